@@ -1,0 +1,35 @@
+"""The scene: what a user describes, validated completely; SI units, points as coordinates."""
+
+from kedfem.scene.analysis import Analysis, Animation, Output, Probe
+from kedfem.scene.damping import Damping, rayleigh
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.files import part_geometry
+from kedfem.scene.laws import drive_angle, load_factor
+from kedfem.scene.links import GROUND, Joint, LinkScene, Meshing
+from kedfem.scene.loads import (
+    Body,
+    BodyLoad,
+    Factor,
+    Flywheel,
+    ForceLoad,
+    Load,
+    PointMass,
+    RigidBody,
+    SurfaceLoad,
+    inertia_tensor,
+)
+from kedfem.scene.materials import Material
+from kedfem.scene.outlines import Arc, Hole
+from kedfem.scene.read import read_scene, scene_from
+from kedfem.scene.scene import Scene
+from kedfem.scene.shapes import Bar, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
+from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
+
+__all__ = [
+    "GROUND", "Analysis", "Animation", "Arc", "Bar", "Body", "BodyLoad", "ConstantSpeed", "Cycloidal",
+    "Damping", "Drive", "Extrusion", "Factor", "Flywheel", "ForceLoad", "Hole", "Joint", "LinkScene", "Load",
+    "Material", "MeshFile", "Meshing", "MotionLaw", "Output", "Part", "PartGeometry", "PlateLink",
+    "PointMass", "Polyline", "Polynomial", "Probe", "Ramp", "RigidBody", "Scene", "Shape", "SurfaceLoad",
+    "Table", "TimeGrid", "drive_angle", "inertia_tensor", "load_factor", "part_geometry", "rayleigh",
+    "read_scene", "scene_from", "time_grid", "turn_steps",
+]  # fmt: skip

@@ -1,0 +1,92 @@
+"""What is analysed, and what is written."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    StrictBool,
+    StrictInt,
+    model_serializer,
+)
+
+from kedfem.scene.base import FileName, Name, Record
+from kedfem.scene.links import Count
+from kedfem.scene.points import Point
+from kedfem.scene.units import PositiveTime, Quantity, fault
+
+Positive = Annotated[float, Quantity("1", above=0.0)]
+
+
+class Analysis(Record):
+    """How long, in which steps, from which state."""
+
+    turns: Positive | None = None
+    """turns of the drive; for drives that turn at a constant speed, or speed up to one"""
+    end_time: PositiveTime | None = None
+    """end of the analysis, instead of `turns`"""
+    steps_per_turn: Annotated[StrictInt, Field(ge=4)] | None = None
+    """time steps in a turn (at the final speed); 720 if neither this nor `step` is given"""
+    step: PositiveTime | None = None
+    """time step, instead of `steps_per_turn`; shortened so that a whole number reaches the end"""
+    rho_inf: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 1.0
+    """ρ∞ of the generalised-α method: 1 is Newmark's average acceleration; less damps fast vibration"""
+    initial: Literal["rest", "quasi-static"] = "rest"
+    """elastic state at the start: none, or that of the slowly turning mechanism"""
+    solver: Literal["condensed", "literal"] = "condensed"
+    """condensed: one factorisation per link; literal: assembles and factors at every step"""
+
+
+class Animation(Record):
+    """Frames for ParaView."""
+
+    frames_per_turn: Count = 36
+    """frames in a turn; in the whole analysis if the drive has no turns"""
+    exaggeration: Positive = 1.0
+    """factor on the elastic displacement"""
+    last_turns: Positive | None = None
+    """only so many turns, the last ones; all if not given"""
+
+
+class Probe(Record):
+    """A quantity at a point of an elastic link, at every time step."""
+
+    link: str
+    """the link"""
+    at: Point
+    """where, in the drawn position"""
+    quantity: Literal["displacement", "velocity", "acceleration", "stress"]
+    """displacement, velocity and acceleration are those of the elastic motion"""
+    frame: Literal["link", "world"] = "link"
+    """axes of the components: those of the link (x along it) or the world's; stress: the link's only"""
+
+
+def animation_or_none(value: Any) -> Any:
+    """`animation = false`: none."""
+    if value is True or (isinstance(value, (int, float, str)) and value is not False):
+        raise fault(f"must be a table of keys, or false, got {value!r}")
+    return None if value is False else value
+
+
+class Output(Record):
+    """Which results are written, and where."""
+
+    folder: FileName | None = None
+    """the folder of the results; `<scene>-results` beside the scene file if not given"""
+    csv: StrictBool = False
+    """whether the results are also written as CSV"""
+    plots: StrictBool = True
+    """whether curves are plotted"""
+    picture: StrictBool = True
+    """whether the frame with the worst stress is drawn"""
+    animation: Annotated[Animation | None, BeforeValidator(animation_or_none)] = Animation()
+    """frames for ParaView; `animation = false` for none"""
+    probes: dict[Name, Probe] = Field(default_factory=dict)
+    """quantities to follow"""
+
+    @model_serializer(mode="wrap")
+    def _no_animation(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {**handler(self), **({"animation": False} if self.animation is None else {})}

@@ -1,0 +1,217 @@
+"""Cross checks: names that must exist, keys that must suit each other. Each check yields fault lines.
+
+They look at what was given, not only at good records, so that a fault in one key hides no fault in another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from kedfem.scene.faults import either, line
+from kedfem.scene.links import GROUND
+from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.wording import shown, unknown_name
+
+SHAPES = {
+    "solid": ["bar", "plate_link", "extrusion", "part", "mesh"],
+    "beam": ["bar", "polyline"],
+}
+ELEMENTS = {"solid": ["hex27", "hex8"], "beam": ["beam3", "beam2"]}
+
+
+def fidelity(link: Entry) -> str:
+    """The fidelity of a link as given."""
+    return link.word("fidelity") or "solid"
+
+
+def reference_faults(parts: Parts) -> Iterator[str]:
+    """Names of materials, links and joints that do not exist."""
+    for link in parts.links.values():
+        material = link.word("material")
+        if material is not None and material not in parts.materials:
+            yield link.fault("material", unknown_name("a material", material, parts.materials))
+    for joint in parts.joints.values() if parts.links else ():
+        for i, name in enumerate(link_names(joint)):
+            if name not in parts.links and name != GROUND:
+                yield joint.fault("links", unknown_name("a link", name, [*parts.links, GROUND]), i)
+    for user in [*parts.loads.values(), *parts.bodies.values(), *parts.probes.values()]:
+        link_name = user.word("link")
+        if link_name is not None and parts.links and link_name not in parts.links:
+            yield user.fault("link", unknown_name("a link", link_name, parts.links))
+    joint_name = parts.drive.word("joint")
+    if joint_name is not None and parts.joints and joint_name not in parts.joints:
+        yield parts.drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
+
+
+def link_names(joint: Entry) -> list[str]:
+    """The names of the links that a joint joins, as given."""
+    names = joint.raw.get("links")
+    return [name for name in names if isinstance(name, str)] if isinstance(names, (list, tuple)) else []
+
+
+def link_faults(parts: Parts) -> Iterator[str]:
+    """Links whose keys do not suit their fidelity."""
+    for link in parts.links.values():
+        if link.name == GROUND:
+            yield line(link.where, "must have another name, got that of the frame")
+        if fidelity(link) == "rigid":
+            yield from rigid_faults(link, parts)
+        elif fidelity(link) in SHAPES:
+            yield from elastic_faults(link)
+            yield from meshing_faults(link)
+
+
+def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
+    """A rigid link that is not a slider, or has keys of an elastic one."""
+    if not any(is_slide(joint) and link.name in link_names(joint) for joint in parts.joints.values()):
+        wanted = "must be 'solid' or 'beam' unless the link is a slider (a prismatic joint to the ground)"
+        yield link.fault("fidelity", f"{wanted}, got 'rigid'")
+    for key in ("shape", "material", "element"):
+        if link.has(key):
+            got = link.word(key, "kind") or link.word(key) or "one"
+            yield link.fault(key, f"must not be given for a rigid link, got {got!r}")
+
+
+def is_slide(joint: Entry) -> bool:
+    """Whether a joint is a slider's."""
+    return joint.word("kind") == "prismatic" and GROUND in link_names(joint)
+
+
+def elastic_faults(link: Entry) -> Iterator[str]:
+    """Missing or unsuitable keys of a solid or a beam."""
+    kind, shape, element = fidelity(link), link.word("shape", "kind"), link.word("element")
+    for key in ("shape", "material"):
+        if not link.has(key):
+            yield link.fault(key, f"is required for a {kind}, got nothing")
+    every_shape = {name for names in SHAPES.values() for name in names}
+    if shape in every_shape and shape not in SHAPES[kind]:
+        yield link.fault("shape", f"must be {either(SHAPES[kind])} for a {kind}, got {shape!r}", "kind")
+    every_element = {name for names in ELEMENTS.values() for name in names}
+    if element in every_element and element not in ELEMENTS[kind]:
+        yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {kind}, got {element!r}")
+    if link.record is not None and link.record.mass:
+        yield link.fault(
+            "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {kind}"
+        )
+
+
+def meshing_faults(link: Entry) -> Iterator[str]:
+    """Keys of `mesh` that do not suit the shape."""
+    shape, mesh = link.word("shape", "kind"), link.raw.get("mesh")
+    if not isinstance(mesh, Mapping):
+        return
+    counted = "beam" if fidelity(link) == "beam" else "bar" if shape == "bar" else None
+    if counted is not None:
+        for key in ("size", "elements_across"):
+            if link.has("mesh", key):
+                got = f"got {shown(mesh[key])}"
+                yield link.fault("mesh", f"must be left out for a {counted} (it has elements), {got}", key)
+        yield from count_faults(link, counted)
+    elif shape in SHAPES["solid"]:
+        if link.has("mesh", "elements"):
+            got = f"got {shown(mesh['elements'])}"
+            wanted = f"must be left out for a {shape} (it has size or elements_across)"
+            yield link.fault("mesh", f"{wanted}, {got}", "elements")
+        if link.has("mesh", "size") and link.has("mesh", "elements_across"):
+            yield link.fault("mesh", "must stand without elements_across, got both", "size")
+
+
+def count_faults(link: Entry, counted: str) -> Iterator[str]:
+    """One number of elements where three are needed, or the reverse."""
+    elements = link.record.mesh.elements if link.record is not None else None
+    if counted == "beam" and isinstance(elements, tuple):
+        wanted = "must be one number, per segment, for a beam"
+        yield link.fault("mesh", f"{wanted}, got {list(elements)}", "elements")
+    if counted == "bar" and isinstance(elements, int):
+        wanted = "must be three numbers for a solid bar: along, across, thickness"
+        yield link.fault("mesh", f"{wanted}, got {elements}", "elements")
+
+
+def joint_faults(parts: Parts) -> Iterator[str]:
+    """Joints that join nothing, and links that nothing joins."""
+    for joint in parts.joints.values():
+        names = link_names(joint)
+        if names == [GROUND, GROUND]:
+            yield joint.fault("links", "must hold a link, got the ground twice")
+        elif len(names) == 2 and names[0] == names[1]:
+            yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
+        if joint.word("kind") == "prismatic":
+            if len(names) == 2 and GROUND not in names:
+                got = f"got {names[0]!r} and {names[1]!r}"
+                yield joint.fault("links", f"must hold 'ground' for a prismatic joint, {got}")
+            if not joint.has("axis"):
+                yield joint.fault(
+                    "axis", "is required for a prismatic joint: 'x', 'y', 'z' or a vector, got nothing"
+                )
+    pairs = [link_names(joint) for joint in parts.joints.values()]
+    reached = connected(GROUND, pairs)
+    for link in parts.links.values() if pairs else ():
+        if not any(link.name in pair for pair in pairs):
+            yield line(link.where, "must be held by a joint, got none")
+        elif link.name not in reached:
+            yield line(link.where, "must be connected with the ground through joints, got no way there")
+
+
+def connected(start: str, pairs: list[list[str]]) -> set[str]:
+    """The names that pairs connect with a first one."""
+    reached = {start}
+    while more := {name for pair in pairs if reached & set(pair) for name in pair} - reached:
+        reached |= more
+    return reached
+
+
+def drive_faults(parts: Parts) -> Iterator[str]:
+    """A drive on a joint that is not a hinge on the ground."""
+    joint = parts.joints.get(parts.drive.word("joint") or "")
+    if joint is None:
+        return
+    kind = joint.word("kind")
+    if kind in {"spherical", "weld", "prismatic"}:
+        yield parts.drive.fault("joint", f"must name a revolute joint, got {joint.name!r}, which is {kind}")
+    names = link_names(joint)
+    if len(names) == 2 and GROUND not in names:
+        got = f"got {joint.name!r} of {names[0]!r} and {names[1]!r}"
+        yield parts.drive.fault("joint", f"must name a joint of a link and the ground, {got}")
+
+
+def load_faults(parts: Parts) -> Iterator[str]:
+    """Loads, bodies and probes that do not suit their link."""
+    for load in parts.loads.values():
+        link = parts.links.get(load.word("link") or "")
+        kind = load.word("kind")
+        if link is None:
+            continue
+        if kind == "surface" and fidelity(link) != "solid":
+            got = f"got {link.name!r}, which is {fidelity(link)}"
+            yield load.fault("link", f"must name a solid for a surface load, {got}")
+        if kind == "body" and fidelity(link) == "rigid":
+            got = f"got {link.name!r}, which is rigid"
+            yield load.fault("link", f"must name a solid or a beam for a body load, {got}")
+    for probe in parts.probes.values():
+        link = parts.links.get(probe.word("link") or "")
+        if link is not None and fidelity(link) == "rigid":
+            yield probe.fault("link", f"must name an elastic link, got {link.name!r}, which is rigid")
+        if probe.word("quantity") == "stress" and probe.word("frame") == "world":
+            yield probe.fault("frame", "must be 'link' for a stress, got 'world'")
+    for body in parts.bodies.values():
+        yield from flywheel_faults(body, parts)
+
+
+def flywheel_faults(body: Entry, parts: Parts) -> Iterator[str]:
+    """A flywheel away from the hinges of its link."""
+    link_name = body.word("link")
+    if body.record is None or body.word("kind") != "flywheel" or link_name not in parts.links:
+        return
+    hinges = [
+        joint
+        for joint in parts.joints.values()
+        if link_name in link_names(joint) and joint.word("kind") != "prismatic"
+    ]
+    if any(joint.record is None for joint in hinges):
+        return
+    turning = [joint.record.at for joint in hinges if joint.record.kind == "revolute"]
+    size = max((math.hypot(*at) for at in turning), default=0.0) + math.hypot(*body.record.at)
+    if not any(not math.dist(at, body.record.at) > 1e-6 * size for at in turning):
+        at = ", ".join(f"{part:.6g}" for part in body.record.at)
+        yield body.fault("at", f"must be the point of a revolute joint of links.{link_name} [m], got ({at})")

@@ -1,0 +1,149 @@
+"""Files beside the scene: TOML text, parts and motion tables."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from kedfem.errors import SceneError
+from kedfem.scene.faults import fault_lines
+from kedfem.scene.placing import Placement
+from kedfem.scene.points import known_points
+from kedfem.scene.shapes import PartGeometry
+from kedfem.scene.units import si_number
+
+scene_folder: ContextVar[Path] = ContextVar("scene_folder", default=Path())
+
+
+def file_text(path: Path) -> str:
+    """Text of a file, UTF-8 with or without a byte order mark.
+
+    Raises
+    ------
+    SceneError
+        No such file, not a file, not readable, not text.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise SceneError(f"{path}: must be a file, got nothing there") from None
+    except UnicodeDecodeError as reason:
+        raise SceneError(
+            f"{path}: must be text in UTF-8, got other bytes at position {reason.start}"
+        ) from None
+    except OSError as reason:
+        raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
+
+
+def toml_table(path: Path) -> tuple[dict[str, Any], str]:
+    """Content and text of a TOML file.
+
+    Raises
+    ------
+    SceneError
+        Not readable, empty or not TOML; the line is named.
+    """
+    text = file_text(path)
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as reason:
+        found = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(reason), re.DOTALL)
+        number = found[2] if found else str(len(text.splitlines()))
+        raise SceneError(
+            f"{path}, line {number}: must be valid TOML, got: {found[1] if found else str(reason)}"
+        ) from None
+    if not table:
+        raise SceneError(f"{path}: must hold at least one key, got an empty file")
+    return table, text
+
+
+def part_geometry(path: Path) -> PartGeometry:
+    """The geometry of a part from its TOML file; may hold a table of `points` of its own, like a scene.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the file, each preceded by its name.
+    """
+    raw, _ = toml_table(path)
+    placement = Placement(raw.get("points"), {})
+    placement.place_all()
+    faults = placement.faults
+    shape = {key: value for key, value in raw.items() if key != "points"}
+    try:
+        with known_points(placement):
+            part = PartGeometry.model_validate(shape)
+    except ValidationError as error:
+        faults = faults + fault_lines(error, PartGeometry, shape)
+    if faults:
+        raise SceneError([f"{path.name}: {fault}" for fault in faults])
+    return part
+
+
+def motion_table(path: Path) -> tuple[list[float], list[float]]:
+    """Times [s] and angles [rad] of a CSV file with two columns, under an optional heading with units.
+
+    Raises
+    ------
+    SceneError
+        Not readable, or a line that is not two numbers.
+    """
+    rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
+    factors = (1.0, 1.0)
+    if rows and not _numbers(rows[0][1]):
+        factors = _heading_factors(path, rows[0][1])
+        rows = rows[1:]
+    pairs = []
+    for i, row in rows:
+        numbers = _numbers(row)
+        if numbers is None:
+            raise SceneError(
+                f"{path.name}, line {i}: must be two numbers, time and angle, got {','.join(row)!r}"
+            )
+        pairs.append(numbers)
+    return [time * factors[0] for time, _ in pairs], [angle * factors[1] for _, angle in pairs]
+
+
+def _numbers(row: list[str]) -> tuple[float, float] | None:
+    try:
+        time, angle = (float(cell) for cell in row)
+    except ValueError:
+        return None
+    return time, angle
+
+
+def _heading_factors(path: Path, row: list[str]) -> tuple[float, float]:
+    """SI units per unit of each column, from a heading such as 'time [ms], angle [deg]'."""
+    units = [re.search(r"\[(.*)\]", cell) for cell in row]
+    if len(units) != 2:
+        raise SceneError(f"{path.name}, line 1: must head two columns, time and angle, got {','.join(row)!r}")
+    try:
+        time, angle = (
+            si_number(f"1 {unit[1]}", si) if unit else 1.0
+            for unit, si in zip(units, ("s", "rad"), strict=True)
+        )
+    except ValueError as reason:
+        raise SceneError(f"{path.name}, line 1: must have units of time and angle, got: {reason}") from None
+    return time, angle
+
+
+def with_motion_table(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with the motion table of its drive read from the file that it names; and faults."""
+    drive = raw.get("drive")
+    motion = drive.get("motion") if isinstance(drive, Mapping) else None
+    if not isinstance(drive, Mapping) or not isinstance(motion, Mapping):
+        return dict(raw), []
+    named = motion.get("kind") == "table" and isinstance(motion.get("file"), str)
+    if not named or "time" in motion or "angle" in motion:
+        return dict(raw), []
+    try:
+        time, angle = motion_table(folder / motion["file"])
+    except SceneError as error:
+        return dict(raw), [f"drive.motion.file: {fault}" for fault in error.faults]
+    return {**raw, "drive": {**drive, "motion": {"kind": "table", "time": time, "angle": angle}}}, []

@@ -1,0 +1,110 @@
+"""The drive's angle and the loads' factors over time, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.loads import Factor
+
+Times = Float[np.ndarray, " t"]
+Law = tuple[Times, Times, Times]
+
+
+def drive_angle(motion: MotionLaw, t: Times) -> Law:
+    """Angle of the driven joint and its derivatives.
+
+    Parameters
+    ----------
+    motion : law of motion of the drive
+    t : (t,) [s]
+        Times, from 0 on.
+
+    Returns
+    -------
+    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²]
+        Relative to the drawn position; right-hand derivatives where a law has a jump.
+
+    Raises
+    ------
+    MotionError
+        A time outside the table of a table law.
+    """
+    t = np.asarray(t, dtype=float)
+    match motion:
+        case ConstantSpeed(speed=w):
+            return w * t, np.full_like(t, w), np.zeros_like(t)
+        case Ramp():
+            return ramp(motion, t)
+        case Table():
+            return spline(motion, t)
+        case Cycloidal() | Polynomial():
+            return rise_dwell(motion, t)
+
+
+def ramp(motion: Ramp, t: Times) -> Law:
+    """A speed that rises from 0 to ω in T: linearly, or as ω/2 (1 − cos πt/T)."""
+    w, T = motion.speed, motion.time
+    up = np.minimum(t, T)
+    k = np.pi / T
+    if motion.shape == "smooth":
+        phi = 0.5 * w * (up - np.sin(k * up) / k)
+        dphi, ddphi = 0.5 * w * (1.0 - np.cos(k * up)), 0.5 * w * k * np.sin(k * up)
+    else:
+        phi, dphi, ddphi = 0.5 * w * up**2 / T, w * up / T, np.full_like(t, w / T)
+    return phi + w * (t - up), dphi, np.where(t < T, ddphi, 0.0)
+
+
+def spline(motion: Table, t: Times) -> Law:
+    """The cubic spline through a table."""
+    from scipy.interpolate import CubicSpline
+
+    first, last = motion.time[0], motion.time[-1]
+    slack = 1e-9 * (last - first)
+    if t.size and (t.min() < first - slack or t.max() > last + slack):
+        wrong = t.min() if t.min() < first - slack else t.max()
+        raise MotionError(
+            f"drive.motion.time: must reach t = {wrong:.6g} s, got a table from {first:.6g} to {last:.6g} s"
+        )
+    curve = CubicSpline(motion.time, motion.angle)
+    return curve(t), curve(t, 1), curve(t, 2)
+
+
+def rise_dwell(motion: Cycloidal | Polynomial, t: Times) -> Law:
+    """Rise, dwell, return and dwell, repeated; without a return time only the rise."""
+    rise, back = motion.rise, motion.return_time
+    if back is None:
+        s, ds, dds = unit_rise(motion, np.clip(t / rise, 0.0, 1.0))
+        return motion.angle * s, motion.angle / rise * ds, motion.angle / rise**2 * dds
+    top = rise + motion.dwell
+    tau = np.mod(t, top + back + motion.dwell_after)
+    falling = tau >= top
+    span = np.where(falling, back, rise)
+    s, ds, dds = unit_rise(motion, np.clip(np.where(falling, tau - top, tau) / span, 0.0, 1.0))
+    sign = np.where(falling, -1.0, 1.0) * motion.angle
+    return np.where(falling, motion.angle, 0.0) + sign * s, sign / span * ds, sign / span**2 * dds
+
+
+def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
+    """A law's rise from 0 to 1 over 0 ≤ x ≤ 1, and its two derivatives."""
+    if isinstance(motion, Cycloidal):
+        w = 2.0 * np.pi
+        return x - np.sin(w * x) / w, 1.0 - np.cos(w * x), w * np.sin(w * x)
+    if motion.order == 5:
+        return (
+            x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
+            30.0 * x**2 * (1.0 - x) ** 2,
+            60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+        )
+    return (
+        x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3),
+        140.0 * x**3 * (1.0 - x) ** 3,
+        420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x),
+    )
+
+
+def load_factor(factor: Factor, t: Times) -> Times:
+    """Factor of a load at times t (t,) [s]: linear between the table's times, held outside."""
+    return np.asarray(np.interp(np.asarray(t, dtype=float), factor.time, factor.value))

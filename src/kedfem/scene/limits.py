@@ -1,0 +1,153 @@
+"""Cross checks of beams and their plane, of the analysis and its drive, of files; each yields fault lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from kedfem.errors import SceneError
+from kedfem.scene.checks import fidelity
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
+from kedfem.scene.files import part_geometry
+from kedfem.scene.parts import Parts
+from kedfem.scene.points import XYZ
+from kedfem.scene.shapes import MeshFile, Part
+from kedfem.scene.timing import turning_speed
+
+FLAT = 1e-9  # how far from the plane, relative to the size of the scene
+
+
+def beam_faults(parts: Parts) -> Iterator[str]:
+    """Beams beside solids, and what leaves the plane of a scene of beams."""
+    solids = [link for link in parts.links.values() if fidelity(link) == "solid"]
+    beams = [link for link in parts.links.values() if fidelity(link) == "beam"]
+    if not beams:
+        return
+    if solids:
+        names = f"got {beams[0].name!r} as a beam and {solids[0].name!r} as a solid"
+        yield f"links: must all be solids or all be beams (rigid sliders go with both), {names}"
+        return
+    for joint in parts.joints.values():
+        axis = joint.record.axis if joint.record is not None else None
+        if axis is None:
+            continue
+        off = max(abs(axis[0]), abs(axis[1]))
+        if joint.record.kind == "revolute" and off > FLAT:
+            yield joint.fault("axis", f"must be along z in a scene of beams, got {vector(axis)}")
+        if joint.record.kind == "prismatic" and abs(axis[2]) > FLAT:
+            yield joint.fault("axis", f"must lie in the xy plane in a scene of beams, got {vector(axis)}")
+    if parts.gravity[2] != 0.0:
+        yield f"gravity: must lie in the xy plane in a scene of beams [m/s^2], got {vector(parts.gravity)}"
+    for load in parts.loads.values():
+        if load.record is not None and load.record.vector[2] != 0.0:
+            yield load.fault(
+                "vector", f"must lie in the xy plane in a scene of beams, got {vector(load.record.vector)}"
+            )
+    yield from plane_faults(parts)
+
+
+def vector(parts: tuple[float, ...]) -> str:
+    """A vector as text."""
+    return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
+
+
+def plane_faults(parts: Parts) -> Iterator[str]:
+    """Points of a scene of beams that are not in the z plane of the first."""
+    placed = [
+        (entry, key, point)
+        for section in (parts.links, parts.joints, parts.loads, parts.bodies, parts.probes)
+        for entry in section.values()
+        if entry.record is not None
+        for key, point in points_of(entry.record)
+        if all(math.isfinite(part) for part in point)
+    ]
+    if not placed:
+        return
+    first = placed[0][2]
+    size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
+    for entry, key, point in placed:
+        if abs(point[2] - first[2]) > FLAT * size:
+            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of a scene of beams [m]"
+            yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
+
+
+def points_of(record: Any) -> Iterator[tuple[tuple[str, *tuple[str | int, ...]], XYZ]]:
+    """The points of a link, joint, load, body or probe, with their keys."""
+    shape = getattr(record, "shape", None)
+    for key in ("between", "points"):
+        for i, point in enumerate(getattr(shape, key, ())):
+            yield ("shape", key, i), point
+    for key in ("at", "centre"):
+        if hasattr(record, key):
+            yield (key,), getattr(record, key)
+
+
+def analysis_faults(parts: Parts) -> Iterator[str]:
+    """An analysis whose end or step is missing, given twice or impossible with the drive."""
+    analysis = parts.analysis
+    if not analysis.raw:
+        return
+    if analysis.has("turns") and analysis.has("end_time"):
+        yield analysis.fault("turns", "must stand without end_time, got both")
+    if not analysis.has("turns") and not analysis.has("end_time"):
+        yield analysis.fault("turns", "is required, or end_time [s], got neither")
+    if analysis.has("step") and analysis.has("steps_per_turn"):
+        yield analysis.fault("step", "must stand without steps_per_turn, got both")
+    if parts.drive.record is not None:
+        yield from drive_and_analysis_faults(parts)
+
+
+def drive_and_analysis_faults(parts: Parts) -> Iterator[str]:
+    """An analysis that does not suit the law of motion."""
+    analysis, motion = parts.analysis, parts.drive.record.motion
+    if turning_speed(motion) == 0.0:
+        still = isinstance(motion, (ConstantSpeed, Ramp))
+        got = "speed 0" if still else f"{motion.kind!r}"
+        for key in ("turns", "steps_per_turn"):
+            if analysis.has(key):
+                instead = "end_time" if key == "turns" else "step"
+                yield analysis.fault(
+                    key, f"needs a drive that goes on turning (else {instead} [s]), got {got}"
+                )
+        if not analysis.has("step") and not analysis.has("steps_per_turn"):
+            yield analysis.fault(
+                "step", f"is required with a drive that does not go on turning [s], got {got}"
+            )
+    if isinstance(motion, Table) and motion.time:
+        yield from table_faults(parts, motion)
+    stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
+    if stays and motion.dwell_after > 0.0:
+        yield "drive.motion.dwell_after: must stand with return_time, got no return"
+
+
+def table_faults(parts: Parts, motion: Table) -> Iterator[str]:
+    """A motion table that does not cover the analysis."""
+    if motion.time[0] > 0.0:
+        yield f"drive.motion.time: must begin at 0 or before [s], got {motion.time[0]:.6g}"
+    end = parts.analysis.record.end_time if parts.analysis.record is not None else None
+    if end is not None and end > motion.time[-1] * (1.0 + 1e-9):
+        wanted = f"must reach the end of the analysis {end:.6g} [s]"
+        yield f"drive.motion.time: {wanted}, got {motion.time[-1]:.6g}"
+
+
+def file_faults(parts: Parts) -> Iterator[str]:
+    """Files of shapes that are missing, and parts that do not fit between their points."""
+    for link in parts.links.values():
+        shape = link.record.shape if link.record is not None else None
+        if isinstance(shape, MeshFile) and not (parts.folder / shape.file).is_file():
+            yield link.fault(
+                "shape", f"must be a mesh file, got nothing at {parts.folder / shape.file}", "file"
+            )
+        if isinstance(shape, Part):
+            try:
+                part = part_geometry(parts.folder / shape.file)
+            except SceneError as error:
+                yield from (link.fault("shape", fault, "file") for fault in error.faults)
+                continue
+            wanted, got = math.dist(*shape.between), math.dist(part.origin, part.x_point)
+            if abs(wanted - got) > 1e-6 * got:
+                message = (
+                    f"must be as far apart as origin and x_point of the part {got:.9g} [m], got {wanted:.9g}"
+                )
+                yield link.fault("shape", message, "between")

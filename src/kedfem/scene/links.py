@@ -1,0 +1,94 @@
+"""Links and joints of the scene."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
+
+from kedfem.scene.base import Record
+from kedfem.scene.points import Axis, Point
+from kedfem.scene.shapes import Bar, Shape
+from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
+
+GROUND = "ground"
+Count = Annotated[StrictInt, Field(ge=1)]
+
+
+def counts(value: object) -> object:
+    """One number of elements, or three."""
+    if value is None:
+        return None
+    several = value if isinstance(value, (list, tuple)) else [value]
+    whole = all(isinstance(number, int) and not isinstance(number, bool) and number > 0 for number in several)
+    if not whole or len(several) not in {1, 3}:
+        raise fault(f"must be one or three whole numbers of at least 1, got {value!r}")
+    return several[0] if len(several) == 1 else tuple(several)
+
+
+class Meshing(Record):
+    """How finely a link is divided into elements."""
+
+    elements: Annotated[int | tuple[int, int, int] | None, BeforeValidator(counts)] = None
+    """solid bar: numbers along, across, through the thickness; beam: number per segment (1 if not given)"""
+    size: PositiveLength | None = None
+    """other solids: edge length of the elements, instead of `elements_across`"""
+    elements_across: Count | None = None
+    """other solids: number across the smallest width; 2 if neither this nor `size` is given"""
+    layers: Count = 1
+    """other solids: number through the thickness"""
+
+
+class LinkScene(Record):
+    """A link: its material, shape, fidelity and mesh."""
+
+    fidelity: Literal["solid", "beam", "rigid"] = "solid"
+    """hexahedra, planar beams, or (sliders only) a rigid body"""
+    material: str | None = None
+    """a name: built in or in `materials`; not for a rigid link"""
+    shape: Shape | None = None
+    """its shape; not for a rigid link"""
+    mass: Mass = 0.0
+    """mass of a rigid link"""
+    mesh: Meshing = Meshing()
+    """how it is meshed"""
+    element: Literal["hex27", "hex8", "beam3", "beam2"] | None = None
+    """hex27 (or hex8) for a solid, beam3 (or beam2) for a beam"""
+    min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
+    """least scaled Jacobian of a solid's elements"""
+    shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] = 5.0 / 6.0
+    """part of the section that carries the shear force of a beam"""
+
+    @model_validator(mode="after")
+    def _defaults(self) -> Self:
+        element = self.element or {"solid": "hex27", "beam": "beam3", "rigid": None}[self.fidelity]
+        return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
+
+    def _mesh_defaults(self) -> dict[str, Any]:
+        if self.fidelity == "beam":
+            return {"elements": self.mesh.elements or 1}
+        if isinstance(self.shape, Bar):
+            along = math.dist(*self.shape.between) / (1.5 * self.shape.width)
+            along = min(max(math.ceil(along), 4), 40) if math.isfinite(along) else 4
+            return {"elements": self.mesh.elements or (along, 2, 1)}
+        across = self.mesh.elements_across or (2 if self.mesh.size is None else None)
+        return {"elements_across": across}
+
+
+class Joint(Record):
+    """A joint between two links, or a link and the ground."""
+
+    kind: Literal["revolute", "spherical", "weld", "prismatic"]
+    """hinge; ball; rigid connection; slider along a line of the ground"""
+    links: tuple[str, str]
+    """the two links that it joins; `"ground"` for the frame"""
+    at: Point
+    """its centre"""
+    axis: Axis | None = None
+    """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), a slider's direction (required);
+    for a ball or a weld the axis of the bore that holds it"""
+
+    @model_validator(mode="after")
+    def _hinge_along_z(self) -> Self:
+        return self.fill(axis=(0.0, 0.0, 1.0)) if self.kind == "revolute" and self.axis is None else self

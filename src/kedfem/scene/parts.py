@@ -1,0 +1,123 @@
+"""A scene under validation: what it says, and those of its parts that are good already."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from kedfem.scene.analysis import Analysis, Probe
+from kedfem.scene.drives import Drive
+from kedfem.scene.faults import line
+from kedfem.scene.links import Joint, LinkScene
+from kedfem.scene.loads import Body, Load
+from kedfem.scene.materials import BUILT_IN
+
+TYPES: dict[str, Any] = {
+    "links": LinkScene,
+    "joints": Joint,
+    "loads": Load,
+    "bodies": Body,
+    "probes": Probe,
+    "drive": Drive,
+    "analysis": Analysis,
+}
+
+
+@cache
+def adapter(section: str) -> TypeAdapter[Any]:
+    """The check of one entry of a section."""
+    return TypeAdapter(TYPES[section])
+
+
+def good(section: str, raw: Any) -> Any:
+    """The record of an entry, or None if it has a fault."""
+    try:
+        return adapter(section).validate_python(raw)
+    except ValidationError:
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A part of the scene: its place, what was given, and the record if that is good."""
+
+    where: tuple[str, ...]
+    raw: Mapping[str, Any]
+    record: Any
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.where[-1]
+
+    def word(self, *path: str) -> str | None:
+        """What a key holds, as given, if it is a word."""
+        value: Any = self.raw
+        for key in path:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        return value if isinstance(value, str) else None
+
+    def has(self, *path: str) -> bool:
+        """Whether a key is given."""
+        value: Any = self.raw
+        for key in path:
+            value = value.get(key) if isinstance(value, Mapping) else None
+        return value is not None
+
+    def fault(self, key: str, message: str, *inner: str | int) -> str:
+        """A fault line about one of its keys."""
+        return line((*self.where, key, *inner), message)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """A scene under validation: its entries by name, known materials and the folder of its files."""
+
+    links: dict[str, Entry]
+    joints: dict[str, Entry]
+    loads: dict[str, Entry]
+    bodies: dict[str, Entry]
+    probes: dict[str, Entry]
+    drive: Entry
+    analysis: Entry
+    gravity: tuple[float, ...]
+    materials: list[str]
+    folder: Path
+
+
+def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
+    """The entries of a section that are tables, by name."""
+    found = raw.items() if isinstance(raw, Mapping) else ()
+    return {
+        str(name): Entry((*above, section, str(name)), value, good(section, value))
+        for name, value in found
+        if isinstance(value, Mapping)
+    }
+
+
+def single(section: str, raw: Any) -> Entry:
+    """A section that is one table."""
+    return Entry((section,), raw if isinstance(raw, Mapping) else {}, good(section, raw))
+
+
+def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path) -> Parts:
+    """The parts of a raw scene; to be called where the names of its points are known."""
+    output = raw.get("output")
+    own = raw.get("materials")
+    return Parts(
+        links=entries("links", raw.get("links")),
+        joints=entries("joints", raw.get("joints")),
+        loads=entries("loads", raw.get("loads")),
+        bodies=entries("bodies", raw.get("bodies")),
+        probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
+        drive=single("drive", raw.get("drive")),
+        analysis=single("analysis", raw.get("analysis")),
+        gravity=gravity,
+        materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
+        folder=folder,
+    )

@@ -1,0 +1,53 @@
+"""Scenes from files and from dictionaries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from kedfem.scene.files import scene_folder, toml_table
+from kedfem.scene.scene import Scene
+
+
+def read_scene(path: str | Path) -> Scene:
+    """A scene from its TOML file.
+
+    Parameters
+    ----------
+    path : the scene file; file names in it are relative to its folder.
+
+    Raises
+    ------
+    SceneError
+        With all faults: of the file, or of the scene in it.
+    """
+    path = Path(path)
+    raw, text = toml_table(path)
+    return scene_from(raw, path.parent, source=text, stem=path.stem)
+
+
+def scene_from(
+    raw: Mapping[str, Any], folder: str | Path = ".", *, source: str | None = None, stem: str = "scene"
+) -> Scene:
+    """A scene from a dictionary of the keys that a scene file has.
+
+    Parameters
+    ----------
+    raw : keys and values; records of this package may stand for tables, units as in a file.
+    folder : what file names in it are relative to.
+    source : text of the file that it comes from.
+    stem : name of the scene, for its results.
+
+    Raises
+    ------
+    SceneError
+        With all faults.
+    """
+    token = scene_folder.set(Path(folder))
+    try:
+        scene = Scene.model_validate(raw)
+    finally:
+        scene_folder.reset(token)
+    scene._source, scene._folder, scene._stem = source, Path(folder), stem
+    return scene

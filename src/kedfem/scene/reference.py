@@ -1,0 +1,191 @@
+"""The reference of all keys of a scene, from its records.
+
+Regenerate it with ``python -m kedfem.scene.reference > docs/scene.md``.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import types
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from kedfem.scene import analysis, damping, drives, links, loads, materials, outlines, points, scene, shapes
+from kedfem.scene.hints import field_hint, keys, kind_of, models, options
+from kedfem.scene.units import Quantity
+
+INTRODUCTION = """\
+# The scene file
+
+A scene is a TOML file: a linkage drawn assembled, its drive and loads, and what to find out.
+`kedfem new four-bar` writes a commented one to start from. All faults of a scene are reported at once, each
+as *where: what was wanted, what was got*.
+
+* **Units** are SI (m, kg, s, N, Pa, rad, Hz). A string may carry another unit of the same kind: `"25.4 mm"`,
+  `"600 rpm"`, `"60 deg"`, `"70 GPa"`. Hertz do not count as a rotational speed nor rpm as a frequency.
+* **Points** are two or three coordinates (z = 0 if left out), the name of a point in `[points]`, or
+  `joints.NAME` for the place of a joint. **Axes** are `"x"`, `"y"`, `"z"` or a vector of any length.
+  **Vectors** are two or three components; the third is 0 if left out.
+* **One reference position:** all points, shapes and axes hold where the linkage is drawn; the drive's angle
+  counts from there.
+* **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
+  the frame.
+* **Materials** that are built in: {materials}.
+* **Beams and solids** cannot share a scene yet; rigid sliders go with both. A scene of beams lies in one
+  plane z = constant, with hinges along z.
+* **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
+  `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
+
+The tables below are made from the program's own records (`python -m kedfem.scene.reference > docs/scene.md`).
+What a `—` in the column *default* stands for is said under *meaning*.
+"""
+
+SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
+    ("The file", "", [scene.Scene]),
+    (
+        "[points]",
+        "Each is a list of coordinates or one of these constructions.",
+        [points.PolarPoint, points.CirclesPoint, points.LinePoint, points.BetweenPoint],
+    ),
+    ("[materials.NAME]", "", [materials.Material]),
+    ("[links.NAME]", "", [links.LinkScene]),
+    ("[links.NAME.mesh]", "", [links.Meshing]),
+    ("[links.NAME.shape]", "", models(shapes.Shape)),
+    ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
+    ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
+    ("[joints.NAME]", "", [links.Joint]),
+    ("[drive]", "", [drives.Drive]),
+    ("[drive.motion]", "", models(drives.MotionLaw)),
+    ("[loads.NAME]", "", models(loads.Load)),
+    ("factor of a load", "", [loads.Factor]),
+    ("[bodies.NAME]", "", models(loads.Body)),
+    ("[damping]", "", [damping.Damping]),
+    ("[analysis]", "", [analysis.Analysis]),
+    ("[output]", "", [analysis.Output]),
+    ("[output.animation]", "", [analysis.Animation]),
+    ("[output.probes.NAME]", "", [analysis.Probe]),
+]
+
+NAMED = {
+    points.Point: ("point", "m"),
+    points.Axis: ("axis", ""),
+    points.AccelerationVector: ("vector", "m/s²"),
+    loads.ForceVector: ("vector", "N"),
+    loads.BodyVector: ("vector", "N/m³"),
+    loads.SurfaceVector: ("vector", "Pa"),
+    loads.FactorOverTime: ("number or table", ""),
+}
+
+
+def scene_reference() -> str:
+    """The text of docs/scene.md."""
+    built_in = ", ".join(f"`{name}`" for name in materials.BUILT_IN)
+    parts = [INTRODUCTION.format(materials=built_in)]
+    for heading, note, records in SECTIONS:
+        parts.append(f"## {heading}\n" + (f"\n{note}\n" if note else ""))
+        parts += [record_table(record, alone=len(records) == 1) for record in records]
+    return "\n".join(parts)
+
+
+def record_table(record: type[BaseModel], alone: bool) -> str:
+    """The keys of a record as a Markdown table; under a heading if it is one of several."""
+    kind = kind_of(record)
+    about = (record.__doc__ or "").strip().splitlines()[0].replace("``", "`")
+    title = "" if alone else f"### {f'kind = {chr(34)}{kind}{chr(34)}' if kind else construction(record)}\n\n"
+    rows = [row(key, field) for key, field in keys(record).items() if key != "kind" or kind is None]
+    header = "| key | value | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n"
+    return f"{title}{about}\n\n{header}" + "\n".join(rows) + "\n"
+
+
+def construction(record: type[BaseModel]) -> str:
+    """The keys that must be given, as the heading of a record without a kind."""
+    return "`{ " + ", ".join(f"{key} =" for key, field in keys(record).items() if field.is_required()) + " }`"
+
+
+def row(key: str, field: FieldInfo) -> str:
+    """One key as a line of a table."""
+    value, unit = described(field_hint(field))
+    meaning = " ".join((field.description or "").split())
+    return f"| `{key}` | {value} | {unit} | {default(field)} | {meaning} |"
+
+
+def described(hint: Any) -> tuple[str, str]:
+    """What a value is, in words, and its unit."""
+    for known, words in NAMED.items():
+        if hint == known:
+            return words
+    quantity = next(
+        (extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None
+    )
+    if quantity is not None:
+        return f"number{limits(quantity)}", unit_sign(quantity.unit)
+    parts = [part for part in annotated_members(hint) if part is not type(None)]
+    kinds = [plain_type(part) for part in parts]
+    units = {unit for _, unit in kinds if unit}
+    return " or ".join(dict.fromkeys(word for word, _ in kinds)), units.pop() if len(units) == 1 else ""
+
+
+def annotated_members(hint: Any) -> list[Any]:
+    """The alternatives of a type with their annotations."""
+    while hasattr(hint, "__metadata__") and not any(
+        isinstance(extra, Quantity) for extra in hint.__metadata__
+    ):
+        if any(hint == known for known in NAMED):
+            return [hint]
+        hint = hint.__origin__
+    return list(get_args(hint)) if get_origin(hint) in {Union, types.UnionType} else [hint]
+
+
+def plain_type(hint: Any) -> tuple[str, str]:
+    """A type that is not a number with a unit, in words, and the unit of numbers within it."""
+    if hasattr(hint, "__metadata__") or len(annotated_members(hint)) > 1:
+        return described(hint)
+    inner = get_args(hint)
+    if get_origin(hint) is Literal:
+        return ", ".join(
+            f'`"{word}"`' if isinstance(word, str) else f"`{word}`" for word in options(hint)
+        ), ""
+    if get_origin(hint) is dict:
+        return "tables by name" if models(inner[1]) else f"{described(inner[1])[0]}s by name", described(
+            inner[1]
+        )[1]
+    if get_origin(hint) is tuple:
+        word, unit = described(inner[0])
+        return (f"list: {word}" if inner[-1] is Ellipsis else f"{len(inner)} × {word}"), unit
+    words = {str: "text", bool: "`true`, `false`", int: "whole number", float: "number"}
+    return ("table" if models(hint) else words.get(hint, str(hint))), ""
+
+
+def limits(quantity: Quantity) -> str:
+    """The bounds of a number in signs."""
+    signs = {">": quantity.above, "≥": quantity.least, "<": quantity.below, "≤": quantity.most}
+    return ",".join(f" {sign} {bound:g}" for sign, bound in signs.items() if math.isfinite(bound))
+
+
+def unit_sign(unit: str) -> str:
+    """A unit as it is printed."""
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("*", "·")
+
+
+def default(field: FieldInfo) -> str:
+    """The default of a key."""
+    value = field.default
+    if field.is_required():
+        return "required"
+    if value is PydanticUndefined or value is None or isinstance(value, BaseModel):
+        return "—"
+    if isinstance(value, float) and math.isnan(value):
+        return "—"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, (tuple, list)):
+        return f"`{[round(part, 12) for part in value]}`".replace(".0", "")
+    return f'`"{value}"`' if isinstance(value, str) else f"`{value:.6g}`"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(scene_reference())

@@ -1,0 +1,148 @@
+"""The whole scene, validated at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import (
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+
+from kedfem.errors import SceneError
+from kedfem.scene.analysis import Analysis, Output
+from kedfem.scene.base import Name, Record, plain
+from kedfem.scene.checks import drive_faults, joint_faults, link_faults, load_faults, reference_faults
+from kedfem.scene.damping import Damping
+from kedfem.scene.drives import Drive
+from kedfem.scene.faults import fault_lines
+from kedfem.scene.files import scene_folder, with_motion_table
+from kedfem.scene.limits import analysis_faults, beam_faults, file_faults
+from kedfem.scene.links import Joint, LinkScene
+from kedfem.scene.loads import Body, Load
+from kedfem.scene.materials import BUILT_IN, Material
+from kedfem.scene.parts import Parts, scene_parts
+from kedfem.scene.placing import Placement
+from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
+
+GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
+
+
+class Scene(Record):
+    """A linkage, its drive and loads, and what to find out about it.
+
+    Point fields hold coordinates and numbers are in SI; `materials` holds those that are built in too.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the scene.
+    """
+
+    title: str = ""
+    """a line about the scene, for pictures and summaries"""
+    gravity: AccelerationVector = (0.0, 0.0, 0.0)
+    """acceleration of free fall; none if not given"""
+    points: dict[Name, Point] = Field(default_factory=dict)
+    """points by name: coordinates or a construction"""
+    materials: dict[Name, Material] = Field(default_factory=dict)
+    """materials of this scene, beside those that are built in; one of the same name replaces them"""
+    links: dict[Name, LinkScene] = Field(min_length=1)
+    """the links by name"""
+    joints: dict[Name, Joint] = Field(min_length=1)
+    """the joints by name"""
+    drive: Drive
+    """what moves the mechanism"""
+    loads: dict[Name, Load] = Field(default_factory=dict)
+    """forces, beside gravity and inertia"""
+    bodies: dict[Name, Body] = Field(default_factory=dict)
+    """rigid bodies attached to links"""
+    damping: Damping = Damping()
+    """damping of the elastic motion"""
+    analysis: Analysis
+    """how long, in which steps"""
+    output: Output = Output()
+    """what is written"""
+
+    _source: str | None = PrivateAttr(None)
+    _folder: Path = PrivateAttr(Path())
+    _stem: str = PrivateAttr("scene")
+
+    @property
+    def source(self) -> str | None:
+        """Text of the scene file, or None for a scene from Python."""
+        return self._source
+
+    @property
+    def folder(self) -> Path:
+        """The folder that file names in the scene are relative to."""
+        return self._folder
+
+    @property
+    def results_folder(self) -> Path:
+        """Where the results go."""
+        return self._folder / (self.output.folder or f"{self._stem}-results")
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _all_at_once(cls, raw: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if isinstance(raw, cls):
+            return raw
+        raw = plain(raw)
+        if not isinstance(raw, Mapping):
+            raise SceneError(f"must be a table of keys, got {raw!r}")
+        placement = Placement(raw.get("points"), raw.get("joints"))
+        points = {name: placement[name] for name in placement if not name.startswith("joints.")}
+        raw, faults = with_motion_table(raw, scene_folder.get())
+        faults = placement.faults + faults
+        with known_points(placement):
+            try:
+                scene = handler(prepared(raw, points))
+            except ValidationError as error:
+                scene, faults = None, faults + fault_lines(error, cls, raw)
+            faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
+        if scene is None or faults:
+            raise SceneError(list(dict.fromkeys(faults)))
+        return scene
+
+
+def prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, Any]:
+    """A raw scene with its points placed and the built-in materials that its links name."""
+    ready = dict(raw)
+    if isinstance(raw.get("points"), Mapping):
+        ready["points"] = {name: point for name, point in points.items() if point is not UNPLACED}
+    own, links = raw.get("materials", {}), raw.get("links")
+    if isinstance(own, Mapping) and isinstance(links, Mapping):
+        named = {str(link.get("material")) for link in links.values() if isinstance(link, Mapping)}
+        ready["materials"] = {**{name: BUILT_IN[name] for name in BUILT_IN if name in named}, **own}
+    return ready
+
+
+def gravity_of(raw: Mapping[str, Any]) -> tuple[float, ...]:
+    """The gravity of a raw scene; none if it has a fault."""
+    try:
+        gravity: tuple[float, ...] = GRAVITY.validate_python(raw.get("gravity", [0.0, 0.0, 0.0]))
+    except ValidationError:
+        return (0.0, 0.0, 0.0)
+    return gravity
+
+
+def cross_faults(parts: Parts) -> list[str]:
+    """The faults that only show when parts of the scene are seen together."""
+    checks = (
+        reference_faults,
+        link_faults,
+        joint_faults,
+        drive_faults,
+        load_faults,
+        beam_faults,
+        analysis_faults,
+        file_faults,
+    )
+    return [fault for check in checks for fault in check(parts)]

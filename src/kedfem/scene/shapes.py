@@ -1,0 +1,147 @@
+"""Shapes of links, drawn in the reference position of the scene."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from kedfem.scene.base import Fault, FileName, Record, refuse
+from kedfem.scene.outlines import Profile
+from kedfem.scene.points import XYZ, Point
+from kedfem.scene.units import Length, PositiveLength, Quantity, fault
+
+
+def different(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
+    """Points of which each differs from the one before."""
+    for P, Q in pairwise(points):
+        if math.dist(P, Q) == 0.0:
+            raise fault(f"must be different points, got ({P[0]:.6g}, {P[1]:.6g}, {P[2]:.6g}) twice")
+    return points
+
+
+def level(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
+    """Two points in one z plane."""
+    P, Q = points
+    if abs(P[2] - Q[2]) > 1e-9 * math.dist(P, Q):
+        raise fault(f"must be two points of the same z [m], got {P[2]:.6g} and {Q[2]:.6g}")
+    return points
+
+
+def not_upright(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
+    """Two points that are not one above the other: across and along z must differ from the line."""
+    P, Q = points
+    if math.dist(P[:2], Q[:2]) == 0.0:
+        raise fault(f"must be two points of different x or y, got ({P[0]:.6g}, {P[1]:.6g}) for both")
+    return points
+
+
+TwoPoints = Annotated[tuple[Point, Point], AfterValidator(different)]
+
+
+class Bar(Record):
+    """A straight bar of rectangular section that ends exactly at two points; solid or beam."""
+
+    kind: Literal["bar"] = "bar"
+    between: Annotated[TwoPoints, AfterValidator(not_upright)]
+    """the two ends"""
+    width: PositiveLength
+    """across the line, in the xy plane"""
+    thickness: PositiveLength
+    """across line and width: along z for a bar in an xy plane"""
+
+
+class PlateLink(Record):
+    """A plate with an eye and a bore at each of two points, joined by a straight waist; solid."""
+
+    kind: Literal["plate_link"] = "plate_link"
+    between: Annotated[TwoPoints, AfterValidator(level)]
+    """the centres of the two bores"""
+    width: PositiveLength
+    """width of the waist, in the xy plane"""
+    thickness: PositiveLength
+    """along z"""
+    eye_diameter: PositiveLength = math.nan
+    """outer diameter of the eyes, at least the width; the width if not given"""
+    bore_diameter: PositiveLength
+    """diameter of the bores, smaller than the eyes"""
+    offset: Length = 0.0
+    """distance of the middle plane from the points, along z"""
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        eye = self.width if math.isnan(self.eye_diameter) else self.eye_diameter
+        length = math.dist(*self.between)
+        faults: list[Fault] = []
+        if eye < self.width:
+            faults.append(
+                (("eye_diameter",), f"must be at least the width {self.width:.6g} [m], got {eye:.6g}")
+            )
+        if self.bore_diameter >= eye:
+            message = f"must be smaller than the eye {eye:.6g} [m], got {self.bore_diameter:.6g}"
+            faults.append((("bore_diameter",), message))
+        elif self.bore_diameter >= length:
+            message = f"must be smaller than their distance {length:.6g} [m], got {self.bore_diameter:.6g}"
+            faults.append((("bore_diameter",), message))
+        refuse(faults)
+        return self.fill(eye_diameter=eye)
+
+
+class Extrusion(Profile):
+    """A plate of any outline with round holes; solid."""
+
+    kind: Literal["extrusion"] = "extrusion"
+    offset: Length = 0.0
+    """distance of the middle plane from the outline, along z"""
+
+
+class Part(Record):
+    """A plate from a file of its own (see *The file of a part*), placed between two points; solid."""
+
+    kind: Literal["part"] = "part"
+    file: FileName
+    """the file of the part, relative to the scene file"""
+    between: Annotated[TwoPoints, AfterValidator(level)]
+    """where the part's `origin` and `x_point` go; they must be as far apart as these"""
+
+
+class Polyline(Record):
+    """A chain of straight segments of one rectangular section; beam."""
+
+    kind: Literal["polyline"] = "polyline"
+    points: Annotated[tuple[Point, ...], AfterValidator(different)] = Field(min_length=2)
+    """its corners, at least two"""
+    width: PositiveLength
+    """across the line, in the xy plane"""
+    thickness: PositiveLength
+    """along z"""
+
+
+class MeshFile(Record):
+    """A mesh of hexahedra (8 or 27 nodes) in a file that meshio reads, in the scene's coordinates; solid."""
+
+    kind: Literal["mesh"] = "mesh"
+    file: FileName
+    """the mesh file, relative to the scene file"""
+    scale: Annotated[float, Quantity("1", above=0.0)] = 1.0
+    """metres per unit of the file: 0.001 for a file in millimetres"""
+
+
+Shape = Annotated[Bar | PlateLink | Extrusion | Part | Polyline | MeshFile, Field(discriminator="kind")]
+
+
+class PartGeometry(Profile):
+    """The geometry of a part, in a TOML file and coordinates of its own."""
+
+    origin: Point
+    """the point that goes to the first of the link's points"""
+    x_point: Point
+    """the point that goes to the second"""
+
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> Self:
+        same = math.dist(self.origin, self.x_point) == 0.0
+        refuse([(("x_point",), "must differ from the origin, got the same point")] if same else [])
+        return self

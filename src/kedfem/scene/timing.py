@@ -1,0 +1,81 @@
+"""The time steps of an analysis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kedfem.scene.drives import ConstantSpeed, MotionLaw, Ramp
+from kedfem.scene.laws import drive_angle
+
+if TYPE_CHECKING:
+    from kedfem.scene.scene import Scene
+
+STEPS_PER_TURN = 720
+
+
+@dataclass(frozen=True, slots=True)
+class TimeGrid:
+    """Equal time steps from t = 0.
+
+    Parameters
+    ----------
+    step : time step [s]
+    steps : number of steps; the analysis has one time point more.
+    """
+
+    step: float
+    steps: int
+
+    @property
+    def end(self) -> float:
+        """Time at the end [s]."""
+        return self.step * self.steps
+
+
+def turning_speed(motion: MotionLaw) -> float:
+    """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not."""
+    return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
+
+
+def time_of_turns(motion: MotionLaw, turns: float) -> float:
+    """Time [s] at which a drive that goes on turning has made so many turns."""
+    angle, speed = 2.0 * math.pi * turns, turning_speed(motion)
+    if isinstance(motion, ConstantSpeed):
+        return angle / speed
+    if not isinstance(motion, Ramp):
+        raise ValueError(f"a {motion.kind} drive has no turns")
+    if angle >= 0.5 * speed * motion.time:  # the ramp, of either shape, takes half the angle of full speed
+        return angle / speed + 0.5 * motion.time
+    from scipy.optimize import brentq
+
+    def short_of(t: float) -> float:
+        return abs(float(drive_angle(motion, np.array([t]))[0][0])) - angle
+
+    return float(brentq(short_of, 0.0, motion.time, xtol=1e-15, rtol=1e-14))
+
+
+def time_grid(scene: Scene) -> TimeGrid:
+    """Step and number of steps of a scene's analysis.
+
+    With ``steps_per_turn`` the step is the turn at the drive's final speed, divided, and the last step may
+    pass the end; ``step`` is shortened so that a whole number reaches the end.
+    """
+    analysis, motion = scene.analysis, scene.drive.motion
+    end = analysis.end_time if analysis.turns is None else time_of_turns(motion, analysis.turns)
+    if end is None:
+        raise ValueError("an analysis needs turns or an end time")
+    if analysis.step is not None:
+        steps = max(1, math.ceil(end / analysis.step - 1e-9))
+        return TimeGrid(end / steps, steps)
+    step = 2.0 * math.pi / (turning_speed(motion) * (analysis.steps_per_turn or STEPS_PER_TURN))
+    return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
+
+
+def turn_steps(scene: Scene) -> float | None:
+    """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
+    speed = turning_speed(scene.drive.motion)
+    return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

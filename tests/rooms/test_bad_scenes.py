@@ -1,0 +1,363 @@
+"""Every fault of a scene has its message: where, what was wanted, what was got; all faults come at once."""
+
+import copy
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from kedfem.errors import SceneError
+from kedfem.scene import Bar, Scene, read_scene, scene_from
+
+GOOD = """
+[points]
+A = [0, 0]
+D = [0.3, 0]
+B = { from = "A", distance = 0.1, angle = "60 deg" }
+C = { from = ["B", "D"], distances = [0.3, 0.25] }
+M = { between = ["C", "D"], offset = 0.012 }
+
+[materials.mine]
+density = 2796
+youngs_modulus = 7.031e10
+shear_modulus = 2.712e10
+
+[links.crank]
+material = "mine"
+shape = { kind = "bar", between = ["A", "B"], width = 0.02, thickness = 0.01 }
+
+[links.coupler]
+material = "steel"
+shape = { kind = "plate_link", between = ["B", "C"], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
+
+[links.rocker]
+material = "steel"
+mesh = { size = 0.005 }
+
+[links.rocker.shape]
+kind = "extrusion"
+outline = [[0.29, -0.02], [0.31, -0.02], [0.32, 0.26], { via = [0.3, 0.28], to = [0.28, 0.26] }]
+holes = [{ at = "C", diameter = 0.01 }, { at = "D", diameter = 0.01 }]
+thickness = 0.01
+
+[joints.A]
+kind = "revolute"
+links = ["ground", "crank"]
+at = "A"
+[joints.B]
+kind = "revolute"
+links = ["crank", "coupler"]
+at = "B"
+[joints.C]
+kind = "revolute"
+links = ["coupler", "rocker"]
+at = "C"
+[joints.D]
+kind = "revolute"
+links = ["rocker", "ground"]
+at = "D"
+
+[drive]
+joint = "A"
+motion = { kind = "constant_speed", speed = "600 rpm" }
+
+[loads.push]
+kind = "force"
+link = "rocker"
+at = "C"
+vector = [0, -100]
+
+[bodies.wheel]
+kind = "flywheel"
+link = "rocker"
+at = "joints.D"
+inertia = 0.08
+
+[damping]
+ratio = 0.02
+frequencies = [10, 1000]
+
+[analysis]
+turns = 2
+steps_per_turn = 360
+
+[output.probes.middle]
+link = "rocker"
+at = "M"
+quantity = "stress"
+"""
+
+BEAMS = """
+[links.arm]
+fidelity = "beam"
+material = "steel"
+shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.02, thickness = 0.01 }
+[links.shoe]
+fidelity = "rigid"
+mass = 0.5
+[joints.A]
+kind = "revolute"
+links = ["ground", "arm"]
+at = [0, 0]
+[joints.B]
+kind = "revolute"
+links = ["arm", "shoe"]
+at = [1, 0]
+[joints.S]
+kind = "prismatic"
+links = ["shoe", "ground"]
+at = [1, 0]
+axis = "x"
+[drive]
+joint = "A"
+motion = { kind = "cycloidal", angle = 1.5, rise = 0.5 }
+[analysis]
+end_time = 1.0
+step = 0.001
+"""
+
+BASES = {"solid": GOOD, "beam": BEAMS}
+CASES = [
+    pytest.param(
+        base,
+        case.get("change", {}),
+        case.get("gone", []),
+        case["faults"],
+        id=f"{base}{i}: {case['faults'][0]}",
+    )
+    for base, cases in tomllib.loads((Path(__file__).parent / "bad_scenes.toml").read_text("utf-8")).items()
+    for i, case in enumerate(cases)
+]
+
+
+def changed(text, change, gone=()):
+    """The scene of a TOML text with values at paths (a/b/0) replaced or added, and others taken out."""
+    scene = tomllib.loads(text)
+    for path, value in change.items():
+        table, key = parent(scene, path)
+        table[key] = copy.deepcopy(value)
+    for path in gone:
+        table, key = parent(scene, path)
+        del table[key]
+    return scene
+
+
+def parent(table, path):
+    *above, last = path.split("/")
+    for key in above:
+        table = table[int(key)] if isinstance(table, list) else table.setdefault(key, {})
+    return table, int(last) if isinstance(table, list) else last
+
+
+def faults_of(call, *arguments):
+    with pytest.raises(SceneError) as caught:
+        call(*arguments)
+    return caught.value.faults
+
+
+@pytest.mark.parametrize("text", BASES.values(), ids=BASES)
+def test_the_scenes_are_good_before_they_are_changed(text):
+    assert scene_from(tomllib.loads(text)).links
+
+
+@pytest.mark.parametrize(("base", "change", "gone", "expected"), CASES)
+def test_a_fault_has_its_message(base, change, gone, expected):
+    assert faults_of(scene_from, changed(BASES[base], change, gone)) == expected
+
+
+def test_faults_of_all_rooms_of_a_scene_come_at_once():
+    change = {
+        "links/crank/shape/width": -0.04,
+        "links/crank/material": "stel",
+        "links/coupler/shape/bore_diameter": "600 rpm",
+        "links/rocker/colour": "red",
+        "points/C/distances": [0.05, 0.05],
+        "joints/B/links": ["crank", "couple"],
+        "joints/D/kind": "hinge",
+        "drive/joint": "C",
+        "damping/alpha": 3,
+        "analysis/end_time": 1,
+        "output/probes/middle/link": "roker",
+        "bodies/wheel/inertia": 0,
+    }
+    assert sorted(faults_of(scene_from, changed(GOOD, change))) == [
+        "analysis.turns: must stand without end_time, got both",
+        "bodies.wheel.inertia: must be positive [kg*m^2], got 0",
+        "damping.ratio: must stand without alpha and beta, got both",
+        "drive.joint: must name a joint of a link and the ground, got 'C' of 'coupler' and 'rocker'",
+        "joints.B.links[1]: must name a link, got 'couple', did you mean 'coupler'?",
+        "joints.D.kind: must be one of revolute, spherical, weld, prismatic, got 'hinge'",
+        "links.coupler.shape.bore_diameter: must be a length [m], got '600 rpm': the unit 'rpm' "
+        "is of another kind",
+        "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
+        "links.crank.shape.width: must be positive [m], got -0.04",
+        "links.rocker.colour: unknown key, known: fidelity, material, shape, mass, mesh, element, "
+        "min_quality, shear_coefficient",
+        "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
+        "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
+        "of 0.164575",
+    ]
+
+
+def test_the_error_is_the_same_from_a_model_and_from_a_dict():
+    raw = changed(GOOD, {"links/crank/shape/width": -1, "links/crank/material": "stel"})
+    assert faults_of(Scene.model_validate, raw) == faults_of(scene_from, raw)
+    assert faults_of(lambda: Scene(**raw)) == faults_of(scene_from, raw)
+
+
+def test_a_scene_must_be_a_table():
+    assert faults_of(Scene.model_validate, [1]) == ["must be a table of keys, got [1]"]
+
+
+def test_a_name_cannot_be_looked_up_outside_a_scene():
+    with pytest.raises(
+        ValueError, match="must be coordinates in a record that is made outside a scene, got 'A'"
+    ):
+        Bar(between=("A", (1, 0)), width=1, thickness=1)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "{path}: must be a file, got nothing there"),
+        (b"", "{path}: must hold at least one key, got an empty file"),
+        (b"# nothing yet\n", "{path}: must hold at least one key, got an empty file"),
+        (b"a = 1\nb = \n", "{path}, line 2: must be valid TOML, got: Invalid value"),
+        (b"a = 1\na = 2\n", "{path}, line 2: must be valid TOML, got: Cannot overwrite a value"),
+        (
+            b"[points\nA = 1",
+            "{path}, line 1: must be valid TOML, got: Expected ']' at the end of a table declaration",
+        ),
+        (
+            b'title = "half',
+            "{path}, line 1: must be valid TOML, got: Unterminated string (at end of document)",
+        ),
+        (b"a = '\xff'", "{path}: must be text in UTF-8, got other bytes at position 5"),
+    ],
+)
+def test_a_scene_file_that_cannot_be_read(tmp_path, content, message):
+    path = tmp_path / "scene.toml"
+    if content is not None:
+        path.write_bytes(content)
+    assert faults_of(read_scene, path) == [message.format(path=path)]
+
+
+def test_a_folder_is_no_scene_file(tmp_path):
+    assert faults_of(read_scene, tmp_path) == [f"{tmp_path}: must be a readable file, got: Is a directory"]
+
+
+PART = {"links/rocker/shape": {"kind": "part", "file": "part.toml", "between": ["C", "D"]}}
+PLATE = """
+outline = [[-0.1, -0.1], [0.4, -0.1], [0.4, 0.1], [-0.1, 0.1]]
+thickness = 0.01
+origin = [0, 0]
+x_point = [0.25, 0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("plate", "message"),
+    [
+        (
+            PLATE.replace("0.25", "0.26"),
+            "between: must be as far apart as origin and x_point of the part 0.26 [m], got 0.25",
+        ),
+        (
+            PLATE.replace("0.25", "0"),
+            "file: part.toml: x_point: must differ from the origin, got the same point",
+        ),
+        (PLATE.replace("thickness", "thicknes"), "file: part.toml: thickness: is required [m], got nothing"),
+        (
+            PLATE.replace("thickness = 0.01", "thickness = -1"),
+            "file: part.toml: thickness: must be positive [m], got -1",
+        ),
+        (PLATE.replace("[0, 0]", '"O"'), "file: part.toml: origin: must name a point, got 'O', known: none"),
+        (
+            PLATE + "[points]\nP = [1]",
+            "file: part.toml: points.P: must be a point: a name, or two or three coordinates [m], got [1]",
+        ),
+    ],
+)
+def test_a_part_that_does_not_fit(tmp_path, plate, message):
+    (tmp_path / "part.toml").write_text(plate)
+    faults = faults_of(scene_from, changed(GOOD, PART, ["links/rocker/mesh"]), tmp_path)
+    assert f"links.rocker.shape.{message}" in faults
+
+
+def test_a_part_that_fits_is_no_fault(tmp_path):
+    (tmp_path / "part.toml").write_text(PLATE)
+    assert (
+        scene_from(changed(GOOD, PART, ["links/rocker/mesh"]), tmp_path).links["rocker"].shape.file
+        == "part.toml"
+    )
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("0, 0\n1; 2\n", "motion.csv, line 2: must be two numbers, time and angle, got '1; 2'"),
+        (
+            "t, phi, omega\n0, 0\n",
+            "motion.csv, line 1: must head two columns, time and angle, got 't, phi, omega'",
+        ),
+        (
+            "t [s], phi [mm]\n0, 0\n",
+            "motion.csv, line 1: must have units of time and angle, got: the unit 'mm' is of another kind",
+        ),
+    ],
+)
+def test_a_motion_table_that_cannot_be_read(tmp_path, table, message):
+    (tmp_path / "motion.csv").write_text(table)
+    change = {
+        "drive/motion": {"kind": "table", "file": "motion.csv"},
+        "analysis": {"end_time": 1, "step": 0.1},
+    }
+    assert faults_of(scene_from, changed(GOOD, change), tmp_path) == [f"drive.motion.file: {message}"]
+
+
+def test_a_motion_table_is_in_a_file_or_in_the_scene():
+    motion = {"kind": "table", "file": "motion.csv", "time": [0, 1], "angle": [0, 1]}
+    change = {"drive/motion": motion, "analysis": {"end_time": 1, "step": 0.1}}
+    assert faults_of(scene_from, changed(GOOD, change)) == [
+        "drive.motion.file: must stand without time and angle, got both"
+    ]
+
+
+ODD = [
+    None,
+    -1,
+    2.5,
+    "",
+    "x",
+    "crank",
+    "5 °",
+    "9**9**9 m",
+    [],
+    {},
+    True,
+    [[1]],
+    {"kind": ["x"]},
+    10**400,
+    "joints.A",
+]
+
+
+def paths(table, above=""):
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+        yield f"{above}{key}"
+        if isinstance(value, (dict, list)):
+            yield from paths(value, f"{above}{key}/")
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
+    for path in paths(tomllib.loads(BASES[base])):
+        for odd in ODD:
+            try:
+                scene_from(changed(BASES[base], {path: odd}))
+            except SceneError as error:
+                for line in error.faults:
+                    assert "\n" not in line, line
+                    assert ", got " in line or "unknown key, " in line, line
+                    assert "function" not in line, line
+                    assert "Input should" not in line, line
