@@ -1,0 +1,209 @@
+"""Curves over the drive angle: one PNG per channel and one of all joint forces."""
+
+import textwrap
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.output.abscissa import Abscissa, abscissa, draw_abscissa
+from kedfem.output.units import prefixed
+from kedfem.results import Channel, Results, ready_folder, replacing
+
+SIZE = (11.0, 6.2)
+"""Inches, at DPI dots each."""
+
+DPI = 120
+
+BINS = 1500
+"""Groups of points in a long curve, about one per pixel; each keeps its smallest and largest value."""
+
+NEGLIGIBLE = 1e-9
+"""A component below this part of the channel's peak is named in the legend instead of drawn."""
+
+MARK = "kedfem plot"
+"""What a PNG of this room says of itself, so that stale ones are told from a user's own."""
+
+VECTOR = ("x", "y", "z")
+
+Curves = Mapping[str, Float[np.ndarray, " n"]]
+
+
+def write_plots(results: Results, folder: Path) -> list[Path]:
+    """Plot every channel: ``probes-rocker_mid-stress.png``, …, and ``joint_forces.png`` for all joints.
+
+    Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
+    with the drive angle below. Plots that an earlier run left in the folder are removed.
+
+    Parameters
+    ----------
+    results
+        What was read; without rows nothing is drawn.
+    folder
+        Made where missing.
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    OutputError
+        The folder or a file cannot be written.
+    """
+    _remove_stale(ready_folder(Path(folder)))
+    if not len(results.time):
+        return []
+    along = abscissa(results.time, results.angle)
+    written = []
+    for channel, values in results.channels.values():
+        path = Path(folder) / f"{channel.name.replace('/', '-')}.png"
+        with _saved(path, _title(channel.description or channel.name, channel, results)) as figure:
+            _draw_panels(figure, along, _panels(channel, values))
+        written.append(path)
+    forces = _force_magnitudes(results)
+    if len(forces) > 1:
+        path = Path(folder) / "joint_forces.png"
+        with _saved(path, _title("Magnitude of the joint forces", None, results)) as figure:
+            _draw_panels(figure, along, [("force", "N", forces)])
+        written.append(path)
+    return written
+
+
+def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarray, " k"]:
+    """Numbers of the points that draw the same curve as all of them: the extremes of each group.
+
+    Parameters
+    ----------
+    values : (n,) [any unit]
+    bins
+        Groups; a curve of no more than two points a group is kept whole.
+
+    Returns
+    -------
+    (k,), rising, with the first and the last point.
+
+    Examples
+    --------
+    >>> envelope(np.array([0.0, 5.0, 1.0, 2.0, 2.5, -3.0, 0.5]), bins=2).tolist()
+    [0, 1, 4, 5, 6]
+    """
+    n = len(values)
+    if n <= 2 * bins:
+        return np.arange(n)
+    width = -(-n // bins)
+    groups = np.append(values, np.full(-n % width, values[-1])).reshape(-1, width)
+    first = np.arange(len(groups)) * width
+    kept = np.concatenate([[0], first + groups.argmin(axis=1), first + groups.argmax(axis=1)])
+    return np.union1d(np.minimum(kept, n - 1), [n - 1])
+
+
+def _panels(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[tuple[str, str, Curves]]:
+    """What is drawn above each other: (quantity, unit, curves)."""
+    curves = dict(zip(channel.columns, values.T, strict=True))
+    quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
+    if channel.columns == VECTOR:
+        return [(quantity, channel.unit, curves | {"magnitude": np.linalg.norm(values, axis=1)})]
+    if "von_mises" in curves:
+        equivalent = {"von Mises": curves.pop("von_mises")}
+        return [(quantity, channel.unit, curves), ("von Mises stress", channel.unit, equivalent)]
+    return [(quantity, channel.unit, curves)]
+
+
+def _force_magnitudes(results: Results) -> Curves:
+    """Joint → magnitude of its force [N]."""
+    return {
+        channel.name.removeprefix("joints/").removesuffix("/force"): np.linalg.norm(values, axis=1)
+        for channel, values in results.channels.values()
+        if channel.name.startswith("joints/") and channel.name.endswith("/force")
+    }
+
+
+def _draw_panels(figure: Any, along: Abscissa, panels: list[tuple[str, str, Curves]]) -> None:
+    """The panels one above the other on one abscissa; below, where needed, the drive angle over time."""
+    strip = 0 if along.degrees is None else 1
+    ratios = [3, 2, 2][: len(panels)] + [1] * strip
+    axes = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    for ax, (quantity, unit, curves) in zip(axes, panels, strict=False):
+        _draw_curves(ax, along, curves, quantity, unit)
+    if along.degrees is not None:
+        axes[-1].plot(along.values, along.degrees, color="0.35", linewidth=1.2)
+        axes[-1].set_ylabel("drive (°)")
+        axes[-1].grid(alpha=0.3)
+    draw_abscissa(axes[0], axes[-1], along)
+
+
+def _draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: str) -> None:
+    """Curves of one unit, with a legend where there is more than one."""
+    peaks = {name: float(np.max(np.abs(y), where=np.isfinite(y), initial=0.0)) for name, y in curves.items()}
+    largest = max(peaks.values(), default=0.0)
+    divisor, label = prefixed(largest, unit)
+    zero = [name for name in curves if peaks[name] <= NEGLIGIBLE * largest] if len(curves) > 1 else []
+    looks = cycle([(f"C{c}", style) for style in ("-", "--", ":") for c in range(10) if c != 7])
+    marker = "o" if len(along.values) == 1 else ""
+    for (name, y), (color, style) in zip(curves.items(), looks, strict=False):
+        if name in zero:
+            continue
+        kept = envelope(y)
+        width = 1.3 if len(kept) == len(y) else 0.7
+        look = ("0.15", "-", 0.7 * width) if name == "magnitude" else (color, style, width)
+        (line,) = ax.plot(along.values[kept], y[kept] / divisor, marker=marker, label=_plain(name))
+        line.set(color=look[0], linestyle=look[1], linewidth=look[2], zorder=2 + (name != "magnitude"))
+    if zero:
+        ax.plot([], [], " ", label=_plain(textwrap.fill(", ".join(zero), 18) + "  ≈ 0"))
+    if len(curves) > 1:
+        ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, ncols=1 + (len(curves) > 18))
+    ax.axhline(0.0, color="0.5", linewidth=0.6, zorder=1)
+    ax.set_ylabel(f"{quantity} ({label})" if label else quantity)
+    ax.ticklabel_format(useOffset=False)
+    ax.grid(alpha=0.3)
+
+
+def _title(text: str, channel: Channel | None, results: Results) -> str:
+    """The title, then the channel with its axes and, for a run that did not end, its status."""
+    below = [channel.name] if channel else []
+    if channel and channel.frame:
+        below.append(f"{channel.frame} axes")
+    if results.status != "complete":
+        below.append(f"not a whole run: {results.status}")
+    title = "\n".join(textwrap.wrap(text[:1].upper() + text[1:], 95))
+    return _plain("\n".join([title, "  ·  ".join(below)] if below else [title]))
+
+
+def _plain(text: str) -> str:
+    """Text that matplotlib does not take for a formula."""
+    return text.replace("$", r"\$")
+
+
+@contextmanager
+def _saved(path: Path, title: str) -> Iterator[Any]:
+    """A figure of its own (no global state), written to a PNG when it is drawn."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    yield figure
+    figure.suptitle(title, x=0.01, ha="left", fontsize=12)
+    with replacing(path) as part, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
+        figure.savefig(part, format="png", metadata={"Software": MARK})
+
+
+def _remove_stale(folder: Path) -> None:
+    """Delete the plots that this room wrote earlier, and nothing else."""
+    from PIL import Image, UnidentifiedImageError
+
+    for path in folder.glob("*.png"):
+        try:
+            with Image.open(path) as image:
+                own = image.info.get("Software") == MARK
+        except (OSError, UnidentifiedImageError):
+            continue
+        if own:
+            path.unlink()

@@ -1,0 +1,224 @@
+"""The drawing process of :func:`kedfem.output.write_picture`.
+
+It is run by its path and imports nothing of kedfem.
+"""
+
+import sys
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)
+"""Least and most pixels; in between as the linkage asks."""
+
+LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60
+"""Pixels kept free: title above, colour bar and axes on the right."""
+
+FLAT = 0.35
+"""A linkage whose least extent is below this part of its second is seen from that side."""
+
+BEAM_RADIUS = 0.007
+"""Radius of the tube that stands for a beam, as part of the diagonal."""
+
+FINEST, TRIANGLES = 4, 200_000
+"""Quadratic faces are halved so many times, unless that makes more triangles than this."""
+
+SHARP = 35.0
+"""Degrees between faces from which an edge is drawn."""
+
+LINES = {3: 2, 21: 3}
+"""VTK's numbers of the line and the quadratic line, and their nodes."""
+
+STATIONS = {2: 2, 3: 17}
+"""Points along a beam of so many nodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """From where a linkage is drawn, and what it takes up there.
+
+    Parameters
+    ----------
+    direction, across, up : (3,) [-]
+        Unit vectors towards the eye, to the right and upwards in the picture.
+    middle, size : (2,) [m]
+        Centre, width and height of the linkage in the picture.
+    """
+
+    direction: Float[np.ndarray, " 3"]
+    across: Float[np.ndarray, " 3"]
+    up: Float[np.ndarray, " 3"]
+    middle: Float[np.ndarray, " 2"]
+    size: Float[np.ndarray, " 2"]
+
+
+def render(vtu: str, png: str, title: str) -> None:
+    """Draw a frame.
+
+    Parameters
+    ----------
+    vtu, png, title
+        As in :func:`kedfem.output.write_picture`.
+    """
+    import pyvista
+
+    grid: Any = pyvista.read(vtu)
+    grid.point_data["MPa"] = grid.point_data["von_mises"] / 1e6
+    shown = view(grid)
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    draw_links(plotter, grid)
+    draw_words(plotter, title)
+    aim(plotter, grid, shown)
+    plotter.screenshot(png)
+
+
+def view(grid: Any) -> View:
+    """The view of a linkage, all of it in the picture."""
+    direction, upwards = sight(np.ptp(grid.points, axis=0))
+    across = np.cross(upwards, direction)
+    across /= np.linalg.norm(across)
+    up = np.cross(direction, across)
+    drawn = grid.points @ np.column_stack([across, up])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    return View(direction, across, up, (low + high) / 2, high - low + 3 * BEAM_RADIUS * grid.length)
+
+
+def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """From where a linkage is seen best, and what is up: flat ones slightly tilted from their flat side.
+
+    Parameters
+    ----------
+    extents : (3,) [m]
+        Along x, y and z.
+
+    Returns
+    -------
+    direction, up
+        Unit vectors, the first towards the eye.
+    """
+    x, y, z = np.eye(3)
+    least, second, most = np.sort(extents)
+    thin = extents <= max(1.01 * least, FLAT * second if second < FLAT * most else 0.0)
+    if least > FLAT * second and second > FLAT * most:
+        direction, up = 0.6 * x + 0.5 * y + z, y
+    elif thin[2]:
+        direction, up = z + 0.3 * y, y
+    else:
+        direction, up = (-y if thin[1] else x) + 0.3 * z, z
+    return direction / np.linalg.norm(direction), up
+
+
+def window(size: Float[np.ndarray, " 2"]) -> list[int]:
+    """Pixels that show a linkage of that width and height without much empty space."""
+    aspect = size[0] / size[1]
+    high = int(np.clip((WIDTHS[1] - LEFT - RIGHT) / aspect + TOP + BOTTOM, *HEIGHTS))
+    return [int(np.clip((high - TOP - BOTTOM) * aspect + LEFT + RIGHT, *WIDTHS)), high]
+
+
+def draw_links(plotter: Any, grid: Any) -> None:
+    """Solids with their edges, beams as tubes, on one colour scale."""
+    is_line = np.isin(grid.celltypes, list(LINES))
+    stress = grid.point_data["MPa"]
+    look = {
+        "scalars": "MPa",
+        "cmap": "turbo",
+        "clim": (0.0, float(np.max(stress, where=np.isfinite(stress), initial=0.0)) or 1.0),
+        "smooth_shading": True,
+        "show_scalar_bar": False,
+        "ambient": 0.55,
+        "diffuse": 0.5,
+    }
+    if not is_line.all():
+        surface = curved_surface(grid.extract_cells(~is_line))
+        links = plotter.add_mesh(surface, split_sharp_edges=True, feature_angle=SHARP, **look)
+        edges = surface.extract_feature_edges(SHARP, manifold_edges=False, non_manifold_edges=False)
+        if edges.n_cells:
+            plotter.add_mesh(edges, color="black", line_width=2.0, opacity=0.7)
+    if is_line.any():
+        links = plotter.add_mesh(tubes(grid.extract_cells(is_line), BEAM_RADIUS * grid.length), **look)
+    draw_bar(plotter, links)
+
+
+def curved_surface(solids: Any) -> Any:
+    """Outer faces, quadratic ones divided until they look curved."""
+    import pyvista
+    from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+
+    halvings = int(np.log(TRIANGLES / solids.n_cells) / np.log(4.0))
+    faces = vtkDataSetSurfaceFilter()
+    faces.SetInputData(solids)
+    faces.SetNonlinearSubdivisionLevel(int(np.clip(halvings, 1, FINEST)))
+    faces.Update()
+    return pyvista.wrap(faces.GetOutput())
+
+
+def tubes(lines: Any, radius: float) -> Any:
+    """Beams as tubes with round ends; quadratic ones curved."""
+    import pyvista
+
+    pieces = []
+    for kind, nodes in LINES.items():
+        for cell in lines.cells_dict.get(kind, np.zeros((0, nodes), int)):
+            weights = shape_functions(nodes, np.linspace(-1.0, 1.0, STATIONS[nodes]))
+            axis = pyvista.PolyData(weights @ lines.points[cell], lines=[len(weights), *range(len(weights))])
+            axis.point_data["MPa"] = weights @ lines.point_data["MPa"][cell]
+            ends = pyvista.PolyData(lines.points[cell[:2]])
+            ends.point_data["MPa"] = lines.point_data["MPa"][cell[:2]]
+            ball = pyvista.Sphere(radius=radius, theta_resolution=24, phi_resolution=24)
+            pieces += [axis.tube(radius=radius, n_sides=24), ends.glyph(geom=ball, scale=False, orient=False)]
+    return pyvista.merge(pieces, merge_points=False)
+
+
+def shape_functions(nodes: int, r: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m"]:
+    """Lagrange's polynomials on a line, ends first, then the middle."""
+    if nodes == 2:
+        return np.column_stack([(1 - r) / 2, (1 + r) / 2])
+    return np.column_stack([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r])
+
+
+def draw_words(plotter: Any, title: str) -> None:
+    """Title and axes."""
+    import matplotlib as mpl
+
+    font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
+    letters = int(plotter.window_size[0] / 16)
+    text = "\n".join(textwrap.wrap(title, letters, max_lines=2, placeholder=" …"))
+    words = plotter.add_text(text, (0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font)
+    words.prop.justification_vertical = "top"
+    words.prop.SetLineSpacing(1.2)
+    wide, high = plotter.window_size
+    plotter.add_axes(color="black", line_width=3, viewport=(1 - 210 / wide, 0.0, 1 - 30 / wide, 180 / high))
+
+
+def draw_bar(plotter: Any, links: Any) -> None:
+    """Colour bar of links that were drawn."""
+    wide, high = plotter.window_size
+    bar = plotter.add_scalar_bar(
+        "von Mises\nstress (MPa)\n", mapper=links.mapper, n_labels=6, fmt="%.3g", color="black",
+        position_x=1 - 170 / wide, position_y=220 / high, width=90 / wide, height=1 - (220 + TOP) / high,
+        vertical=True, title_font_size=22, label_font_size=22,
+    )  # fmt: skip
+    bar.SetTextPad(8)
+
+
+def aim(plotter: Any, grid: Any, shown: View) -> None:
+    """Parallel projection in which the whole linkage lies in the free part of the picture."""
+    wide, high = plotter.window_size
+    pixel = np.max(shown.size / [wide - LEFT - RIGHT, high - TOP - BOTTOM])
+    centre = shown.middle + pixel / 2 * np.array([RIGHT - LEFT, TOP - BOTTOM])
+    depth = np.mean(grid.points @ shown.direction)
+    focus = centre[0] * shown.across + centre[1] * shown.up + depth * shown.direction
+    camera = plotter.camera
+    camera.focal_point, camera.up = focus, shown.up
+    camera.position = focus + 10 * grid.length * shown.direction
+    camera.parallel_projection, camera.parallel_scale = True, pixel * high / 2
+    plotter.renderer.ResetCameraClippingRange()
+
+
+if __name__ == "__main__":
+    render(*sys.argv[1:])

@@ -1,0 +1,169 @@
+"""The ParaView animation: one VTU file per frame with all links in it, and a PVD file that lists them."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import OutputError
+from kedfem.results.files import ready_folder, reason, replacing
+
+STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+
+
+@dataclass(frozen=True, slots=True)
+class LinkField:
+    """One link in one frame of the animation.
+
+    Parameters
+    ----------
+    name
+        The link's name.
+    cell_type
+        meshio's name: ``hexahedron27``, ``hexahedron``, ``line``, ``line3``.
+    cells : (e, k) [-]
+        Node numbers in VTK's order.
+    points : (n, 3) [m]
+        Where the nodes are drawn: rigid motion plus the exaggerated elastic displacement.
+    displacement : (n, 3) [m]
+        Elastic displacement δ, world components, not exaggerated.
+    stress : (n, 6) [Pa]
+        xx, yy, zz, xy, yz, zx in the link's axes.
+    von_mises : (n,) [Pa]
+    """
+
+    name: str
+    cell_type: str
+    cells: Int[np.ndarray, "e k"]
+    points: Float[np.ndarray, "n 3"]
+    displacement: Float[np.ndarray, "n 3"]
+    stress: Float[np.ndarray, "n 6"]
+    von_mises: Float[np.ndarray, " n"]
+
+
+class AnimationWriter:
+    """Writes frames as they are made; each is whole, and so is the list of them, at any moment.
+
+    The first frame removes the frames that an earlier run left under the same stem, and nothing else.
+
+    Parameters
+    ----------
+    folder
+        Where ``STEM.pvd`` and ``STEM_0000.vtu``, ``STEM_0001.vtu``, … go.
+    stem
+        Beginning of the names.
+
+    Raises
+    ------
+    OutputError
+        From :meth:`add`: the folder or a file cannot be written.
+    """
+
+    def __init__(self, folder: Path, stem: str) -> None:
+        self.folder = Path(folder)
+        self.stem = stem
+        self.times: list[float] = []
+
+    def add(self, time: float, fields: Sequence[LinkField]) -> Path:
+        """Write the next frame.
+
+        Parameters
+        ----------
+        time : [s]
+        fields
+            The links in this frame.
+
+        Returns
+        -------
+        The VTU file.
+        """
+        if not self.times:
+            remove_animation(self.folder, self.stem)
+        path = self.folder / _frame_name(self.stem, len(self.times))
+        with replacing(path) as part:
+            _write_vtu(part, time, fields)
+        self.times.append(float(time))
+        with replacing(self.folder / f"{self.stem}.pvd") as part:
+            part.write_text(_collection(self.stem, self.times), encoding="utf-8")
+        return path
+
+
+def remove_animation(folder: Path, stem: str) -> None:
+    """Delete the animation of an earlier run: ``STEM.pvd`` and its frames, and nothing else.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written, or a file in it cannot be removed.
+    """
+    ready_folder(folder)
+    frame = re.compile(re.escape(stem) + r"_\d{4,}\.vtu")
+    try:
+        (folder / f"{stem}.pvd").unlink(missing_ok=True)
+        for path in folder.iterdir():
+            if frame.fullmatch(path.name):
+                path.unlink()
+    except OSError as error:
+        got = f"{Path(error.filename).name} that cannot be removed ({reason(error)})"
+        raise OutputError(f"{folder}: must be free of the frames of an earlier run, got {got}") from error
+
+
+def _frame_name(stem: str, index: int) -> str:
+    return f"{stem}_{index:04d}.vtu"
+
+
+def _collection(stem: str, times: Sequence[float]) -> str:
+    """The PVD file."""
+    frames = "".join(
+        f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(_frame_name(stem, index))}/>\n'
+        for index, time in enumerate(times)
+    )
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+    return head + frames + "  </Collection>\n</VTKFile>\n"
+
+
+def _write_vtu(path: Path, time: float, fields: Sequence[LinkField]) -> None:
+    """One frame: zlib-compressed binary through meshio, with the field data that meshio leaves out."""
+    from meshio import vtu
+
+    vtu.write(str(path), _merged(fields), binary=True, compression="zlib")
+    stress = f'Name="stress" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
+    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
+    text = path.read_bytes()
+    text = text.replace(b"<UnstructuredGrid>", b"<UnstructuredGrid>" + _field_data(time, fields).encode(), 1)
+    path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
+
+
+def _merged(fields: Sequence[LinkField]) -> Any:
+    """All links as one mesh of meshio."""
+    import meshio
+
+    first = np.cumsum([0, *(len(field.points) for field in fields)])
+    return meshio.Mesh(
+        np.concatenate([field.points for field in fields]),
+        [
+            (field.cell_type, (field.cells + n0).astype(np.int32))
+            for field, n0 in zip(fields, first, strict=False)
+        ],
+        point_data={
+            name: np.ascontiguousarray(np.concatenate([getattr(field, name) for field in fields]))
+            for name in ("displacement", "von_mises", "stress")
+        },
+        cell_data={"link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields)]},
+    )
+
+
+def _field_data(time: float, fields: Sequence[LinkField]) -> str:
+    """The frame's time, and which number in the cell data is which link."""
+    numbers = "".join(
+        f'<DataArray type="Int32" Name={quoteattr("link " + field.name)} NumberOfTuples="1" format="ascii">'
+        f"{index}</DataArray>"
+        for index, field in enumerate(fields)
+    )
+    moment = f'<DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{float(time)!r}'
+    return f"<FieldData>{moment}</DataArray>{numbers}</FieldData>"

@@ -1,0 +1,84 @@
+"""Folders and files that can be written, and files that appear only when they are whole."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from kedfem.errors import OutputError
+
+
+def reason(error: OSError | RuntimeError) -> str:
+    """What the system (or HDF5, which also raises RuntimeError) said, in one line and without paths."""
+    said = error.strerror if isinstance(error, OSError) else None
+    return (said or str(error)).splitlines()[0]
+
+
+def ready_folder(folder: Path) -> Path:
+    """A folder that exists and takes files; made where it is missing, with its parents.
+
+    Parameters
+    ----------
+    folder
+        Where results are to go.
+
+    Returns
+    -------
+    The same path.
+
+    Raises
+    ------
+    OutputError
+        ``output.folder: must be a writable folder, got …``: a file in the way, no permission, a full or
+        read-only disk.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        message = f"output.folder: must be a writable folder, got {folder} ({reason(error)})"
+        raise OutputError(message) from error
+    return folder
+
+
+def require_space(folder: Path, size: int) -> None:
+    """Make sure that `size` bytes can be written in a folder, disk and quota allowing.
+
+    HDF5 cannot close a file after a refused write (it takes the process down, and the file with it): space is
+    asked for before, on a file without a name that is gone at once.
+
+    Raises
+    ------
+    OSError
+        There is not that much space.
+    """
+    with tempfile.TemporaryFile(dir=folder) as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+        else:
+            file.write(bytes(size))
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A temporary path beside `path` that takes its place when the block ends without an error.
+
+    Readers see the old file or the new one, never a part of it.
+
+    Raises
+    ------
+    OutputError
+        The folder or the file cannot be written; the old file is left as it was.
+    """
+    ready_folder(path.parent)
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

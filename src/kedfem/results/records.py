@@ -1,0 +1,70 @@
+"""What a results file holds: channels of columns over time and drive angle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+Status = Literal["running", "complete", "interrupted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One group of columns that are recorded together.
+
+    Parameters
+    ----------
+    name
+        Path in the file, e.g. ``probes/rocker_mid/stress``, ``joints/B/force``, ``drive/torque``.
+    columns
+        Names of the columns, e.g. ``("x", "y", "z")``.
+    unit
+        Unit of all columns, e.g. ``Pa``.
+    frame
+        ``link``, ``world``, or empty where there is none.
+    description
+        A line for titles and readers.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    unit: str
+    frame: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """A results file as it was read.
+
+    Parameters
+    ----------
+    time : (n,) [s]
+        Moments of the rows, read-only.
+    angle : (n,) [rad]
+        Drive angle from the drawn position, read-only.
+    channels
+        Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
+    status
+        ``complete``; ``interrupted``; ``running``: still being written, or the process was killed.
+    scene_json, scene_toml
+        The scene that was analysed; the TOML text is None for a scene made in Python.
+    notes
+        What the run said about itself.
+    reason
+        Why the run was interrupted, else empty.
+    version
+        The kedfem that wrote the file.
+    """
+
+    time: Float[np.ndarray, " n"]
+    angle: Float[np.ndarray, " n"]
+    channels: Mapping[str, tuple[Channel, Float[np.ndarray, "n c"]]]
+    status: Status
+    scene_json: str
+    scene_toml: str | None = None
+    notes: Mapping[str, str | float] = field(default_factory=dict)
+    reason: str = ""
+    version: str = ""

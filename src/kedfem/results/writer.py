@@ -1,0 +1,237 @@
+"""Writing a results file while the analysis runs."""
+
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import OutputError
+from kedfem.results.files import ready_folder, reason, require_space
+from kedfem.results.records import Channel
+
+FORMAT = 1
+"""Version of the file's layout."""
+
+CHUNK_ROWS = 512
+"""Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
+
+SPARE_SPACE = 1_000_000
+"""Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
+
+TIME = Channel("time", (), "s", "", "time")
+ANGLE = Channel("angle", (), "rad", "", "drive angle from the drawn position")
+
+
+def installed_version() -> str:
+    """The version of kedfem, or ``unknown`` where it runs without being installed."""
+    try:
+        return metadata.version("kedfem")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+class ResultsWriter:
+    """Appends rows to a results file; a context manager that tells how the run ended.
+
+    See :mod:`kedfem.results` for what happens to an older file of the same name.
+
+    Parameters
+    ----------
+    path
+        The HDF5 file; its folder is made where missing.
+    channels
+        All channels, with distinct names.
+    scene_json, scene_toml
+        The scene, stored in the file.
+    notes
+        Facts about the run, stored as attributes.
+
+    Raises
+    ------
+    OutputError
+        On entering: the folder or file cannot be written, or another run is writing it. Later: a disk error.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> torque = Channel("drive/torque", ("torque",), "N m", "", "drive torque")
+    >>> path = Path(folder.name) / "results.h5"
+    >>> with ResultsWriter(path, [torque], "{}", None, {}) as writer:
+    ...     writer.append(np.array([0.1]), np.array([1.0]), {"drive/torque": np.array([[3.0]])})
+    >>> from kedfem.results import read_results
+    >>> read_results(path).status
+    'complete'
+    >>> folder.cleanup()
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        channels: Sequence[Channel],
+        scene_json: str,
+        scene_toml: str | None,
+        notes: Mapping[str, str | float],
+    ) -> None:
+        self.path = Path(path)
+        self.channels = tuple(channels)
+        self.rows = 0
+        self._scene = {"json": scene_json} | ({} if scene_toml is None else {"toml": scene_toml})
+        self._notes = dict(notes)
+        self._part = self.path.with_name(self.path.name + ".part")
+        self._published = False
+        self._file: Any = None
+
+    def __enter__(self) -> Self:
+        ready_folder(self.path.parent)
+        self._refuse_another_run()
+        try:
+            require_space(self.path.parent, SPARE_SPACE)
+            self._open(self._part, "w")
+            self._lay_out()
+        except OSError as error:
+            self._discard()
+            raise self._fault(error) from error
+        return self
+
+    def append(
+        self,
+        time: Float[np.ndarray, " b"],
+        angle: Float[np.ndarray, " b"],
+        values: Mapping[str, Float[np.ndarray, "b c"]],
+    ) -> None:
+        """Write rows at the end and bring them to the disk.
+
+        Parameters
+        ----------
+        time : (b,) [s]
+        angle : (b,) [rad]
+        values
+            Channel name → (b, columns), for every channel, in its unit.
+
+        Raises
+        ------
+        OutputError
+            The disk refused.
+        ValueError
+            A channel is missing, unknown or of the wrong shape.
+        """
+        self._check(len(time), values)
+        try:
+            require_space(self.path.parent, self._block_space(len(time)))
+            for name, block in (*values.items(), (ANGLE.name, angle), (TIME.name, time)):
+                rows = self._file[name]
+                rows.resize(self.rows + len(time), axis=0)
+                rows[self.rows :] = block
+            self._file.flush()
+            self.rows += len(time)
+            if not self._published:
+                self._publish()
+        except (OSError, RuntimeError) as error:
+            raise self._fault(error) from error
+
+    def note(self, notes: Mapping[str, str | float]) -> None:
+        """Store more facts about the run, e.g. what is known only at its end."""
+        try:
+            self._file["notes"].attrs.update(notes)
+        except OSError as error:
+            raise self._fault(error) from error
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._end("complete", "")
+            elif self._published:
+                self._end("interrupted", f"{kind.__name__}: {error}".removesuffix(": "))
+            else:
+                self._discard()
+        except (OSError, RuntimeError) as fault:
+            if kind is None:
+                raise self._fault(fault) from fault
+
+    def _open(self, path: Path, mode: str) -> None:
+        """Open the file, locked against a second writer where the disk knows locks."""
+        import h5py
+
+        self._file = h5py.File(path, mode, locking="best-effort")
+
+    def _refuse_another_run(self) -> None:
+        """An older file is only replaced when no run is at work on it."""
+        try:
+            if self.path.is_dir():
+                raise IsADirectoryError(21, "a folder of that name")
+            if self.path.exists():
+                self._open(self.path, "r")
+                self._file.close()
+        except (BlockingIOError, IsADirectoryError) as error:
+            raise self._fault(error) from error
+        except OSError:
+            return  # not readable as results: it will be replaced
+
+    def _lay_out(self) -> None:
+        """The empty file: scene, notes, one extendable dataset per channel with its units."""
+        self._file.attrs.update(
+            {"format": FORMAT, "kedfem_version": installed_version(), "status": "running", "reason": ""}
+        )
+        scene = self._file.create_group("scene")  # datasets: an attribute holds no more than 64 kB
+        for key, text in self._scene.items():
+            scene[key] = text
+        self._file.create_group("notes").attrs.update(self._notes)
+        for index, channel in enumerate((TIME, ANGLE, *self.channels)):
+            width = (len(channel.columns),) if channel.columns else ()
+            rows = self._file.create_dataset(
+                channel.name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width)
+            )
+            rows.attrs.update(unit=channel.unit, frame=channel.frame, description=channel.description)
+            rows.attrs.update(columns=list(channel.columns) or [channel.name], index=index)
+
+    def _check(self, length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
+        """Names and shapes of a block."""
+        expected = {channel.name: (length, len(channel.columns)) for channel in self.channels}
+        found = {name: np.shape(block) for name, block in values.items()}
+        if found != expected:
+            wrong = sorted(set(expected.items()) ^ set(found.items()))
+            raise ValueError(f"values: must be the channels with their shapes, differs in {wrong}")
+
+    def _block_space(self, length: int) -> int:
+        """Bytes that a block of rows may add, in whole chunks."""
+        width = 2 + sum(len(channel.columns) for channel in self.channels)
+        return 8 * width * CHUNK_ROWS * (length // CHUNK_ROWS + 2) + SPARE_SPACE
+
+    def _publish(self) -> None:
+        """Put the new file in the old one's place; closed meanwhile: not every system renames open files."""
+        self._file.close()
+        self._part.replace(self.path)
+        self._published = True
+        self._open(self.path, "r+")
+
+    def _end(self, status: str, why: str) -> None:
+        """Close the file, all channels cut to the rows that were written whole."""
+        if not self._file:  # stopped while it was being put in place
+            self._open(self.path, "r+")
+        for channel in (TIME, ANGLE, *self.channels):
+            self._file[channel.name].resize(self.rows, axis=0)
+        self._file.attrs.update(reason=why, status=status)
+        if self._published:
+            self._file.close()
+        else:
+            self._publish()
+            self._file.close()
+
+    def _discard(self) -> None:
+        """Remove a file that has no rows yet."""
+        if self._file:
+            self._file.close()
+        self._part.unlink(missing_ok=True)
+
+    def _fault(self, error: OSError | RuntimeError) -> OutputError:
+        """The fault as the user reads it."""
+        if isinstance(error, BlockingIOError):
+            return OutputError(f"{self.path}: must not be in use, got another run that is writing it")
+        return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")

@@ -1,0 +1,389 @@
+"""Output: ParaView reads what was meant, and pictures show something."""
+
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from kedfem.errors import OutputError
+from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
+from kedfem.output.abscissa import abscissa
+from kedfem.output.plots import envelope
+from kedfem.output.rendering import shape_functions, sight
+from kedfem.output.units import prefixed
+from kedfem.results import Channel, Results
+
+# Parametric coordinates (halves) of the nodes in VTK's order, after its documentation of the triquadratic
+# hexahedron: corners, edges of the bottom, of the top, upright edges, faces −x +x −y +y −z +z, centre.
+HEX27 = np.array([
+    (0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2),
+    (1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2),
+    (0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1),
+    (0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2), (1, 1, 1),
+])  # fmt: skip
+
+
+def filled(name: str, cell_type: str, cells: np.ndarray, points: np.ndarray) -> LinkField:
+    """A link with numbers that tell node and component."""
+    node = np.arange(len(points), dtype=float)
+    stress = 1e6 * (node[:, None] + np.arange(6) / 10)
+    return LinkField(name, cell_type, cells, points, 1e-3 * (points + 1), stress, 1e6 * (node + 1))
+
+
+def warped() -> LinkField:
+    """One 27-node cell: (x, y, z) = (2r, 3s + r², 4t + 2rs + r²), whose det J is 24 everywhere."""
+    r, s, t = HEX27.T / 2
+    return filled(
+        "warped", "hexahedron27", np.arange(27)[None], np.c_[2 * r, 3 * s + r**2, 4 * t + 2 * r * s + r**2]
+    )
+
+
+def brick() -> LinkField:
+    return filled("brick", "hexahedron", np.arange(8)[None], HEX27[:8] / 2 + [0.0, 6.0, 0.0])
+
+
+def arch() -> LinkField:
+    x = np.array([0.0, 4.0, 2.0, 8.0, 6.0])
+    points = np.c_[x, x * (8 - x) / 8 - 3, 0 * x]
+    return filled("arch & co", "line3", np.array([[0, 1, 2], [1, 3, 4]]), points)
+
+
+def rod() -> LinkField:
+    return filled("rod", "line", np.array([[0, 1]]), np.array([[0.0, -4.0, 0.0], [8.0, -4.0, 0.0]]))
+
+
+def links() -> list[LinkField]:
+    return [warped(), brick(), arch(), rod()]
+
+
+def frame_times(pvd: Path) -> list[tuple[float, str]]:
+    return [(float(d.get("timestep", "")), d.get("file", "")) for d in ET.parse(pvd).iter("DataSet")]
+
+
+def test_meshio_reads_what_was_written(tmp_path: Path) -> None:
+    written = links()
+    mesh = meshio.read(AnimationWriter(tmp_path, "run").add(0.125, written))
+    for name in ("points", "displacement", "stress", "von_mises"):
+        expected = np.concatenate([getattr(link, name) for link in written])
+        found = mesh.points if name == "points" else mesh.point_data[name]
+        np.testing.assert_array_equal(found, expected)
+    first = 0
+    for index, (link, block) in enumerate(zip(written, mesh.cells, strict=True)):
+        assert block.type == link.cell_type
+        np.testing.assert_array_equal(block.data, link.cells + first)
+        np.testing.assert_array_equal(mesh.cell_data["link"][index], index)
+        first += len(link.points)
+    assert mesh.field_data["TimeValue"] == [0.125]
+    assert mesh.field_data["link arch & co"] == [2]
+
+
+def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
+    import pyvista  # noqa: PLC0415
+
+    written = links()
+    grid = pyvista.read(AnimationWriter(tmp_path, "run").add(0.125, written))
+    assert grid.celltypes.tolist() == [29, 12, 21, 21, 3]  # VTK: triquadratic and linear hexahedron, lines
+    np.testing.assert_array_equal(
+        grid.point_data["stress"], np.concatenate([link.stress for link in written])
+    )
+    np.testing.assert_array_equal(grid.cell_data["link"], [0, 1, 2, 2, 3])
+    names = [grid.GetPointData().GetArray("stress").GetComponentName(i) for i in range(6)]
+    assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]  # ParaView's names of our xx, yy, zz, xy, yz, zx
+    assert grid.field_data["TimeValue"] == [0.125]
+
+
+def test_vtk_takes_27_nodes_in_our_order(tmp_path: Path) -> None:
+    """The volume by VTK's own shape functions is the exact one, and so is det J at every Gauss point."""
+    import pyvista  # noqa: PLC0415
+
+    cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [warped()])).GetCell(0)
+    points = np.array([cell.GetPoints().GetPoint(i) for i in range(27)])
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact for det J, of degree 5 in each coordinate
+    volume = 0.0
+    for i, j, k in np.ndindex(3, 3, 3):
+        gradients = [0.0] * 81
+        cell.InterpolateDerivs((0.5 + nodes[[i, j, k]] / 2).tolist(), gradients)
+        det_J = np.linalg.det(np.reshape(gradients, (3, 27)) @ points)
+        assert det_J == pytest.approx(24.0, rel=1e-12)  # 2 · 3 · 4, see warped()
+        volume += det_J * weights[i] * weights[j] * weights[k] / 8
+    assert volume == pytest.approx(24.0, rel=1e-12)
+    np.testing.assert_allclose(np.reshape(cell.GetParametricCoords(), (27, 3)), HEX27 / 2)
+
+
+def test_the_list_names_whole_frames_in_order_after_each(tmp_path: Path) -> None:
+    animation = AnimationWriter(tmp_path, "run")
+    for count, time in enumerate([0.0, 0.1, 0.30000000000000004], start=1):
+        animation.add(time, [rod()])
+        listed = frame_times(tmp_path / "run.pvd")
+        assert len(listed) == count
+        assert listed[-1] == (time, f"run_{count - 1:04d}.vtu")
+        assert {p.name for p in tmp_path.iterdir()} == {"run.pvd", *(name for _, name in listed)}
+
+
+def test_vtk_reads_the_list(tmp_path: Path) -> None:
+    import pyvista  # noqa: PLC0415
+
+    animation = AnimationWriter(tmp_path, "run")
+    for time in (0.0, 0.5):
+        animation.add(time, [rod()])
+    reader = pyvista.get_reader(tmp_path / "run.pvd")
+    assert reader.time_values == [0.0, 0.5]
+    assert reader.read()[0].n_cells == 1
+
+
+def test_frames_of_an_earlier_run_go_and_nothing_else(tmp_path: Path) -> None:
+    old = AnimationWriter(tmp_path, "run")
+    for time in range(3):
+        old.add(time, [rod()])
+    others = ["run_2_0000.vtu", "other_0001.vtu", "run_mesh.vtu", "run_0001.vtu.bak", "run.h5"]
+    for name in others:
+        (tmp_path / name).touch()
+    new = AnimationWriter(tmp_path, "run")
+    assert len(frame_times(tmp_path / "run.pvd")) == 3  # nothing is lost before the first frame
+    new.add(7.0, [arch()])
+    assert frame_times(tmp_path / "run.pvd") == [(7.0, "run_0000.vtu")]
+    assert {p.name for p in tmp_path.iterdir()} == {"run_0000.vtu", "run.pvd", *others}
+    remove_animation(tmp_path, "run")
+    assert {p.name for p in tmp_path.iterdir()} == set(others)
+
+
+def test_a_failing_frame_leaves_the_list_as_it_was(tmp_path: Path) -> None:
+    animation = AnimationWriter(tmp_path, "run")
+    animation.add(0.0, [rod()])
+    (tmp_path / "run_0001.vtu").mkdir()
+    with pytest.raises(
+        OutputError, match=r"run_0001\.vtu: must be a file that can be written, got Is a directory"
+    ):
+        animation.add(1.0, [rod()])
+    assert frame_times(tmp_path / "run.pvd") == [(0.0, "run_0000.vtu")]
+    with pytest.raises(
+        OutputError, match=r"free of the frames of an earlier run, got run_0001\.vtu that cannot be"
+    ):
+        remove_animation(tmp_path, "run")
+
+
+@pytest.mark.parametrize("kind", ["animation", "plots", "picture"])
+def test_a_file_in_the_way_of_the_folder(tmp_path: Path, kind: str) -> None:
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
+    (tmp_path / "taken").touch()
+    folder = tmp_path / "taken"
+    writers = {
+        "animation": lambda: AnimationWriter(folder, "run").add(0.0, [rod()]),
+        "plots": lambda: write_plots(results(), folder),
+        "picture": lambda: write_picture(vtu, folder / "picture.png", ""),
+    }
+    with pytest.raises(OutputError, match=r"^output\.folder: must be a writable folder, got .*taken"):
+        writers[kind]()
+
+
+def results(n: int = 721, turns: float = 2.0) -> Results:
+    """Made-up curves of a four-bar."""
+    angle = np.linspace(0, 2 * np.pi * turns, n)
+    wave = np.sin(angle) + 0.2 * np.sin(23 * angle)
+    columns = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
+    stress = np.c_[4e7 * wave, 1e6 * wave, 0 * wave, 2e6 * wave, 0 * wave, 0 * wave, 4e7 * abs(wave)]
+    channels = [(Channel("probes/mid/stress", columns, "Pa", "link", r"costs $\frac, not $6"), stress)]
+    for joint in "AB":
+        name = f"joints/{joint}/force"
+        force = np.c_[200 * wave, 100 * wave, 0 * wave]
+        channels.append((Channel(name, ("x", "y", "z"), "N", "world", f"force at {joint}"), force))
+    torque = Channel("drive/torque", ("torque",), "N m", "", "drive torque")
+    channels.append((torque, 12 * wave[:, None]))
+    return Results(angle / 60, angle, {c.name: (c, values) for c, values in channels}, "complete", "{}")
+
+
+def pixels(path: Path) -> np.ndarray:
+    from PIL import Image  # noqa: PLC0415
+
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"), float)
+
+
+def assert_shows_something(path: Path) -> None:
+    """White paper with ink on it, but with none at the rim, where it would be cut off."""
+    picture = pixels(path)
+    ink = picture.min(axis=2) < 250
+    assert 0.002 < ink.mean() < 0.6
+    assert picture.std() > 5
+    for rim in (ink[0], ink[-1], ink[:, 0], ink[:, -1]):
+        assert not rim.any()
+
+
+def test_every_channel_has_a_plot(tmp_path: Path) -> None:
+    written = write_plots(results(), tmp_path / "plots")
+    assert [path.name for path in written] == [
+        "probes-mid-stress.png",
+        "joints-A-force.png",
+        "joints-B-force.png",
+        "drive-torque.png",
+        "joint_forces.png",
+    ]
+    for path in written:
+        assert pixels(path).shape == (744, 1320, 3)  # 11 by 6.2 inches at 120 dots
+        assert_shows_something(path)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        results(n=100_000, turns=30),
+        results(n=1),
+        replace(results(), angle=np.sin(results().angle)),
+        replace(results(), angle=np.zeros(721)),
+        replace(results(), angle=-results().angle, status="interrupted"),
+    ],
+    ids=["long", "one row", "to and fro", "standing", "backwards"],
+)
+def test_unusual_runs_are_plotted(tmp_path: Path, made: Results) -> None:
+    few = {name: made.channels[name] for name in ("probes/mid/stress", "joints/A/force")}
+    for path in write_plots(replace(made, channels=few), tmp_path):
+        assert_shows_something(path)
+
+
+def test_results_that_are_not_finite_are_plotted(tmp_path: Path) -> None:
+    made = results()
+    values = made.channels["drive/torque"][1].copy()
+    values[400:] = np.nan
+    values[399] = np.inf
+    one = {"drive/torque": (made.channels["drive/torque"][0], values)}
+    assert_shows_something(write_plots(replace(made, channels=one), tmp_path)[0])
+
+
+def test_stale_plots_go_and_a_users_pictures_stay(tmp_path: Path) -> None:
+    from PIL import Image  # noqa: PLC0415
+
+    write_plots(results(), tmp_path)
+    Image.new("RGB", (4, 4)).save(tmp_path / "photo.png")
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    few = {"drive/torque": results().channels["drive/torque"]}
+    write_plots(replace(results(), channels=few), tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {"photo.png", "broken.png", "drive-torque.png"}
+
+
+def test_results_without_rows_have_no_plots(tmp_path: Path) -> None:
+    none = Results(np.zeros(0), np.zeros(0), {}, "interrupted", "{}")
+    assert write_plots(none, tmp_path) == []
+
+
+def test_a_shortened_curve_keeps_its_extremes() -> None:
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=100_003)
+    kept = envelope(values, 1000)
+    assert len(kept) <= 2002
+    assert (np.diff(kept) > 0).all()
+    assert (kept[0], kept[-1]) == (0, 100_002)
+    assert {values.argmin(), values.argmax()} <= set(kept.tolist())
+
+
+def test_what_curves_are_drawn_over() -> None:
+    time = np.linspace(0, 1, 101)
+    turning = abscissa(time, 2 * np.pi * time)
+    assert turning.degrees is None
+    assert turning.values[-1] == pytest.approx(360.0)
+    ramp = abscissa(time, time / 2 - np.sin(np.pi * time) / (2 * np.pi))  # from rest, but it keeps on
+    assert ramp.degrees is None
+    for angle in (np.sin(6 * time), np.minimum(time, 0.5), 0 * time):
+        assert abscissa(time, angle).degrees is not None
+
+
+@pytest.mark.parametrize(
+    ("peak", "unit", "expected"),
+    [
+        (4.2e7, "Pa", (1e6, "MPa")),
+        (999.0, "N", (1.0, "N")),
+        (1000.0, "N", (1e3, "kN")),
+        (3e-5, "m", (1e-6, "µm")),
+        (2e4, "N*m", (1e3, "kN m")),
+        (5e4, "m/s^2", (1.0, "m/s²")),
+        (0.01, "rad", (1.0, "rad")),
+        (np.inf, "Pa", (1.0, "Pa")),
+    ],
+)
+def test_prefixes(peak: float, unit: str, expected: tuple[float, str]) -> None:
+    divisor, label = prefixed(peak, unit)
+    assert divisor == pytest.approx(expected[0])
+    assert label == expected[1]
+
+
+def test_a_picture_of_all_kinds_of_links(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, links())
+    title = (
+        "Worst frame: σ = 27 MPa at 60°, " + "with a title that is much longer than the picture is wide " * 5
+    )
+    write_picture(vtu, tmp_path / "picture.png", title)
+    assert_shows_something(tmp_path / "picture.png")
+    colours = pixels(tmp_path / "picture.png")
+    assert (np.ptp(colours, axis=2) > 60).mean() > 0.01  # stresses are coloured
+    assert capfd.readouterr() == ("", "")  # VTK keeps off the terminal
+    assert {p.name for p in tmp_path.iterdir()} == {"run_0000.vtu", "run.pvd", "picture.png"}
+
+
+def test_the_colour_bar_is_that_of_the_links(tmp_path: Path) -> None:
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, [warped()])  # its edges are drawn last, without colours
+    write_picture(vtu, tmp_path / "picture.png", "one link")
+    bar = pixels(tmp_path / "picture.png")[:, -200:].reshape(-1, 3)  # right of the links
+    for end in ((48, 18, 59), (122, 4, 3)):  # of the colour map "turbo" (Mikhailov 2019)
+        assert (np.abs(bar - end).max(axis=1) < 12).sum() > 50
+
+
+def test_a_picture_without_stress_is_drawn(tmp_path: Path) -> None:
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, [replace(rod(), von_mises=np.zeros(2))])
+    write_picture(vtu, tmp_path / "picture.png", "unloaded")
+    assert_shows_something(tmp_path / "picture.png")
+
+
+@pytest.mark.parametrize(
+    ("extents", "normal"),
+    [
+        ((3, 2, 0.1), 2),
+        ((3, 0.1, 2), 1),
+        ((0.1, 3, 2), 0),
+        ((3, 0.1, 0.1), 2),
+        ((0.1, 3, 0.1), 2),
+        ((0.1, 0.1, 3), 1),
+    ],
+)
+def test_flat_linkages_are_seen_from_their_flat_side(extents: tuple[float, ...], normal: int) -> None:
+    direction, up = sight(np.array(extents, float))
+    assert np.argmax(np.abs(direction)) == normal
+    assert np.linalg.norm(direction) == pytest.approx(1.0)
+    assert extents[np.argmax(up)] >= min(extents)
+    across = np.cross(up, direction)
+    assert np.count_nonzero(np.abs(across) > 1e-12) == 1  # one axis lies level in the picture
+
+
+def test_curved_beams_pass_through_their_nodes() -> None:
+    for nodes, places in ((2, [-1.0, 1.0]), (3, [-1.0, 1.0, 0.0])):
+        np.testing.assert_allclose(shape_functions(nodes, np.array(places)), np.eye(nodes), atol=1e-15)
+
+
+def test_a_missing_frame(tmp_path: Path) -> None:
+    with pytest.raises(
+        OutputError, match=r"run_0000\.vtu: must be a frame of the animation, got no such file"
+    ):
+        write_picture(tmp_path / "run_0000.vtu", tmp_path / "picture.png", "")
+
+
+def test_a_corrupt_frame(tmp_path: Path) -> None:
+    (tmp_path / "run_0000.vtu").write_text("no XML")
+    with pytest.raises(OutputError, match=r"run_0000\.vtu: must be a frame that VTK can draw, got \w+Error"):
+        write_picture(tmp_path / "run_0000.vtu", tmp_path / "picture.png", "")
+    assert not (tmp_path / "picture.png").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the crash")
+def test_a_machine_where_vtk_crashes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
+    crash = tmp_path / "crash"
+    crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    crash.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(crash))
+    with pytest.raises(
+        OutputError, match=r"^picture: must be drawn by VTK, .*libEGL.*, got no window \(signal 11\)"
+    ):
+        write_picture(vtu, tmp_path / "picture.png", "")
+    assert not (tmp_path / "picture.png").exists()

@@ -1,0 +1,338 @@
+"""Results: what is written is read, the status tells the truth, and nothing old is lost."""
+
+import csv
+import errno
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from kedfem.errors import OutputError
+from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, replacing, write_csv
+
+STRESS = Channel(
+    "probes/rocker_mid/stress",
+    ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises"),
+    "Pa",
+    "link",
+    "stress at the outer side of the rocker's midpoint",
+)
+FORCE = Channel("joints/B/force", ("x", "y", "z"), "N", "world", "force on coupler at B")
+TORQUE = Channel("drive/torque", ("torque",), "N m", "", "torque of the drive")
+CHANNELS = [STRESS, FORCE, TORQUE]
+SCENE_TOML = (
+    'title = "Größe"\n' + "# a table of a motion law\n" * 4000
+)  # above the 64 kB of an HDF5 attribute
+NOTES = {"solver": "condensed", "factorisations": 3, "alpha": 0.25}
+
+
+def rows(first: int, count: int) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Rows whose numbers tell their place."""
+    step = np.arange(first, first + count, dtype=float)
+    values = {c.name: step[:, None] / 3 + np.arange(len(c.columns)) for c in CHANNELS}
+    return step * 1e-3, step * 0.1, values
+
+
+def writer(path: Path) -> ResultsWriter:
+    return ResultsWriter(path, CHANNELS, '{"title": "Größe"}', SCENE_TOML, NOTES)
+
+
+def write(path: Path, *blocks: int) -> None:
+    """A whole run in blocks of so many rows."""
+    with writer(path) as results:
+        for block in blocks:
+            results.append(*rows(results.rows, block))
+
+
+def run(code: str, *arguments: Path) -> "subprocess.CompletedProcess[str]":
+    """Python code in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "results.h5"
+    write(path, 5, 700, 1)  # 700 rows: beyond one chunk
+    read = read_results(path)
+    time, angle, values = rows(0, 706)
+    np.testing.assert_array_equal(read.time, time)
+    np.testing.assert_array_equal(read.angle, angle)
+    assert [channel for channel, _ in read.channels.values()] == CHANNELS
+    for name, expected in values.items():
+        np.testing.assert_array_equal(read.channels[name][1], expected)
+    assert (read.status, read.reason) == ("complete", "")
+    assert (read.scene_json, read.scene_toml) == ('{"title": "Größe"}', SCENE_TOML)
+    assert dict(read.notes) == NOTES
+    assert read.version
+
+
+def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
+    write(tmp_path / "results.h5", 2)
+    read = read_results(tmp_path / "results.h5")
+    with pytest.raises(ValueError, match="read-only"):
+        read.channels[FORCE.name][1][0, 0] = 1.0
+
+
+def test_units_stand_inside_the_file(tmp_path: Path) -> None:
+    write(tmp_path / "results.h5", 2)
+    with h5py.File(tmp_path / "results.h5", "r") as file:
+        stress = file[STRESS.name].attrs
+        assert (stress["unit"], stress["frame"], stress["description"]) == ("Pa", "link", STRESS.description)
+        assert tuple(stress["columns"]) == STRESS.columns
+        assert (file["time"].attrs["unit"], file["angle"].attrs["unit"]) == ("s", "rad")
+
+
+def test_notes_can_be_added_at_the_end(tmp_path: Path) -> None:
+    with writer(tmp_path / "results.h5") as results:
+        results.append(*rows(0, 1))
+        results.note({"wall_time": 1.5})
+    assert read_results(tmp_path / "results.h5").notes["wall_time"] == 1.5
+
+
+def test_a_scene_made_in_python_has_no_toml(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path / "results.h5", [TORQUE], "{}", None, {}):
+        pass
+    read = read_results(tmp_path / "results.h5")
+    assert (read.scene_toml, len(read.time), read.status) == (None, 0, "complete")
+
+
+def test_a_run_under_way_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    with writer(path) as results:
+        results.append(*rows(0, 4))
+        here = read_results(path)
+        code = "import sys; from kedfem.results import read_results as r; print(r(sys.argv[1]).status)"
+        elsewhere = run(code, path)
+    assert (here.status, len(here.time)) == ("running", 4)
+    assert elsewhere.stdout.strip() == "running", elsewhere.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [(KeyboardInterrupt(), "KeyboardInterrupt"), (RuntimeError("step 7"), "RuntimeError: step 7")],
+)
+def test_a_stopped_run_says_so_and_keeps_its_rows(tmp_path: Path, error: BaseException, reason: str) -> None:
+    path = tmp_path / "results.h5"
+
+    def stopped() -> None:
+        with writer(path) as results:
+            results.append(*rows(0, 4))
+            raise error
+
+    with pytest.raises(type(error)):
+        stopped()
+    read = read_results(path)
+    assert (read.status, read.reason, len(read.time)) == ("interrupted", reason, 4)
+
+
+def test_a_killed_run_is_not_complete_and_keeps_its_rows(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, sys\nimport numpy as np\nfrom pathlib import Path\n"
+        "from kedfem.results import *\n"
+        "with ResultsWriter(Path(sys.argv[1]), [Channel('a/b', ('x',), 'N', '', '')], '{}', None, {}) as w:\n"
+        "    for k in range(9): w.append(np.array([k]), np.array([k]), {'a/b': np.array([[k]])})\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    assert run(code, tmp_path / "results.h5").returncode == -signal.SIGKILL
+    read = read_results(tmp_path / "results.h5")
+    assert read.status == "running"
+    np.testing.assert_array_equal(read.channels["a/b"][1][:, 0], np.arange(9))
+
+
+def test_a_block_that_was_cut_short_leaves_no_rows(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    time, angle, values = rows(4, 3)
+    values[TORQUE.name] = np.full(
+        (3, 1), "words"
+    )  # refused by HDF5 after the channels before it were written
+
+    def cut_short() -> None:
+        with writer(path) as results:
+            results.append(*rows(0, 4))
+            results.append(time, angle, values)
+
+    with pytest.raises((TypeError, ValueError)):
+        cut_short()
+    with h5py.File(path, "r") as file:
+        assert {len(file[name]) for name in (STRESS.name, FORCE.name, TORQUE.name, "time", "angle")} == {4}
+
+
+def test_a_run_that_fails_before_its_first_rows_leaves_the_old_results(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    write(path, 3)
+    before = path.read_bytes()
+    with pytest.raises(RuntimeError, match="no start"), writer(path):
+        raise RuntimeError("no start")
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["results.h5"]
+
+
+def test_the_first_rows_replace_the_old_results(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    write(path, 30)
+    with writer(path) as results:
+        assert len(read_results(path).time) == 30
+        results.append(*rows(0, 2))
+        assert len(read_results(path).time) == 2
+    assert [p.name for p in tmp_path.iterdir()] == ["results.h5"]
+
+
+def test_wrong_blocks_are_refused(tmp_path: Path) -> None:
+    time, angle, values = rows(0, 2)
+    with writer(tmp_path / "results.h5") as results:
+        with pytest.raises(ValueError, match=r"must be the channels .*drive/torque"):
+            results.append(time, angle, {k: v for k, v in values.items() if k != TORQUE.name})
+        with pytest.raises(ValueError, match=r"must be the channels .*joints/B/force"):
+            results.append(time, angle, values | {FORCE.name: np.zeros((2, 2))})
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="asks for space in another way")
+def test_a_full_disk_stops_the_run_and_keeps_its_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "results.h5"
+
+    def full(*_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def filled() -> None:
+        with writer(path) as results:
+            results.append(*rows(0, 4))
+            monkeypatch.setattr(os, "posix_fallocate", full)
+            results.append(*rows(4, 4))
+
+    with pytest.raises(
+        OutputError, match=r"results\.h5: must be a file that can be written, got No space left"
+    ):
+        filled()
+    read = read_results(path)
+    assert (read.status, len(read.time)) == ("interrupted", 4)
+
+
+def test_two_runs_cannot_write_the_same_file(tmp_path: Path) -> None:
+    path = tmp_path / "results.h5"
+    code = (
+        "import sys; from kedfem.results import *\nwith ResultsWriter(sys.argv[1], [], '{}', None, {}): pass"
+    )
+    with writer(path) as results:
+        results.append(*rows(0, 1))
+        second = run(code, path)
+    assert "must not be in use, got another run that is writing it" in second.stderr
+    assert read_results(path).status == "complete"
+
+
+def corrupt(path: Path) -> None:
+    path.write_bytes(bytes(range(256)) * 8)
+
+
+def truncated(path: Path) -> None:
+    write(path, 600)
+    path.write_bytes(path.read_bytes()[:9000])
+
+
+def foreign(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time"] = [0.0]
+
+
+def newer(path: Path) -> None:
+    write(path, 1)
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = 99
+
+
+def gap(path: Path) -> None:
+    write(path, 1)
+    with h5py.File(path, "r+") as file:
+        del file["angle"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda path: None, "must be a results file of kedfem, got no such file"),
+        (Path.mkdir, "must be a results file of kedfem, got a folder"),
+        (corrupt, "must be a results file of kedfem, got a corrupt file"),
+        (truncated, "must be a results file of kedfem, got a corrupt file .*truncated"),
+        (foreign, "must be a results file of kedfem, got another HDF5 file"),
+        (newer, "must be a results file of kedfem with layout 1 or older, got layout 99"),
+        (gap, "must be a results file of kedfem, got one with a gap .*angle"),
+    ],
+)
+def test_what_is_no_results_file_is_refused(tmp_path: Path, spoil, message: str) -> None:
+    path = tmp_path / "results.h5"
+    spoil(path)
+    with pytest.raises(OutputError, match=r"results\.h5: " + message):
+        read_results(path)
+
+
+@pytest.mark.parametrize("below", ["", "deeper"])
+def test_a_file_in_the_way_of_the_folder(tmp_path: Path, below: str) -> None:
+    (tmp_path / "taken").write_text("mine")
+    folder = tmp_path / "taken" / below
+    message = r"^output\.folder: must be a writable folder, got .*taken"
+    with pytest.raises(OutputError, match=message):
+        ready_folder(folder)
+    with pytest.raises(OutputError, match=message):
+        write(folder / "results.h5", 1)
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(
+        OutputError, match=r"^output\.folder: must be a writable folder, got .*Permission denied"
+    ):
+        ready_folder(tmp_path)
+
+
+def test_a_folder_in_the_way_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "results.h5").mkdir()
+    message = r"results\.h5: must be a file that can be written, got a folder of that name"
+    with pytest.raises(OutputError, match=message):
+        write(tmp_path / "results.h5", 1)
+
+
+def test_a_file_is_replaced_only_when_it_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+
+    def broken() -> None:
+        with replacing(path) as part:
+            part.write_text("ne")
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(OutputError, match=r"table\.csv: must be a file that can be written, got No space"):
+        broken()
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["old"]
+    with replacing(path) as part:
+        part.write_text("new")
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["new"]
+
+
+def test_a_table_reads_back_equal(tmp_path: Path) -> None:
+    write(tmp_path / "results.h5", 7)
+    read = read_results(tmp_path / "results.h5")
+    write_csv(read, tmp_path / "results.csv")
+    with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
+        header, *lines = csv.reader(file)
+    assert header[:3] == ["time [s]", "angle [rad]", "probes/rocker_mid/stress xx [Pa]"]
+    assert header[-2:] == ["joints/B/force z [N]", "drive/torque torque [N m]"]
+    blocks = [read.time[:, None], read.angle[:, None], *(values for _, values in read.channels.values())]
+    np.testing.assert_array_equal(np.array(lines, float), np.hstack(blocks))
+
+
+def test_a_table_of_part_of_a_run_says_so(tmp_path: Path) -> None:
+    write(tmp_path / "results.h5", 7)
+    part: Results = replace(read_results(tmp_path / "results.h5"), status="interrupted")
+    write_csv(part, tmp_path / "results.csv")
+    text = (tmp_path / "results.csv").read_text(encoding="utf-8")
+    assert text.startswith("# not a whole run: interrupted after 7 steps\ntime [s],")
