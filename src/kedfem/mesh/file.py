@@ -1,0 +1,107 @@
+"""Meshes of hexahedra from files, through meshio."""
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Int
+from scipy.sparse.csgraph import connected_components
+
+from kedfem.errors import MeshError
+from kedfem.mesh.hexahedra import HexMesh, without_spare_nodes
+
+_ACCEPTED = ("hexahedron", "hexahedron27")
+
+
+def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
+    """The hexahedra of a mesh file, nodes that none of them uses left out.
+
+    Parameters
+    ----------
+    where : str
+        What the file is for, for messages.
+    path : Path
+        Any format that meshio reads. Points, lines and faces in it are passed over.
+    scale : float [m]
+        Length of the file's unit.
+
+    Raises
+    ------
+    MeshError
+        No such file, not readable, other cells than hexahedra of one kind, coordinates that are not finite,
+        nodes that do not exist, several pieces that share no nodes.
+    """
+    raw = _read(where, path)
+    cells = _hexahedra(where, path, raw)
+    points = np.asarray(raw.points, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise MeshError(f"{where}: nodes must have three coordinates, got shape {points.shape} in {path}")
+    if cells.size and (cells.min() < 0 or cells.max() >= len(points)):
+        raise MeshError(
+            f"{where}: elements must use nodes 0 to {len(points) - 1}, got node "
+            f"{cells.min() if cells.min() < 0 else cells.max()} in {path}"
+        )
+    mesh = without_spare_nodes(scale * points, cells)
+    if not np.isfinite(mesh.points).all():
+        used = np.unique(cells)
+        bad = used[~np.isfinite(mesh.points).all(axis=1)][0]
+        raise MeshError(
+            f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
+        )
+    pieces = _pieces(mesh)
+    if pieces > 1:
+        raise MeshError(
+            f"{where}: must be one piece, got {pieces} pieces that share no nodes in {path}; "
+            "merge nodes that lie on each other, or make each piece a link"
+        )
+    return mesh
+
+
+def _read(where: str, path: Path) -> Any:
+    """What meshio makes of the file; whatever it raises, prints or exits with becomes a MeshError."""
+    if not path.is_file():
+        raise MeshError(
+            f"{where}: must be a mesh file, got {'a folder' if path.is_dir() else 'nothing'} at {path}"
+        )
+    import meshio
+
+    spoken = io.StringIO()
+    try:
+        with (
+            warnings.catch_warnings(),
+            contextlib.redirect_stdout(spoken),
+            contextlib.redirect_stderr(spoken),
+        ):
+            warnings.simplefilter("ignore")
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:  # each of its readers fails in its own way
+        reason = " ".join((str(error) if not isinstance(error, SystemExit) else spoken.getvalue()).split())
+        raise MeshError(
+            f"{where}: must be a mesh file that meshio can read, got {path}: {reason or type(error).__name__}"
+        ) from error
+
+
+def _hexahedra(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
+    """The cells of the one kind of hexahedra in a file."""
+    found: dict[str, int] = {}
+    for block in raw.cells:
+        if block.dim == 3:
+            found[block.type] = found.get(block.type, 0) + len(block.data)
+    if len(found) == 1 and (kind := next(iter(found))) in _ACCEPTED and found[kind]:
+        return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
+    got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
+    raise MeshError(
+        f"{where}: must hold hexahedra of one kind ({' or '.join(_ACCEPTED)}), got {got} in {path}"
+    )
+
+
+def _pieces(mesh: HexMesh) -> int:
+    """Number of groups of elements that share no nodes."""
+    n, (e, k) = len(mesh.points), mesh.cells.shape
+    incidence = sp.csr_array((np.ones(e * k), mesh.cells.ravel(), np.arange(0, e * k + 1, k)), shape=(e, n))
+    graph = sp.block_array([[None, incidence], [incidence.T, None]])
+    return int(connected_components(graph, directed=False)[0])

@@ -1,0 +1,177 @@
+"""The mesh of a link, whatever its shape."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from kedfem.errors import MeshError, SceneError
+from kedfem.mesh.file import mesh_from_file
+from kedfem.mesh.hexahedra import (
+    HexMesh,
+    extruded,
+    frame_along,
+    linear,
+    placed,
+    quadratic,
+    rectangle_quads,
+)
+from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
+from kedfem.mesh.plane import Quads
+from kedfem.mesh.plate import PlateSizes, plate_quads
+from kedfem.mesh.quads import quad_mesh
+from kedfem.mesh.quality import checked_mesh
+from kedfem.scene import (
+    Arc,
+    Bar,
+    Extrusion,
+    LinkScene,
+    MeshFile,
+    Meshing,
+    Part,
+    PartGeometry,
+    PlateLink,
+    part_geometry,
+)
+
+MOST_ELEMENTS = 2_000_000
+_EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wider than the waist
+
+
+def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
+    """The hexahedral mesh of a solid link, in the scene's reference position.
+
+    Parameters
+    ----------
+    name : str
+        The link's name, for messages.
+    link : LinkScene
+        A solid link of a validated scene.
+    folder : Path
+        The folder that the names of part and mesh files refer to.
+
+    Returns
+    -------
+    HexMesh
+        27-node elements, or 8-node ones if `link.element` is hex8, of at least `link.min_quality`.
+
+    Raises
+    ------
+    MeshError
+        The shape cannot be meshed as asked, a file cannot be used, or an element is not good enough.
+    """
+    where = f"links.{name}"
+    match link.shape:
+        case Bar() as shape:
+            mesh = bar_mesh(where, shape, link.mesh)
+        case PlateLink() as shape:
+            mesh = plate_mesh(where, shape, link.mesh)
+        case Extrusion() as shape:
+            mesh = extrusion_mesh(where, shape, link.mesh)
+        case Part() as shape:
+            mesh = part_mesh(where, shape, link.mesh, folder)
+        case MeshFile() as shape:
+            mesh = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
+        case other:
+            kind = "no shape" if other is None else other.kind
+            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part or mesh, got {kind}")
+    mesh = linear(mesh) if link.element == "hex8" else quadratic(mesh)
+    return checked_mesh(name, mesh, link.min_quality)
+
+
+def bar_mesh(where: str, shape: Bar, mesh: Meshing) -> HexMesh:
+    """A box between two points, in equal elements."""
+    elements = mesh.elements or 4
+    along, across, layers = elements if isinstance(elements, tuple) else (elements, 2, 1)
+    _check_count(f"{where}.mesh.elements", float(along * across * layers))
+    P, Q = np.array(shape.between)
+    quads = rectangle_quads(math.dist(P, Q), shape.width, along, across)
+    return placed(extruded(*quads, shape.thickness, layers), P, frame_along(Q - P))
+
+
+def plate_mesh(where: str, shape: PlateLink, mesh: Meshing) -> HexMesh:
+    """A plate with a bore at each of two points."""
+    P, Q = np.array(shape.between)
+    length = math.dist(P, Q)
+    sizes = PlateSizes(length, shape.width, shape.eye_diameter, shape.bore_diameter)
+    if sizes.waisted and length < _EYE_GAP * shape.eye_diameter:
+        raise MeshError(
+            f"{where}.shape.eye_diameter: must be at most {length / _EYE_GAP:.6g} [m], the distance of the "
+            f"bores over {_EYE_GAP}, for eyes wider than the waist, got {shape.eye_diameter:.6g}"
+        )
+    size = element_size(where, mesh, shape.width, length + shape.eye_diameter)
+    _check_count(_size_key(where, mesh), mesh.layers * (length + shape.eye_diameter) * shape.width / size**2)
+    axes = frame_along(Q - P)
+    plate = extruded(*plate_quads(sizes, size), shape.thickness, mesh.layers)
+    return placed(plate, P + shape.offset * axes[2], axes)
+
+
+def extrusion_mesh(where: str, shape: Extrusion, mesh: Meshing) -> HexMesh:
+    """A plate of any outline, in a z plane."""
+    quads = _outline_quads(where, profile_outline(shape), mesh)
+    start = shape.outline[0]
+    middle = np.array([0.0, 0.0, (start.to if isinstance(start, Arc) else start)[2] + shape.offset])
+    return placed(extruded(*quads, shape.thickness, mesh.layers), middle, np.eye(3))
+
+
+def part_mesh(where: str, shape: Part, mesh: Meshing, folder: Path) -> HexMesh:
+    """A plate that a file describes, between two points."""
+    part = _part(where, shape, folder)
+    origin, x_point = np.array(part.origin[:2]), np.array(part.x_point[:2])
+    quads = _outline_quads(where, turned_outline(profile_outline(part), origin, x_point - origin), mesh)
+    P, Q = np.array(shape.between)
+    return placed(extruded(*quads, part.thickness, mesh.layers), P, frame_along(Q - P))
+
+
+def _part(where: str, shape: Part, folder: Path) -> PartGeometry:
+    """The geometry in a part's file, if it fits between the part's two points."""
+    try:
+        part = part_geometry(folder / shape.file)
+    except SceneError as error:
+        raise MeshError("\n".join(f"{where}.shape.file: {fault}" for fault in error.faults)) from error
+    wanted, got = math.dist(part.origin, part.x_point), math.dist(*shape.between)
+    if abs(wanted - got) > 1e-6 * wanted:
+        raise MeshError(
+            f"{where}.shape.between: must be as far apart as origin and x_point of {shape.file}, "
+            f"{wanted:.9g} [m], got {got:.9g}"
+        )
+    return part
+
+
+def _outline_quads(where: str, outline: Outline, mesh: Meshing) -> Quads:
+    """The plane mesh of an outline, in elements of the size asked for."""
+    extent = float(np.linalg.norm(np.ptp(outline.corners, axis=0)))
+    size = element_size(where, mesh, smallest_width(outline), extent)
+    _check_count(_size_key(where, mesh), mesh.layers * outline_area(outline) / size**2)
+    return quad_mesh(f"{where}.shape", outline, size)
+
+
+def element_size(where: str, mesh: Meshing, width: float, extent: float) -> float:
+    """Edge length of the elements [m]: as given, or from the number of them across the smallest width.
+
+    Raises
+    ------
+    MeshError
+        The size given is larger than the whole link.
+    """
+    if mesh.size is None:
+        return width / (mesh.elements_across or 2)
+    if mesh.size > extent:
+        raise MeshError(
+            f"{where}.mesh.size: must be below the link's own size {extent:.6g} [m], got {mesh.size:.6g}"
+        )
+    return mesh.size
+
+
+def _size_key(where: str, mesh: Meshing) -> str:
+    """The key that the element size comes from."""
+    return f"{where}.mesh.{'elements_across' if mesh.size is None else 'size'}"
+
+
+def _check_count(key: str, count: float) -> None:
+    """Refuse meshes that no computer here could solve, before they are made."""
+    if count > MOST_ELEMENTS:
+        raise MeshError(
+            f"{key}: must give at most {MOST_ELEMENTS:,} elements, got about {count:,.0f}; "
+            "take a coarser mesh"
+        )

@@ -1,0 +1,196 @@
+"""Quadrilateral meshes of plane outlines: gmsh under a few settings, each relaxed, the best one taken."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import MeshError
+from kedfem.mesh.outline import Outline, edge_circles, outline_area, scaled_outline
+from kedfem.mesh.plane import PlaneQuads, Quads, directed_sides, pillowed
+from kedfem.mesh.quality import scaled_jacobian
+from kedfem.mesh.relaxation import relaxed
+from kedfem.mesh.session import gmsh_model
+
+_QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
+_GOOD = 0.5  # scaled Jacobian that is good enough: of such meshes the one with the fewest elements is taken
+_FAIR = 0.3  # scaled Jacobian below which subdivision, at four times the elements, is tried too
+_LARGE = 1000  # quadrilaterals from which time matters: the first good mesh is taken, and relaxed less
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One way to let gmsh make quadrilaterals: its 2-D algorithm, recombination and subdivision."""
+
+    algorithm: int
+    recombination: int
+    subdivision: int
+
+
+#: All tried; the last, which leaves no triangles, if no other is fair. Not algorithm 11: it can hang.
+SETTINGS = (*(Setting(plane, blossom, 0) for blossom in (3, 1) for plane in (6, 5, 8)), Setting(6, 1, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """A curve in gmsh's model and the circle that it lies on; radius nan: straight."""
+
+    tag: int
+    centre: Float[np.ndarray, "2"]
+    radius: float
+
+
+def quad_mesh(where: str, outline: Outline, size: float) -> Quads:
+    """quad9 mesh of the area inside an outline, nodes on the boundary exactly on its arcs and holes.
+
+    Parameters
+    ----------
+    where : str
+        What is meshed, for messages.
+    outline : Outline
+        A checked outline.
+    size : float [m]
+        Edge length of the elements; arcs take shorter ones where they turn more than 22.5° an element.
+
+    Returns
+    -------
+    (n, 2) [m] and (e, 9)
+        Plane nodes; cells in VTK order, anticlockwise. Of the meshes that are good, or within a tenth of the
+        best if none is, the one with the fewest elements.
+
+    Raises
+    ------
+    MeshError
+        gmsh cannot be used, or no setting gives quadrilaterals alone; with what gmsh said.
+    """
+    said: list[str] = []
+    found: list[tuple[float, Quads]] = []
+    large = outline_area(outline) / size**2 > _LARGE
+    extent = float(np.ptp(outline.corners, axis=0).max())  # tolerances are absolute: all see a unit size
+    meshes = _gmsh_meshes(scaled_outline(outline, 1 / extent), size / extent, said)
+    for tried, mesh in enumerate(meshes, start=1):
+        if mesh is not None:
+            found += _relaxed_meshes(mesh, 40 if large else 150)
+        best = max((quality for quality, _ in found), default=-1.0)
+        if (large and best >= _GOOD) or (tried == len(SETTINGS) - 1 and best >= _FAIR):
+            break
+    if not found:
+        raise MeshError(
+            f"{where}: must be an area that quadrilaterals can fill, got no such mesh from gmsh "
+            f"({'; '.join(dict.fromkeys(said)) or 'triangles were left'}); change mesh.size or the outline"
+        )
+    enough = min(_GOOD, best - 0.1 * abs(best))
+    good = [mesh for quality, mesh in found if quality >= enough]
+    points, cells = min(good, key=lambda mesh: len(mesh[1]))
+    return points * extent, cells
+
+
+def _relaxed_meshes(mesh: PlaneQuads, iterations: int) -> list[tuple[float, Quads]]:
+    """The mesh relaxed and, unless that is good, pillowed and relaxed: worst scaled Jacobians, meshes."""
+    found: list[tuple[float, Quads]] = []
+    for candidate in (mesh, pillowed(mesh)):
+        points, cells = relaxed(candidate, iterations)
+        found.append((float(scaled_jacobian(points, cells).min()), (points, cells)))
+        if found[-1][0] >= _GOOD:
+            break
+    return found
+
+
+def _gmsh_meshes(outline: Outline, size: float, said: list[str]) -> Iterator[PlaneQuads | None]:
+    """What gmsh makes under each setting, None if not quadrilaterals alone; its errors go to `said`."""
+    with gmsh_model() as gmsh:
+        curves: list[_Curve] = []
+        for setting in SETTINGS:
+            mesh = None
+            try:
+                curves = curves or _drawn(gmsh, outline, size)
+                mesh = _meshed(gmsh, curves, setting)
+            except Exception as error:  # noqa: BLE001  (gmsh raises nothing more special)
+                said.append(str(error))
+            yield mesh
+
+
+def segment_count(length: float, turn: float, size: float) -> int:
+    """Number of quadratic segments of an edge: even, near `size` long, none turning more than 22.5°.
+
+    Even numbers let any outline be filled with quadrilaterals.
+    """
+    return 2 * max(1, int(np.ceil(length / (2 * size) - 0.25)), int(np.ceil(abs(turn) / (np.pi / 4) - 1e-9)))
+
+
+def _drawn(gmsh: ModuleType, outline: Outline, size: float) -> list[_Curve]:
+    """The outline as a surface of gmsh's model, its curves divided; the curves, those of the holes last."""
+    occ, arcs = gmsh.model.occ, edge_circles(outline)
+    corners = [occ.addPoint(x, y, 0) for x, y in outline.corners]
+    tags, lengths, turns = [], [*arcs.lengths], [*arcs.turns]
+    for start, end, via in zip(corners, corners[1:] + corners[:1], outline.via, strict=True):
+        if np.isnan(via[0]):
+            tags.append(occ.addLine(start, end))
+        else:
+            tags.append(occ.addCircleArc(start, occ.addPoint(*via, 0), end, center=False))
+    loops = [occ.addCurveLoop(tags)]
+    for (x, y), radius in zip(outline.centres, outline.radii, strict=True):
+        tags.append(occ.addCircle(x, y, 0, radius))
+        loops.append(occ.addCurveLoop(tags[-1:]))
+        lengths.append(2 * np.pi * radius)
+        turns.append(2 * np.pi)
+    surface = occ.addPlaneSurface(loops)
+    occ.synchronize()
+    for tag, length, turn in zip(tags, lengths, turns, strict=True):
+        gmsh.model.mesh.setTransfiniteCurve(tag, segment_count(length, turn, size) + 1)
+    gmsh.model.mesh.setRecombine(2, surface)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    centres, radii = [*arcs.centres, *outline.centres], [*arcs.radii, *outline.radii]
+    return [_Curve(*curve) for curve in zip(tags, centres, radii, strict=True)]
+
+
+def _meshed(gmsh: ModuleType, curves: list[_Curve], setting: Setting) -> PlaneQuads | None:
+    """The mesh that gmsh makes of its model under one setting, or None if it is not quadrilaterals alone."""
+    gmsh.model.mesh.clear()
+    gmsh.option.setNumber("Mesh.Algorithm", setting.algorithm)
+    gmsh.option.setNumber("Mesh.RecombinationAlgorithm", setting.recombination)
+    gmsh.option.setNumber("Mesh.SubdivisionAlgorithm", setting.subdivision)
+    gmsh.model.mesh.generate(2)
+    kinds, _, nodes = gmsh.model.mesh.getElements(2)
+    if list(kinds) != [_QUAD4]:
+        return None
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    used, cells = np.unique(nodes[0], return_inverse=True)
+    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)], :2]
+    rims = [
+        np.searchsorted(used, gmsh.model.mesh.getElements(1, curve.tag)[2][0]).reshape(-1, 2)
+        for curve in curves
+    ]
+    return _bounded(points, cells.reshape(-1, 4), curves, rims)
+
+
+def _bounded(
+    points: Float[np.ndarray, "n 2"],
+    cells: Int[np.ndarray, "e 4"],
+    curves: list[_Curve],
+    rims: list[Int[np.ndarray, "_ 2"]],
+) -> PlaneQuads:
+    """The record of a mesh: cells anticlockwise, nodes and middles of the boundary on their circles."""
+    diagonals = points[cells[:, 2:]] - points[cells[:, :2]]
+    if np.linalg.det(diagonals).sum() < 0:
+        cells = cells[:, ::-1]
+    middles = []
+    for curve, rim in zip(curves, rims, strict=True):
+        points[rim] = _on_circle(curve, points[rim])
+        middles.append(_on_circle(curve, points[rim].mean(axis=1)))
+    rim = np.concatenate(rims)
+    size = len(points)
+    forward = np.isin(rim @ [size, 1], directed_sides(cells) @ [size, 1])
+    return PlaneQuads(points, cells, np.where(forward[:, None], rim, rim[:, ::-1]), np.concatenate(middles))
+
+
+def _on_circle(curve: _Curve, points: Float[np.ndarray, "*p 2"]) -> Float[np.ndarray, "*p 2"]:
+    """Points moved radially onto the circle of a curve; left where they are if it is straight."""
+    if np.isnan(curve.radius):
+        return points
+    arm = points - curve.centre
+    return np.asarray(curve.centre + curve.radius * arm / np.linalg.norm(arm, axis=-1, keepdims=True))

@@ -1,0 +1,73 @@
+"""gmsh, opened and closed in one place."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+from kedfem.errors import MeshError
+
+#: Debian packages that hold the shared libraries that gmsh's wheel links to.
+SYSTEM_PACKAGES = {
+    "libGLU.so.1": "libglu1-mesa",
+    "libGL.so.1": "libgl1",
+    "libXrender.so.1": "libxrender1",
+    "libXcursor.so.1": "libxcursor1",
+    "libXfixes.so.3": "libxfixes3",
+    "libXext.so.6": "libxext6",
+    "libXft.so.2": "libxft2",
+    "libfontconfig.so.1": "libfontconfig1",
+    "libXinerama.so.1": "libxinerama1",
+    "libX11.so.6": "libx11-6",
+    "libgomp.so.1": "libgomp1",
+}
+_one_at_a_time = threading.RLock()
+
+
+@contextmanager
+def gmsh_model() -> Iterator[ModuleType]:
+    """gmsh with an empty model, silent, deterministic, on one thread, deaf to the user's gmsh settings.
+
+    The model is removed at the end; gmsh is closed if it was opened here. Ctrl-C stays with Python, any
+    thread may call, one at a time.
+
+    Raises
+    ------
+    MeshError
+        gmsh or a system library of it is missing, or gmsh gave up (its own words are in the message).
+    """
+    gmsh = _gmsh()
+    with _one_at_a_time:
+        opened_here = not gmsh.isInitialized()
+        if opened_here:
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("General.NumThreads", 1)
+        gmsh.model.add("kedfem")
+        try:
+            yield gmsh
+        finally:
+            gmsh.model.remove()
+            if opened_here:
+                gmsh.finalize()
+
+
+def _gmsh() -> ModuleType:
+    """The module gmsh, or a MeshError that says what to install."""
+    try:
+        import gmsh
+    except ModuleNotFoundError as error:
+        raise MeshError("gmsh: must be installed to mesh this shape (pip install gmsh), got none") from error
+    except OSError as error:
+        raise MeshError(_missing_library(str(error))) from error
+    return gmsh  # type: ignore[no-any-return]
+
+
+def _missing_library(message: str) -> str:
+    """What to install when gmsh's shared library does not load."""
+    missing = [package for library, package in SYSTEM_PACKAGES.items() if library in message]
+    others = sorted(set(SYSTEM_PACKAGES.values()) - set(missing))
+    return (
+        f"gmsh: must find its system libraries, got: {message}; "
+        f"on Debian or Ubuntu: apt-get install {' '.join(missing + others)}"
+    )
