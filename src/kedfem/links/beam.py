@@ -1,0 +1,136 @@
+"""Planar isoparametric beams with 2 or 3 nodes: [KED, eqs. (21)(22)], reduced integration against shear locking."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.links.record import Link, Mass, Section, mass_constants, read_only
+from kedfem.scene import Material
+
+CELL_TYPES = {2: "line", 3: "line3"}
+
+
+def shape_functions(r: float, nodes: int) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    """N_a(r) and dN_a/dr of a line element on [-1, 1], ends first."""
+    if nodes == 2:
+        return np.array([1 - r, 1 + r]) / 2, np.array([-0.5, 0.5])
+    return np.array([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r]), np.array([r - 0.5, r + 0.5, -2 * r])
+
+
+def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray, "3 k"], float]:
+    """Rows of axial strain ε, shear strain γ and curvature κ over the element's (u, v, ψ), and det J.
+
+    ε = t·u_s, γ = n·u_s − ψ, κ = ψ_s with s the arc length, det J = √(x_r² + y_r²), [KED, eq. (22)].
+
+    Parameters
+    ----------
+    x : (m, 2) node positions [m]
+    r : parent coordinate in [-1, 1]
+
+    Returns
+    -------
+    (3, 3m) and det J [m]
+    """
+    N, dN = shape_functions(r, len(x))
+    tangent = dN @ x
+    det_J = float(np.hypot(*tangent))
+    t = tangent / det_J
+    rows = np.zeros((3, len(x), 3))
+    rows[0, :, :2] = np.outer(dN, t) / det_J
+    rows[1, :, :2] = np.outer(dN, [-t[1], t[0]]) / det_J
+    rows[1, :, 2] = -N
+    rows[2, :, 2] = dN / det_J
+    return rows.reshape(3, -1), det_J
+
+
+def element_stiffness(
+    x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "k k"]:
+    """Stiffness of one element by reduced integration (m − 1 Gauss points), [KED, eqs. (13)(21)].
+
+    Parameters
+    ----------
+    rigidity : (EA, κGA, EI) [N, N, N m²]
+    """
+    K = np.zeros((3 * len(x), 3 * len(x)))
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) - 1), strict=True):
+        B, det_J = strain_rows(x, r)
+        K += w * det_J * (B.T * rigidity) @ B
+    return K
+
+
+def element_mass(x: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m m"]:
+    """∫ N_a N_b det J of one element [m], to be multiplied by (ρA, ρA, ρI), [KED, eq. (22)]."""
+    m = np.zeros((len(x), len(x)))
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
+        N, dN = shape_functions(r, len(x))
+        m += w * np.hypot(*(dN @ x)) * np.outer(N, N)
+    return m
+
+
+def beam_mesh(
+    points: Float[np.ndarray, "p 3"], elements: int, nodes: int
+) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e m"]]:
+    """Nodes and elements along a polyline, the same number of elements on each of its segments.
+
+    Parameters
+    ----------
+    points : (p, 3) corners [m]
+    elements : per segment
+    nodes : per element, 2 or 3
+
+    Returns
+    -------
+    (n, 3) and (e, nodes), ends first
+    """
+    per_segment = elements * (nodes - 1)
+    s = np.arange((len(points) - 1) * per_segment + 1) / per_segment
+    X = np.stack([np.interp(s, np.arange(len(points)), points[:, k]) for k in range(3)], axis=1)
+    first = np.arange(0, len(X) - 1, nodes - 1)
+    columns = [first, first + nodes - 1] + ([first + 1] if nodes == 3 else [])
+    return X, np.stack(columns, axis=1)
+
+
+def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, material: Material,
+              elements: int = 1, nodes: int = 3) -> Link:  # fmt: skip
+    """The record of a planar beam in a plane z = constant, rows (u, v, ψ).
+
+    Parameters
+    ----------
+    points : (p, 3) corners of its axis in the reference position [m]
+    elements : per straight segment
+    nodes : per element, 2 or 3
+    """
+    X, cells = beam_mesh(points, elements, nodes)
+    E, G = material.youngs_modulus, material.shear_modulus
+    A, I = section.area, section.second_moment  # noqa: E741
+    rigidity = np.array([E * A, section.shear_coefficient * G * A, E * I])
+    gram = _assembled([element_mass(X[c, :2]) for c in cells], cells, len(X))
+    dofs = (3 * cells[:, :, None] + np.arange(3)).reshape(len(cells), -1)
+    K0 = _assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs, 3 * len(X))
+    translation, rotation = material.density * A * gram, material.density * I * gram
+    mass: Mass = (translation, translation, rotation)
+    m1, mX = mass_constants(mass, X * [1, 1, 0])
+    read_only(X, cells, m1, mX)
+    return Link(
+        name=name, kind="beam", X=X, cells=cells, cell_type=CELL_TYPES[nodes], axes=line_axes(points[0], points[-1]),
+        mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        E=E, lame=material.lame(), section=section,
+    )  # fmt: skip
+
+
+def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Link axes as columns: x from start to end, z as near to the world's z as can be (its x, if the link is along z)."""
+    x = (end - start) / np.linalg.norm(end - start)
+    up = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    y = np.cross(up, x)
+    y /= np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def _assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
+    rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
+    columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
+    return sp.csr_array(
+        sp.coo_array((np.concatenate([b.ravel() for b in blocks]), (rows, columns)), shape=(size, size))
+    )

@@ -1,0 +1,84 @@
+"""Rigid bodies attached to links: flywheels, point masses, any inertia. Still a scalar, constant mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.links.record import Link, Mass, mass_constants, read_only
+from kedfem.links.seats import Seat, is_flat
+
+
+def euler_tensor(inertia: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """∫ ρ x xᵀ dV = ½ tr(I) 1 − I of a rigid body from its inertia tensor I [kg m²]."""
+    return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+
+
+def inertia_of(euler: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+    """Inertia tensor tr(G) 1 − G from the Euler tensor G [kg m²]."""
+    return np.asarray(np.trace(euler) * np.eye(3) - euler)
+
+
+def flywheel_tensor(seat: Seat, axis: Float[np.ndarray, "3"], inertia: float) -> Float[np.ndarray, "3 3"]:
+    """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
+
+    On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so
+    there the same J stands across the axis within the face: J t tᵀ.
+    """
+    if not is_flat(seat):
+        return np.asarray(inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
+    t = np.cross(seat.directions[2], axis)
+    return np.asarray(inertia * np.outer(t, t))
+
+
+def with_body(
+    link: Link, seat: Seat, mass: float, centre: Float[np.ndarray, "3"], euler: Float[np.ndarray, "3 3"]
+) -> Link:
+    """A link with a rigid body on one of its seats: W4ᵀ Γ W4 is added to the scalar mass.
+
+    Γ = [[mass, mass·cᵀ], [mass·c, G]], c the body's centre from the seat's origin, G its Euler tensor about that origin.
+    On a planar beam the body adds its mass to the node's translation and its inertia about z to the node's turn.
+
+    Parameters
+    ----------
+    mass : [kg]
+    centre : centre of mass in the reference position [m]; on a beam or a flat face the seat must know the direction to it
+    euler : (3, 3) Euler tensor ∫ ρ x xᵀ dV about the centre [kg m²]
+    """
+    c = centre - seat.origin
+    G = euler + mass * np.outer(c, c)
+    if link.kind == "beam":
+        return _with_node_body(link, seat, mass, float(inertia_of(G)[2, 2]))
+    gamma = np.zeros((4, 4))
+    gamma[0, 0] = mass
+    gamma[0, 1:] = gamma[1:, 0] = mass * c
+    gamma[1:, 1:] = G
+    W4 = sp.csr_array(seat.fit)
+    m = sp.csr_array(link.mass[0] + W4.T @ sp.csr_array(gamma) @ W4)
+    return _with_mass(link, (m, m, m))
+
+
+def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -> Link:
+    """A link with a mass that follows one port point and does not turn with the link, such as a slider's [kg]."""
+    w = sp.csr_array(weights[None, :])
+    lump = sp.csr_array(mass * (w.T @ w))
+    x, _, z = link.mass
+    if link.kind == "beam":
+        xy = sp.csr_array(x + lump)
+        return _with_mass(link, (xy, xy, z))
+    m = sp.csr_array(x + lump)
+    return _with_mass(link, (m, m, m))
+
+
+def _with_node_body(link: Link, seat: Seat, mass: float, inertia: float) -> Link:
+    w = sp.csr_array(seat.fit[:1])
+    lump = sp.csr_array(w.T @ w)
+    xy = sp.csr_array(link.mass[0] + mass * lump)
+    return _with_mass(link, (xy, xy, sp.csr_array(link.mass[2] + inertia * lump)))
+
+
+def _with_mass(link: Link, mass: Mass) -> Link:
+    m1, mX = mass_constants(mass, link.X * [1, 1, 0 if link.kind == "beam" else 1])
+    read_only(m1, mX)
+    return replace(link, mass=mass, m1=m1, mX=mX)

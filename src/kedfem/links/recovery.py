@@ -1,0 +1,265 @@
+"""What a link's state means at a point and at its nodes: displacement weights and stresses in link axes.
+
+Stress = elasticity : sym(gradient), and the gradient is again scalar: three (n, n) matrices serve all of it.
+Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from jaxtyping import Float, Int
+
+from kedfem.errors import SceneError
+from kedfem.links.beam import shape_functions, strain_rows
+from kedfem.links.record import Link
+
+COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx
+POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
+
+
+@dataclass(frozen=True, slots=True)
+class PointRows:
+    """What a point of a link reads from the link's state g (n, 3), link frame.
+
+    value : (n,) displacement = value @ g
+    stress : (6, 3n) stress components in link axes [Pa/m] = stress @ g.ravel()
+    X : (3,) the point itself, moved into the link if it was slightly outside [m]
+    """
+
+    value: Float[np.ndarray, " n"]
+    stress: sp.csr_array
+    X: Float[np.ndarray, "3"]
+
+
+def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+    """The rows of a probe; its displacement is d = N g and f = N δ with the same N, [KED, eqs. (4b)(6)].
+
+    Parameters
+    ----------
+    where : how messages name the point, e.g. ``output.probes.tip.at``
+    point : reference position [m]
+
+    Raises
+    ------
+    SceneError
+        If the point is not in the link.
+    """
+    return _solid_rows(link, where, point) if link.kind == "solid" else _beam_rows(link, where, point)
+
+
+def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -> tuple[sp.csr_array, ...]:
+    """Scalar matrices G_k: nodal ∂_k of a field in a solid, averaged over the elements that meet at a node [1/m].
+
+    Parameters
+    ----------
+    elements : restrict to these; right at the nodes whose elements are all among them
+    """
+    mesh_dofs = link.basis.element_dofs
+    points, extension = _gauss_points(len(mesh_dofs))
+    quadrature = (points, np.ones(points.shape[1]))
+    at_gauss = skfem.Basis(link.basis.mesh, link.basis.elem, elements=elements, quadrature=quadrature)
+    dofs = mesh_dofs if elements is None else mesh_dofs[:, elements]  # (m, e)
+    count = np.maximum(np.bincount(dofs.ravel(), minlength=link.n), 1)
+    rows = np.repeat(dofs.T[:, :, None], len(dofs), axis=2)
+    columns = np.repeat(dofs.T[:, None, :], len(dofs), axis=1)
+    out = []
+    for k in range(3):
+        grad = np.stack([np.asarray(shape[0].grad)[k] for shape in at_gauss.basis])  # (b, e, q)
+        local = np.einsum("aq,beq->eab", extension, grad, optimize=True) / count[rows]
+        out.append(
+            sp.csr_array(sp.coo_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=(link.n,) * 2))
+        )
+    return tuple(out)
+
+
+def stress_of_gradient(H: Float[np.ndarray, "p 3 3"], link: Link) -> Float[np.ndarray, "p 6"]:
+    """Stresses in link axes from displacement gradients H_ij = ∂_j u_i in reference axes: λ tr(ε) 1 + 2 μ ε [Pa]."""
+    lam, mu = link.lame
+    H = np.einsum("ia,pij,jb->pab", link.axes, H, link.axes)
+    stress = mu * (H + H.transpose(0, 2, 1)) + lam * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    return np.stack([stress[:, i, j] for i, j in COMPONENTS], axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class StressRecovery:
+    """Nodal stresses of a whole link; `matrices` are gradients of a solid or element rows of a beam."""
+
+    link: Link
+    matrices: tuple[sp.csr_array, ...]
+
+
+def stress_recovery(link: Link) -> StressRecovery:
+    """Prepare nodal stresses of a link."""
+    if link.kind == "solid":
+        return StressRecovery(link, nodal_gradients(link))
+    half = link.section.height / 2 if link.section else 0.0
+    return StressRecovery(link, (_beam_fibre(link, half), _beam_fibre(link, -half)))
+
+
+def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 6"]:
+    """Stresses at the nodes in link axes [Pa]; of a beam σ_xx of the outer fibre where it is larger in size.
+
+    Parameters
+    ----------
+    g : (n, 3) displacement in the link frame [m; ψ: rad]
+    """
+    if recovery.link.kind == "solid":
+        H = np.stack([G @ g for G in recovery.matrices], axis=2)  # (n, i, j)
+        return stress_of_gradient(H, recovery.link)
+    top, bottom = (m @ g.ravel() for m in recovery.matrices)
+    out = np.zeros((recovery.link.n, 6))
+    out[:, 0] = np.where(np.abs(top) >= np.abs(bottom), top, bottom)
+    return out
+
+
+def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
+    """Equivalent stress from xx, yy, zz, xy, yz, zx [same unit]."""
+    xx, yy, zz, xy, yz, zx = stress.T
+    normal = ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2
+    return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
+
+
+def _gauss_points(nodes: int) -> tuple[Float[np.ndarray, "3 q"], Float[np.ndarray, "m q"]]:
+    """Reduced Gauss points in [0, 1]³ and the matrix that extends values there to the element's nodes."""
+    elem = skfem.ElementHex1() if nodes == 8 else skfem.ElementHex2()
+    if nodes == 8:
+        return np.full((3, 1), 0.5), np.ones((8, 1))
+    a = np.array([0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)])
+    points = np.stack(np.meshgrid(a, a, a, indexing="ij")).reshape(3, 8)
+    at_nodes = np.asarray(elem.doflocs)  # (27, 3)
+    factors = [
+        np.where(points[k] == a[0], (a[1] - at_nodes[:, k : k + 1]), (at_nodes[:, k : k + 1] - a[0]))
+        / (a[1] - a[0])
+        for k in range(3)
+    ]
+    return points, factors[0] * factors[1] * factors[2]
+
+
+def _solid_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+    element, local = _element_at(link, where, point)
+    N, _ = _shapes(link, local)
+    dofs = link.basis.element_dofs[:, element]
+    value = np.zeros(link.n)
+    value[dofs] = N
+    X = N @ link.X[dofs]
+    touching = np.flatnonzero(np.isin(link.basis.element_dofs, dofs).any(axis=0))
+    gradient = [sp.csr_array(value[None, :]) @ G for G in nodal_gradients(link, touching)]
+    return PointRows(value, _stress_rows(link, gradient), X)
+
+
+def _stress_rows(link: Link, gradient: list[sp.csr_array]) -> sp.csr_array:
+    """(6, 3n) rows from the three gradient rows (1, n) at a point."""
+    columns = np.unique(np.concatenate([G.indices for G in gradient]))
+    dense = np.stack([G[:, columns].toarray()[0] for G in gradient])  # (j, c)
+    H = np.zeros((3 * len(columns), 3, 3))
+    for i in range(3):
+        H[i::3, i, :] = dense.T
+    stress = stress_of_gradient(H, link).T
+    dofs = (3 * columns[:, None] + np.arange(3)).ravel()
+    out = sp.lil_array((6, 3 * link.n))
+    out[:, dofs] = stress
+    return sp.csr_array(out)
+
+
+def _shapes(link: Link, local: Float[np.ndarray, "3"]) -> tuple[np.ndarray, np.ndarray]:
+    """N (m,) and dN (m, 3) of a solid element at local coordinates in [0, 1]³."""
+    pairs = [link.basis.elem.lbasis(local[:, None], i) for i in range(len(link.basis.element_dofs))]
+    return np.array([float(np.ravel(N)[0]) for N, _ in pairs]), np.array([np.ravel(dN) for _, dN in pairs])
+
+
+def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[int, Float[np.ndarray, "3"]]:
+    """The element that contains a point (or is nearest to it) and the local coordinates there."""
+    corners = link.X[link.basis.element_dofs]  # (m, e, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    outside = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=1)
+    size = np.ptp(link.X, axis=0).max()
+    best, gap, at = -1, np.inf, np.full(3, 0.5)
+    for element in np.argsort(outside, kind="stable")[:64]:
+        if outside[element] > gap:
+            break
+        local = _local_coordinates(link, int(element), point)
+        distance = float(np.linalg.norm(_shapes(link, local)[0] @ corners[:, element] - point))
+        if distance < gap - 1e-12 * size:
+            best, gap, at = int(element), distance, local
+    if gap > POINT_TOLERANCE * size:
+        raise SceneError(_outside(link, where, point, gap))
+    return best, at
+
+
+def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Newton for the isoparametric map, kept within the element."""
+    x = link.X[link.basis.element_dofs[:, element]]
+    local = np.full(3, 0.5)
+    for _ in range(30):
+        N, dN = _shapes(link, local)
+        change = np.linalg.lstsq(x.T @ dN, point - N @ x, rcond=None)[0]
+        moved = np.clip(local + change, 0.0, 1.0)
+        if np.abs(moved - local).max() < 1e-14:
+            break
+        local = moved
+    return local
+
+
+def _beam_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+    if link.section is None:
+        raise SceneError(f"{where}: link '{link.name}' has no section")
+    best: tuple[float, int, float, float] = (np.inf, 0, 0.0, 0.0)
+    for e, cell in enumerate(link.cells):
+        r, offset, gap = _beam_coordinates(link.X[cell][:, :2], point[:2])
+        best = min(best, (gap, e, r, offset))
+    gap, e, r, offset = best
+    beyond = max(abs(offset) - link.section.height / 2, gap)
+    if beyond > POINT_TOLERANCE * np.ptp(link.X, axis=0).max():
+        raise SceneError(_outside(link, where, point, beyond))
+    value = np.zeros(link.n)
+    value[link.cells[e]] = shape_functions(r, link.cells.shape[1])[0]
+    row = _fibre_row(link, e, r, offset)
+    stress = sp.csr_array(sp.vstack([row[None, :], np.zeros((5, 3 * link.n))]))
+    return PointRows(value, stress, value @ link.X)
+
+
+def _beam_coordinates(
+    x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]
+) -> tuple[float, float, float]:
+    """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
+    r = 0.0
+    for _ in range(20):
+        N, dN = shape_functions(r, len(x))
+        tangent = dN @ x
+        r = float(np.clip(r + tangent @ (point - N @ x) / (tangent @ tangent), -1, 1))
+    N, dN = shape_functions(r, len(x))
+    t = dN @ x / np.linalg.norm(dN @ x)
+    d = point - N @ x
+    return r, float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
+
+
+def _fibre_row(link: Link, element: int, r: float, offset: float) -> Float[np.ndarray, " k"]:
+    """σ_xx = E (ε − offset κ) of a fibre, from the strains at the reduced Gauss points extended to r."""
+    cell = link.cells[element]
+    gauss = np.polynomial.legendre.leggauss(len(cell) - 1)[0]
+    weights = [np.prod([(r - q) / (p - q) for q in gauss if q != p]) for p in gauss]
+    rows = sum(w * strain_rows(link.X[cell][:, :2], float(p))[0] for w, p in zip(weights, gauss, strict=True))
+    out = np.zeros(3 * link.n)
+    out[(3 * cell[:, None] + np.arange(3)).ravel()] = link.E * (
+        np.asarray(rows)[0] - offset * np.asarray(rows)[2]
+    )
+    return out
+
+
+def _beam_fibre(link: Link, offset: float) -> sp.csr_array:
+    """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
+    nodes = link.cells.shape[1]
+    parent = [-1.0, 1.0, 0.0][:nodes]
+    total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
+    for e, cell in enumerate(link.cells):
+        for a, r in zip(cell, parent, strict=True):
+            total[a] += _fibre_row(link, e, r, offset)
+            count[a] += 1
+    return sp.csr_array(total / count[:, None])
+
+
+def _outside(link: Link, where: str, point: Float[np.ndarray, "3"], gap: float) -> str:
+    shown = ", ".join(f"{v:.6g}" for v in point)
+    return f"{where}: must lie in link '{link.name}', got ({shown}), {gap:.3g} m outside it"

@@ -1,0 +1,149 @@
+"""Hexahedral solid links: six scalar forms, and everything else follows. The only wall to scikit-fem, with `surface`.
+
+[KED, eqs. (4), (9), (11), (13)]; the same functions interpolate geometry and displacement (isoparametric).
+"""
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import meshio
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from jaxtyping import Float, Int
+from skfem.io.meshio import HEX_MAPPING, from_meshio
+
+from kedfem.links.record import Link, Mass, mass_constants, read_only
+from kedfem.mesh import HexMesh
+from kedfem.scene import Material
+
+QUADRATURE_ORDER = {8: 3, 27: 5}  # 2³ and 3³ Gauss points: the volume of a distorted element is exact
+CELL_TYPES = {8: "hexahedron", 27: "hexahedron27"}
+
+
+def solid_basis(mesh: HexMesh) -> skfem.Basis:
+    """Isoparametric function space of a hexahedral mesh, [KED, eqs. (4a)(4b)].
+
+    Parameters
+    ----------
+    mesh : 8- or 27-node hexahedra [m]
+    """
+    nodes = mesh.cells.shape[1]
+    element = skfem.ElementHex1() if nodes == 8 else skfem.ElementHex2()
+    fem_mesh = from_meshio(meshio.Mesh(mesh.points, {CELL_TYPES[nodes]: mesh.cells}))
+    return skfem.Basis(fem_mesh, element, intorder=QUADRATURE_ORDER[nodes])
+
+
+def vtk_cells(basis: skfem.Basis) -> Int[np.ndarray, "e m"]:
+    """Elements as rows of function numbers in VTK's node order."""
+    dofs = basis.element_dofs
+    return np.ascontiguousarray(dofs[HEX_MAPPING[: len(dofs)]].T)
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """The one sparsity pattern of all scalar matrices of a basis: where each entry of each element goes.
+
+    indices, indptr : CSR structure
+    slot : of each local entry, in scikit-fem's order
+    """
+
+    indices: Int[np.ndarray, " nnz"]
+    indptr: Int[np.ndarray, " n1"]
+    slot: Int[np.ndarray, " k"]
+
+    def assembled(self, form: skfem.BilinearForm, basis: skfem.Basis) -> sp.csr_array:
+        """A scalar form as a sparse array, entries that happen to vanish kept."""
+        data = np.bincount(self.slot, weights=form.coo_data(basis).data, minlength=len(self.indices))
+        n = len(self.indptr) - 1
+        return sp.csr_array((data, self.indices, self.indptr), shape=(n, n))
+
+
+def pattern(basis: skfem.Basis) -> Pattern:
+    """Sparsity pattern of a basis."""
+    dofs, n = basis.element_dofs.astype(np.int64), basis.N
+    keys = (dofs[None, :, :] * n + dofs[:, None, :]).ravel()  # entry (j, i, e): row i, column j
+    found, slot = np.unique(keys, return_inverse=True)
+    indptr = np.searchsorted(found, n * np.arange(n + 1)).astype(np.int32)
+    return Pattern((found % n).astype(np.int32), indptr, slot)
+
+
+def scalar_mass(basis: skfem.Basis, on: Pattern, density: float) -> sp.csr_array:
+    """Scalar Gram matrix m_ab = ∫ ρ N_a N_b det(J), [KED, eqs. (9)(11)].
+
+    Parameters
+    ----------
+    density : ρ [kg/m³]
+
+    Returns
+    -------
+    (n, n) [kg]
+    """
+    return on.assembled(skfem.BilinearForm(lambda u, v, _: density * u * v), basis)
+
+
+def gradient_products(basis: skfem.Basis, on: Pattern) -> dict[tuple[int, int], sp.csr_array]:
+    """The scalar matrices D_ij = ∫ ∂_i N_a ∂_j N_b, i ≤ j, all on one sparsity pattern [m]."""
+    return {
+        (i, j): on.assembled(skfem.BilinearForm(lambda u, v, _, i=i, j=j: v.grad[i] * u.grad[j]), basis)
+        for i, j in combinations_with_replacement(range(3), 2)
+    }
+
+
+def elastic_stiffness(D: dict[tuple[int, int], sp.csr_array], lame: tuple[float, float]) -> sp.csr_array:
+    """K0 from six scalar matrices: block(i, j) = λ D_ij + μ D_ji + μ δ_ij Σ_k D_kk, [KED, eqs. (13)(14)].
+
+    Parameters
+    ----------
+    D : scalar matrices of `gradient_products` [m]
+    lame : Lamé's (λ, μ) [Pa]
+
+    Returns
+    -------
+    (3n, 3n) in the link frame, dof 3·node + component [N/m]
+    """
+    lam, mu = lame
+    like = D[0, 0]
+    transposed = transposition(like)
+    data = {(i, j): D[i, j].data if i <= j else D[j, i].data[transposed] for i in range(3) for j in range(3)}
+    laplace = mu * (data[0, 0] + data[1, 1] + data[2, 2])
+    blocks = np.empty((like.nnz, 3, 3))
+    for i in range(3):
+        for j in range(3):
+            blocks[:, i, j] = lam * data[i, j] + mu * data[j, i]
+        blocks[:, i, i] += laplace
+    n = like.shape[0]
+    return sp.csr_array(sp.bsr_array((blocks, like.indices, like.indptr), shape=(3 * n, 3 * n)).tocsr())
+
+
+def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:
+    """Where the transposed entry of each entry of a structurally symmetric matrix stands."""
+    number = sp.csr_array((np.arange(like.nnz), like.indices, like.indptr), shape=like.shape)
+    turned = sp.csr_array(number.T.tocsr())
+    turned.sort_indices()
+    return np.asarray(turned.data)
+
+
+def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
+    """The record of a hexahedral link.
+
+    Parameters
+    ----------
+    name : key of the link in the scene
+    mesh : hexahedra in the reference position
+    material : ρ, E, ν
+    axes : (3, 3) columns are the link axes
+    """
+    basis = solid_basis(mesh)
+    on = pattern(basis)
+    m = scalar_mass(basis, on, material.density)
+    mass: Mass = (m, m, m)
+    X = np.ascontiguousarray(basis.doflocs.T)
+    m1, mX = mass_constants(mass, X)
+    read_only(X, m1, mX)
+    return Link(
+        name=name, kind="solid", X=X, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
+        axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
+        volume=m1[:, 0] / material.density,
+        E=material.youngs_modulus, lame=material.lame(), basis=basis,
+    )  # fmt: skip
