@@ -1,0 +1,71 @@
+"""Rigid motion R, p, R'', p'' of all links at many times at once, [KED, eqs. (2)(3)]."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import OPEN, Path, closed, cross_matrix, derivatives, predicted
+
+
+@dataclass(frozen=True, slots=True)
+class RigidMotion:
+    """Poses and accelerations of all bodies (ground first) at T times.
+
+    t, phi : (T,) time [s] and drive angle [rad]
+    R, p : (T, B, 3, 3), (T, B, 3): a point drawn at X is at p + R X
+    omega, alpha : (T, B, 3) angular velocity and acceleration, world components [rad/s, rad/s²]
+    v : (T, B, 3) p' [m/s]
+    R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
+    omega_phi, v_phi : (T, B, 3) rotation and displacement of the origin per drive angle [-, m]
+    """
+
+    t: Float[np.ndarray, " T"]
+    phi: Float[np.ndarray, " T"]
+    R: Float[np.ndarray, "T B 3 3"]
+    p: Float[np.ndarray, "T B 3"]
+    omega: Float[np.ndarray, "T B 3"]
+    alpha: Float[np.ndarray, "T B 3"]
+    v: Float[np.ndarray, "T B 3"]
+    R2: Float[np.ndarray, "T B 3 3"]
+    p2: Float[np.ndarray, "T B 3"]
+    omega_phi: Float[np.ndarray, "T B 3"]
+    v_phi: Float[np.ndarray, "T B 3"]
+
+
+Drive = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
+
+
+def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: Drive) -> RigidMotion:
+    """The rigid part of [KED, eqs. (2)(3)] at given times.
+
+    Newton from the nearest point of the path, then differentiated constraints.
+
+    Parameters
+    ----------
+    along : path that covers the drive angles
+    t : (T,) [s]
+    drive : angle, speed and acceleration of the drive at those times, each (T,) [rad, rad/s, rad/s²]
+
+    Raises
+    ------
+    MotionError
+        If a joint is left open, with time and drive angle.
+    """
+    phi, speed, acceleration = drive
+    poses, worst = closed(link, predicted(along, phi), phi)
+    if worst.size and worst.max() > OPEN:
+        k = int(worst.argmax())
+        raise MotionError(
+            f"joints: the linkage must close at all times, got an open joint ({worst[k] * link.size:.3g} m) "
+            f"at t = {t[k]:.6g} s, drive angle {np.degrees(phi[k]):.6g} deg"
+        )
+    first, second, _ = derivatives(link, poses, phi)
+    s, ss, a = speed[:, None, None], speed[:, None, None] ** 2, acceleration[:, None, None]
+    (v1, w1), (v2, w2) = first, second
+    omega, alpha = w1 * s, w2 * ss + w1 * a
+    W = cross_matrix(omega)
+    R2 = (cross_matrix(alpha) + W @ W) @ poses[0]
+    return RigidMotion(t, phi, *poses, omega, alpha, v1 * s, R2, v2 * ss + v1 * a, w1, v1)

@@ -1,0 +1,181 @@
+"""Constraint rows of joints and drives, and their first and second derivatives, for many time points at once.
+
+A body's point is at p + R X (X: reference position, R = I there). Two kinds of rows make every joint:
+
+* gap:  b_j · (x_i − x_j) = 0       two points of bodies i and j meet, seen along a direction b fixed in body j
+* turn: a_i · b_j = 0               a direction of body i stays perpendicular to a direction of body j
+"""
+
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float
+
+GAP, TURN = 0, 1
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One scalar constraint between bodies i and j (0 is the ground).
+
+    kind : GAP or TURN
+    a : point X of the joint (gap) [m] or direction in body i (turn) [-], reference components
+    b : direction in body j, reference components
+    b_drive : turn only: b at drive angle φ is b cos φ + b_drive sin φ; None: b does not depend on φ
+    joint : name, for messages
+    """
+
+    kind: int
+    i: int
+    j: int
+    a: Vector
+    b: Vector
+    joint: str
+    b_drive: Vector | None = field(default=None)
+
+
+def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:
+    """Two unit vectors e1, e2 with e1 × e2 = axis."""
+    helper = np.eye(3)[np.abs(axis).argmin()]
+    e1 = np.cross(axis, helper)
+    e1 /= np.linalg.norm(e1)
+    return e1, np.cross(axis, e1)
+
+
+def joint_rows(kind: str, name: str, i: int, j: int, point: Vector, axis: Vector | None) -> list[Row]:
+    """Rows of a joint between bodies i and j.
+
+    Parameters
+    ----------
+    kind : spherical, revolute, prismatic or weld
+    point : of the joint, reference position [m]
+    axis : unit vector; of a revolute joint its axis, of a prismatic joint its direction
+    """
+    x, y, z = np.eye(3)
+    meet = [Row(GAP, i, j, point, b, name) for b in (x, y, z)]
+    aligned = [Row(TURN, i, j, a, b, name) for a, b in combinations((x, y, z), 2)]
+    if kind == "spherical":
+        return meet
+    if kind == "weld":
+        return meet + aligned
+    assert axis is not None  # noqa: S101  (the scene requires it)
+    e1, e2 = perpendiculars(axis)
+    if kind == "revolute":
+        return [*meet, Row(TURN, i, j, axis, e1, name), Row(TURN, i, j, axis, e2, name)]
+    slides = [Row(GAP, i, j, point, b, name) for b in (e1, e2)]
+    return slides + aligned
+
+
+def drive_row(name: str, i: int, j: int, axis: Vector) -> Row:
+    """The drive of a revolute joint: body i is turned by φ about the axis against body j.
+
+    e1 of body i stays perpendicular to e2 of body j turned by φ: −e1 sin φ + e2 cos φ.
+    """
+    e1, e2 = perpendiculars(axis)
+    return Row(TURN, i, j, e1, e2, name, -e1)
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Rows as arrays: kind, i, j (m,); a, b, b_drive (m, 3); driven (m,)."""
+
+    kind: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    b_drive: np.ndarray
+    driven: np.ndarray
+
+
+def stacked(rows: list[Row]) -> Rows:
+    """Rows as arrays, for evaluation all at once."""
+    return Rows(
+        kind=np.array([r.kind for r in rows]), i=np.array([r.i for r in rows]), j=np.array([r.j for r in rows]),
+        a=np.array([r.a for r in rows]), b=np.array([r.b for r in rows]),
+        b_drive=np.array([np.zeros(3) if r.b_drive is None else r.b_drive for r in rows]),
+        driven=np.array([r.b_drive is not None for r in rows]),
+    )  # fmt: skip
+
+
+Poses = tuple[Float[np.ndarray, "T B 3 3"], Float[np.ndarray, "T B 3"]]
+Twists = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Features:
+    """What rows are made of at T time points: all (T, m, 3).
+
+    u : gap: x_i − x_j, turn: a in world components; w : b in world components; w_phi : ∂w/∂φ;
+    arm_i, arm_j : R_i a and R_j a, the joint point from the bodies' reference origins.
+    """
+
+    u: np.ndarray
+    w: np.ndarray
+    w_phi: np.ndarray
+    arm_i: np.ndarray
+    arm_j: np.ndarray
+
+
+def features(rows: Rows, poses: Poses, phi: Float[np.ndarray, " T"]) -> Features:
+    """Evaluate what the rows are made of."""
+    R, p = poses
+    cos = np.where(rows.driven, np.cos(phi)[:, None], 1.0)[..., None]
+    sin = np.where(rows.driven, np.sin(phi)[:, None], 0.0)[..., None]
+    b = rows.b * cos + rows.b_drive * sin
+    b_phi = np.where(rows.driven[:, None], rows.b_drive * cos - rows.b * sin, 0.0)
+    Ri, Rj = R[:, rows.i], R[:, rows.j]
+    arm_i, arm_j = np.einsum("tmij,mj->tmi", Ri, rows.a), np.einsum("tmij,mj->tmi", Rj, rows.a)
+    gap = p[:, rows.i] + arm_i - p[:, rows.j] - arm_j
+    is_gap = (rows.kind == GAP)[:, None]
+    return Features(
+        u=np.where(is_gap, gap, arm_i), w=np.einsum("tmij,tmj->tmi", Rj, b),
+        w_phi=np.einsum("tmij,tmj->tmi", Rj, b_phi), arm_i=arm_i, arm_j=arm_j,
+    )  # fmt: skip
+
+
+def residuals(f: Features) -> Float[np.ndarray, "T m"]:
+    """Values of the rows: u · w [m or -]."""
+    return np.asarray(np.einsum("tmk,tmk->tm", f.u, f.w))
+
+
+def jacobian(rows: Rows, f: Features, bodies: int) -> Float[np.ndarray, "T m k"]:
+    """Derivatives of the rows by the bodies' twists (v, ω), δR = [δθ]× R; ground columns dropped, k = 6 (bodies − 1)."""
+    T, m = f.u.shape[:2]
+    J = np.zeros((T, m, bodies, 6))
+    gap, number = (rows.kind == GAP)[:, None], np.arange(m)
+    # d(u·w) = w · du + u · dw;  du: gap v_i + ω_i × arm_i − v_j − ω_j × arm_j, turn ω_i × u;  dw = ω_j × w
+    J[:, number, rows.i, :3] += np.where(gap, f.w, 0)
+    J[:, number, rows.j, :3] -= np.where(gap, f.w, 0)
+    J[:, number, rows.i, 3:] += np.cross(f.arm_i, f.w)
+    J[:, number, rows.j, 3:] += np.cross(f.w, f.u) - np.where(gap, np.cross(f.arm_j, f.w), 0)
+    return J[:, :, 1:].reshape(T, m, 6 * (bodies - 1))
+
+
+def drive_derivative(f: Features) -> Float[np.ndarray, "T m"]:
+    """∂(row)/∂φ."""
+    return np.asarray(np.einsum("tmk,tmk->tm", f.u, f.w_phi))
+
+
+def convective(
+    rows: Rows, f: Features, twists: Twists, speed: Float[np.ndarray, " T"]
+) -> Float[np.ndarray, "T m"]:
+    """Second time derivative of the rows without the terms in accelerations: J̇ q̇ and the drive's quadratic terms."""
+    v, omega = twists
+    wi, wj = omega[:, rows.i], omega[:, rows.j]
+    gap = (rows.kind == GAP)[:, None]
+    rate_i, rate_j = np.cross(wi, f.arm_i), np.cross(wj, f.arm_j)
+    u1 = np.where(gap, v[:, rows.i] + rate_i - v[:, rows.j] - rate_j, rate_i)
+    u2 = np.cross(wi, rate_i) - np.where(gap, np.cross(wj, rate_j), 0)
+    s = speed[:, None, None]
+    turn_w = np.cross(wj, f.w)
+    w1 = turn_w + f.w_phi * s
+    driven = rows.driven[:, None]
+    w2 = np.cross(wj, turn_w) + 2 * s * np.cross(wj, f.w_phi) - np.where(driven, f.w, 0) * s**2
+    return np.asarray(
+        np.einsum("tmk,tmk->tm", u2, f.w)
+        + 2 * np.einsum("tmk,tmk->tm", u1, w1)
+        + np.einsum("tmk,tmk->tm", f.u, w2)
+    )
