@@ -1,0 +1,244 @@
+"""The condensed step: one constant factorisation per link, joints solved on a dozen unknowns.
+
+Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.cholesky import Cholesky
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import LinkState, Nominal, Rayleigh, accelerated
+from kedfem.links.record import Link, mass_times
+
+ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
+Nodal = Float[np.ndarray, "n 3"]
+Rotation = Float[np.ndarray, "3 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Substructure:
+    """A link seen from its q port components and e anchors, all constant in the link frame.
+
+    A holds a free link by its inertia only, so a long step would leave it nearly singular. Factored is therefore
+    Ã = A + κ E Eᵀ, E a few components of nodes far apart (the anchors): A g = r + Wᵀ λ is Ã g = r + Wᵀ λ + E μ with
+    μ = κ Eᵀ g. Exact for every κ. With C = [Wᵀ E] and y = Ã⁻¹ r,
+
+        [λ; μ] = S ([W g; 0] − Cᵀ y),   S = (Cᵀ Ã⁻¹ C − diag(0, 1/κ))⁻¹,   g = y + Ã⁻¹ C [λ; μ].
+
+    solve : (n, 3) → (n, 3), Ã⁻¹
+    Y : (3n, q + e) Ã⁻¹ C
+    S : (q + e, q + e)
+    anchors : (e,) components of the state
+    """
+
+    solve: Callable[[Nodal], Nodal]
+    attachment: Attachment
+    Y: Float[np.ndarray, "k c"]
+    S: Float[np.ndarray, "c c"]
+    anchors: Int[np.ndarray, " e"]
+
+
+def substructure(
+    attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
+    anchors: Int[np.ndarray, " e"] | None = None, kappa: float = 1.0,
+) -> Substructure:  # fmt: skip
+    """Condense a link onto its ports and anchors.
+
+    Parameters
+    ----------
+    n : functions of the link
+    solve, solve_many : Ã⁻¹ for one state (n, 3) and for columns (3n, k)
+    anchors, kappa : components that Ã holds in addition to A, none if not given, and how stiffly [N/m]
+    """
+    held = np.zeros(0, int) if anchors is None else anchors
+    E = np.zeros((3 * n, len(held)))
+    E[held, np.arange(len(held))] = 1.0
+    C = np.concatenate([port_columns(attachment, n), E], axis=1)
+    Y = solve_many(C)
+    F = C.T @ Y
+    F[np.arange(len(F) - len(held), len(F)), np.arange(len(F) - len(held), len(F))] -= 1 / kappa
+    return Substructure(solve, attachment, Y, np.linalg.inv(F), held)
+
+
+def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
+    """Wᵀ for all held components of a link with n functions, (3n, q)."""
+    p = len(attachment.weights)
+    W = np.zeros((p, 3, n, 3))
+    for k in range(3):
+        W[:, k, attachment.nodes, k] = attachment.weights
+    return np.asarray(W.reshape(3 * p, 3 * n)[attachment.keep].T)
+
+
+def port_values(attachment: Attachment, u: Nodal) -> Float[np.ndarray, " q"]:
+    """W u, the held components."""
+    return np.asarray((attachment.weights @ u[attachment.nodes]).ravel()[attachment.keep])
+
+
+def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q"]:
+    """R on all held components."""
+    keep = attachment.keep
+    return np.where(keep[:, None] // 3 == keep // 3, R[keep[:, None] % 3, keep % 3], 0.0)
+
+
+def coupled(
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[Nodal]
+) -> tuple[list[Nodal], list[Float[np.ndarray, " q"]]]:
+    """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
+
+    The mechanism of [KED, eq. (19)]: joints make shared points move together.
+
+    Parameters
+    ----------
+    parts, R, rhs : per link; R link to world, rhs (n, 3) in the link frame
+
+    Returns
+    -------
+    g : per link (n, 3), link frame
+    forces : per link (q,) λ on the link at its ports, link frame
+    """
+    y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
+    v = [_held(part, x) for part, x in zip(parts, y, strict=True)]
+    RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
+    z = np.zeros(parts[0].attachment.B.shape[1])
+    if len(z):
+        # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
+        H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
+        f = np.sum([b.T @ (part.S @ x) for part, b, x in zip(parts, RB, v, strict=True)], axis=0)
+        z = scipy.linalg.solve(H, f, assume_a="pos", check_finite=False)
+    forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
+    g = [x + (part.Y @ force).reshape(-1, 3) for part, x, force in zip(parts, y, forces, strict=True)]
+    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
+
+
+def _held(part: Substructure, y: Nodal) -> Float[np.ndarray, " c"]:
+    """Cᵀ y: values at ports and anchors."""
+    return np.concatenate([port_values(part.attachment, y), y.ravel()[part.anchors]])
+
+
+def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:
+    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns."""
+    B = part.attachment.B
+    out = np.zeros((len(part.S), B.shape[1]))
+    out[: len(B)] = port_rotation(part.attachment, R).T @ B
+    return out
+
+
+class CondensedSteps:
+    """Advances all links by generalised-α steps; the effective matrices are factored once, here.
+
+    Everything but one mass product and one pair of triangular solves per link follows by recurrence.
+    """
+
+    def __init__(
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
+    ) -> None:
+        self.links, self.scheme, self.damping = links, scheme, damping
+        c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+        # A = c_M M + c_K K0 = c_m a0 M + c_f (K0 + a1 C0)
+        self.c_M = c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha
+        self.c_K = c_f * (1 + scheme.a1 * damping.beta)
+        self.parts = [
+            factored(link, joint, self.c_M, self.c_K) for link, joint in zip(links, joints, strict=True)
+        ]
+        self.factorisations = len(self.parts)
+
+    def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+        """States of all links one step later.
+
+        Parameters
+        ----------
+        states : now
+        at : orientation and P − M R0'' of each link at the end of the step
+        """
+        rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
+        g, forces = coupled(self.parts, [nominal.R for nominal in at], rhs)
+        return [self._next(k, states[k], at[k], g[k], rhs[k], forces[k]) for k in range(len(self.links))]
+
+    def _rhs(self, s: LinkState, at: Nominal) -> Nodal:
+        """History + (P − M R0''), link frame at the end of the step."""
+        scheme = self.scheme
+        c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+        b = c_m * scheme.acceleration
+        total = b[0] * s.Mu
+        total += b[1] * s.Mv
+        total += (b[2] - scheme.alpha_m) * s.Ma
+        total += c_f * at.F if scheme.alpha_f else at.F
+        if scheme.alpha_f:
+            total += scheme.alpha_f * (s.F - s.f @ s.R.T)
+        out = total @ at.R
+        if s.C is not None:
+            out += c_f * np.tensordot(scheme.rate, s.C, 1)
+        return np.asarray(out)
+
+    def _next(
+        self, k: int, s: LinkState, at: Nominal, g: Nodal, rhs: Nodal, port_force: Float[np.ndarray, " q"]
+    ) -> LinkState:
+        link, scheme = self.links[k], self.scheme
+        u = g @ at.R.T
+        Mu = mass_times(link.mass, u)
+        v, a = accelerated(scheme, u, s.u, s.v, s.a)
+        Mv, Ma = accelerated(scheme, Mu, s.Mu, s.Mv, s.Ma)
+        # A g = r + Wᵀ λ is known, so K0 g needs no product: c_K K0 g = r + Wᵀ λ − c_M M g
+        Kg = Mu @ at.R  # M g
+        Cg = self.damping.alpha * Kg if s.C is not None else None
+        Kg *= -self.c_M
+        Kg += rhs
+        add_port_forces(Kg, self.parts[k].attachment, port_force)
+        Kg /= self.c_K
+        C, f = s.C, Kg
+        if s.C is not None and Cg is not None:
+            Cg += self.damping.beta * Kg
+            C = np.stack([Cg, *accelerated(scheme, Cg, *s.C)])
+            f = Kg + C[1]
+        return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, port_force)
+
+
+def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray, " q"]) -> None:
+    """Add Wᵀ λ to nodal forces in place."""
+    out[attachment.nodes] += attachment.weights.T @ port_vectors(attachment, force)
+
+
+def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p 3"]:
+    """Port forces as one vector per port, zero where a component is not held."""
+    full = np.zeros(3 * len(attachment.weights))
+    full[attachment.keep] = force
+    return full.reshape(-1, 3)
+
+
+def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
+    """A = c_M M + c_K K0 in the link frame, (3n, 3n): constant because of [KED, eqs. (12)(14)]."""
+    M = sp.csr_array(sum(sp.kron(m, _unit(k), format="csr") for k, m in enumerate(link.mass)))
+    return sp.csr_array(c_M * M + c_K * link.K0)
+
+
+def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
+    """Components that hold a link against rigid motion: of a beam a middle node's, of a solid those of three nodes."""
+    if link.kind == "beam":
+        return np.arange(3) + 3 * (link.n // 2)
+    first = int(np.linalg.norm(link.X - link.X.mean(axis=0), axis=1).argmax())
+    arms = link.X - link.X[first]
+    second = int(np.linalg.norm(arms, axis=1).argmax())
+    third = int(np.linalg.norm(np.cross(arms, arms[second]), axis=1).argmax())
+    return (3 * np.array([[first], [second], [third]]) + np.arange(3)).ravel()
+
+
+def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
+    """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
+    anchors = anchors_of(link)
+    kappa = ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean())
+    springs = sp.coo_array((np.full(len(anchors), kappa), (anchors, anchors)), shape=link.K0.shape)
+    factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
+    return substructure(
+        joint, link.n, lambda r: factor.solve(r.ravel()).reshape(-1, 3), factor.solve_many, anchors, kappa
+    )
+
+
+def _unit(k: int) -> sp.csr_array:
+    return sp.csr_array(([1.0], ([k], [k])), shape=(3, 3))

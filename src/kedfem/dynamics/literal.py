@@ -1,0 +1,141 @@
+"""The literal step: assemble T K0 Tᵀ, share nodes, factor, at every step. Oracle for tests, baseline for the benchmark.
+
+It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the condensed step.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg
+from jaxtyping import Float
+
+from kedfem.dynamics.condensed import Nodal, Rotation, port_columns
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import LinkState, Nominal, Rayleigh, accelerated
+from kedfem.links.record import Link
+
+
+def rotated_stiffness(K0: sp.csr_array, R: Rotation) -> sp.csr_array:
+    """K = T K0 Tᵀ, [KED, eq. (14)], block by block.
+
+    Parameters
+    ----------
+    K0 : (3n, 3n) in the link frame
+    R : link to world
+
+    Returns
+    -------
+    (3n, 3n) in the world frame
+    """
+    blocks = sp.bsr_array(K0, blocksize=(3, 3))
+    return sp.csr_array(sp.bsr_array((R @ blocks.data @ R.T, blocks.indices, blocks.indptr), shape=K0.shape))
+
+
+def shared_nodes(
+    links: Sequence[Link], joints: Sequence[Attachment]
+) -> tuple[sp.csr_array, list[np.ndarray]]:
+    """The constant map T from free unknowns to all nodal displacements that keeps every joint closed.
+
+    [KED, eq. (19)]: joints make shared nodes move together.
+    Per link, as many components near each joint as it holds are expressed by the others: Ws u_s = B z − Wm u_m.
+
+    Returns
+    -------
+    T (3N, free), and per link the dependent components
+    """
+    blocks, interface, dependent = [], [], []
+    for link, joint in zip(links, joints, strict=True):
+        W = port_columns(joint, link.n).T
+        s = scipy.linalg.qr(W, pivoting=True, mode="r")[1][: len(W)] if len(W) else np.zeros(0, int)
+        m = np.setdiff1d(np.arange(3 * link.n), s)
+        inverse = np.linalg.inv(W[:, s]) if len(W) else np.zeros((0, 0))
+        T = sp.lil_array((3 * link.n, len(m)))
+        T[m, np.arange(len(m))] = 1.0
+        Tz = np.zeros((3 * link.n, joint.B.shape[1]))
+        if len(s):
+            near = np.flatnonzero(W[:, m].any(axis=0))
+            T[np.ix_(s, near)] = -inverse @ W[:, m[near]]
+            Tz[s] = inverse @ joint.B
+        blocks.append(sp.csr_array(T))
+        interface.append(sp.csr_array(Tz))
+        dependent.append(s)
+    return sp.csr_array(sp.hstack([sp.block_diag(blocks), sp.vstack(interface)])), dependent
+
+
+class LiteralSteps:
+    """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
+
+    def __init__(
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
+    ) -> None:
+        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self.T, self.dependent = shared_nodes(links, joints)
+        self.Wt = [port_columns(joint, link.n) for link, joint in zip(links, joints, strict=True)]
+        self.M = [
+            sp.csr_array(
+                sum(sp.kron(m, sp.diags_array(np.eye(3)[k]), format="csr") for k, m in enumerate(link.mass))
+            )
+            for link in links
+        ]
+        self.factorisations = 0
+
+    def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+        """States of all links one step later; see `CondensedSteps.advance`."""
+        K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
+        A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
+        rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]
+        system = sp.csc_array(self.T.T @ sp.csr_array(sp.block_diag(A)) @ self.T)
+        lu = scipy.sparse.linalg.splu(
+            system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        self.factorisations += 1
+        u = self.T @ lu.solve(self.T.T @ np.concatenate([r.ravel() for r in rhs]))
+        parts = np.split(u, np.cumsum([3 * link.n for link in self.links])[:-1])
+        return [
+            self._next(k, states[k], at[k], parts[k].reshape(-1, 3), A[k], rhs[k])
+            for k in range(len(self.links))
+        ]
+
+    def _effective(self, M: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
+        s, d = self.scheme, self.damping
+        C = d.alpha * M + d.beta * K
+        return sp.csr_array((1 - s.alpha_m) * s.a0 * M + (1 - s.alpha_f) * (K + s.a1 * C))
+
+    def _rhs(self, k: int, s: LinkState, at: Nominal) -> Nodal:
+        scheme = self.scheme
+        b0, b1, b2 = scheme.acceleration
+        history = (1 - scheme.alpha_m) * (b0 * s.u + b1 * s.v + b2 * s.a) - scheme.alpha_m * s.a
+        out = (self.M[k] @ history.ravel()).reshape(-1, 3)
+        out = out + (1 - scheme.alpha_f) * at.F + scheme.alpha_f * (s.F - s.f @ s.R.T)
+        if s.C is not None:
+            out = out + (1 - scheme.alpha_f) * np.tensordot(scheme.rate, s.C, 1) @ at.R.T
+        return np.asarray(out)
+
+    def _next(self, k: int, s: LinkState, at: Nominal, u: Nodal, A: sp.csr_array, rhs: Nodal) -> LinkState:
+        v, a = accelerated(self.scheme, u, s.u, s.v, s.a)
+        g = u @ at.R
+        Kg = (self.links[k].K0 @ g.ravel()).reshape(-1, 3)
+        Mu, Mv, Ma = ((self.M[k] @ x.ravel()).reshape(-1, 3) for x in (u, v, a))
+        C, f = s.C, Kg
+        if s.C is not None:
+            Cg = self.damping.alpha * Mu @ at.R + self.damping.beta * Kg
+            C = np.stack([Cg, *accelerated(self.scheme, Cg, *s.C)])
+            f = Kg + C[1]
+        port_forces = self._port_forces(k, A, u, rhs, at.R)
+        return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, port_forces)
+
+    def _port_forces(
+        self, k: int, A: sp.csr_array, u: Nodal, rhs: Nodal, R: Rotation
+    ) -> Float[np.ndarray, " q"]:
+        """λ from what is left over at the dependent components: A u − r = Wᵀ λ; turned into the link frame."""
+        s = self.dependent[k]
+        if not len(s):
+            return np.zeros(0)
+        world = np.linalg.solve(self.Wt[k][s], (A @ u.ravel() - rhs.ravel())[s])
+        joint = self.joints[k]
+        full = np.zeros(3 * len(joint.weights))
+        full[joint.keep] = world
+        return np.asarray((full.reshape(-1, 3) @ R).ravel()[joint.keep])

@@ -1,0 +1,103 @@
+"""Loads P of the general equation: every one is a constant pattern of the link times a factor over time.
+
+[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import SceneError
+from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows
+from kedfem.links.seats import face_seat, surface_weights
+from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import BodyLoad, ForceLoad, Load, Scene, SurfaceLoad, load_factor
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Nodal forces of one load on one link.
+
+    forces : (n, 3) at factor one, reference components [N]
+    follows : turns with the link
+    factor : times (t,) → factors (t,)
+    """
+
+    forces: Float[np.ndarray, "n 3"]
+    follows: bool
+    factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
+
+
+def patterns(scene: Scene, name: str, link: Link) -> tuple[Pattern, ...]:
+    """All loads P on a link, [KED, eqs. (15)(16)], gravity first.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a point or face is not on the link.
+    """
+    out = []
+    if any(scene.gravity):
+        out.append(Pattern(link.m1 * _planar(link, scene.gravity), False, np.ones_like))
+    for key, load in scene.loads.items():
+        if load.link == name:
+            out.append(_pattern(f"loads.{key}", load, link))
+    return tuple(out)
+
+
+def slider_pattern(load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
+    """A concentrated force through given weights."""
+    return Pattern(
+        np.outer(weights, load.vector), load.frame == "link", lambda t: load_factor(load.factor, t)
+    )
+
+
+def _pattern(where: str, load: Load, link: Link) -> Pattern:
+    match load:
+        case ForceLoad():
+            weights = point_rows(link, f"{where}.at", np.asarray(load.at)).value
+        case BodyLoad():
+            weights = link.volume
+        case SurfaceLoad() if link.kind == "solid":
+            weights = surface_weights(link, face_seat(link, f"{where}.at", np.asarray(load.at)))
+        case _:
+            raise SceneError(f"{where}: a surface force needs a solid link, got the beam '{link.name}'")
+    forces = np.outer(weights, _planar(link, load.vector))
+    return Pattern(forces, load.frame == "link", lambda t: load_factor(load.factor, t))
+
+
+def _planar(link: Link, vector: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
+    """A force on a beam acts in its plane: the third row is a moment."""
+    return np.asarray(vector) * ([1, 1, 0] if link.kind == "beam" else 1)
+
+
+def nominal_acceleration(link: Link, motion: RigidMotion, body: int, k: int) -> Float[np.ndarray, "3"]:
+    """p'' of a link at time point k; of a planar beam (x'', y'', θ'')."""
+    p2 = motion.p2[k, body]
+    return np.array([p2[0], p2[1], motion.alpha[k, body, 2]]) if link.kind == "beam" else p2
+
+
+def applied(
+    link: Link,
+    loads: tuple[Pattern, ...],
+    factors: Float[np.ndarray, "l t"],
+    motion: RigidMotion,
+    body: int,
+    k: int,
+) -> Float[np.ndarray, "n 3"]:
+    """P − M R0'' at time point k, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
+
+    Parameters
+    ----------
+    factors : of each load at each time point
+    body : the link's number in the motion
+    """
+    F = link.mX @ -motion.R2[k, body].T
+    F -= link.m1 * nominal_acceleration(link, motion, body, k)
+    for load, factor in zip(loads, factors, strict=True):
+        if factor[k]:
+            F += factor[k] * (load.forces @ motion.R[k, body].T if load.follows else load.forces)
+    return np.asarray(F)

@@ -1,0 +1,145 @@
+"""The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.coupling import Attachment, attachments, seat_of, slider_axis
+from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
+from kedfem.dynamics.state import Rayleigh
+from kedfem.errors import MeshError, SceneError
+from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
+from kedfem.links.build import bare_links
+from kedfem.links.record import Link
+from kedfem.links.seats import holds, is_flat, joint_seat, port_weights
+from kedfem.motion.linkage import Linkage, unit
+from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """A rigid slider on a line of the ground: its mass and forces ride on the link that it is joined to.
+
+    name, mass [kg], axis : of the slider
+    guide, joint : its prismatic joint, and the joint with the elastic link
+    carrier : number of that link
+    weights : (n,) of the joint's point on the carrier
+    loads : its own loads, as patterns of the carrier
+    """
+
+    name: str
+    mass: float
+    axis: Float[np.ndarray, "3"]
+    guide: str
+    joint: str
+    carrier: int
+    weights: Float[np.ndarray, " n"]
+    loads: tuple[Pattern, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Everything that the time integration needs, constant.
+
+    bodies : number of each link in the linkage
+    joints, loads : per link
+    """
+
+    links: tuple[Link, ...]
+    bodies: tuple[int, ...]
+    joints: tuple[Attachment, ...]
+    loads: tuple[tuple[Pattern, ...], ...]
+    sliders: tuple[Slider, ...]
+    damping: Rayleigh
+
+    @property
+    def unknowns(self) -> int:
+        """Elastic unknowns of all links before joints share any."""
+        return sum(3 * link.n for link in self.links)
+
+    @property
+    def coordinates(self) -> int:
+        """Generalised coordinates once the joints share theirs."""
+        held = sum(len(joint.keep) for joint in self.joints)
+        return self.unknowns - held + int(self.joints[0].B.shape[1])
+
+
+def elastic_model(scene: Scene, linkage: Linkage) -> Model:
+    """Mesh and assemble all elastic links and tie them together.
+
+    Raises
+    ------
+    MeshError
+        If a link cannot be meshed, or a joint or body finds no seat on its link.
+    SceneError
+        If a load or body does not fit its link.
+    """
+    links = bare_links(scene)
+    for key, body in scene.bodies.items():
+        if body.link in links:
+            links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])
+    numbers = {name: k for k, name in enumerate(links)}
+    sliders = tuple(
+        _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None
+    )
+    for slider in sliders:
+        name = list(links)[slider.carrier]
+        links[name] = with_point_mass(links[name], slider.weights, slider.mass)
+    joined = attachments(scene, links)
+    loads = {name: patterns(scene, name, link) for name, link in links.items()}
+    for slider in sliders:
+        loads[list(links)[slider.carrier]] += slider.loads
+    return Model(
+        links=tuple(links.values()), bodies=tuple(linkage.bodies.index(name) for name in links),
+        joints=tuple(joined[name] for name in links), loads=tuple(loads[name] for name in links),
+        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)),
+    )  # fmt: skip
+
+
+def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
+    at = np.asarray(body.at)
+    hinges = (
+        unit(j.axis) for j in scene.joints.values() if j.axis and np.allclose(j.at, at, rtol=0, atol=1e-9)
+    )
+    axis = next(hinges, None)
+    seat = joint_seat(link, f"{where}.at", at, axis)
+    match body:
+        case Flywheel(mass=mass, inertia=inertia):
+            spin = unit((0, 0, 1)) if axis is None else axis
+            if link.kind == "solid" and not holds(seat, spin):
+                raise MeshError(
+                    f"{where}.at: a flywheel must sit on a bore, or on a flat face that contains its axis"
+                )
+            return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
+        case PointMass(mass=mass):
+            return with_body(link, seat, mass, at, np.zeros((3, 3)))
+        case RigidBody(mass=mass, inertia=inertia, centre=centre):
+            if link.kind == "solid" and is_flat(seat):
+                raise MeshError(
+                    f"{where}.at: a rigid body with full inertia must sit on a bore, got a flat face of '{link.name}'"
+                )
+            if link.kind == "beam" and np.linalg.norm(np.subtract(centre, at)[:2]) > 1e-9:
+                raise SceneError(
+                    f"{where}.centre: a body on a planar beam must have its centre at its point {body.at}, got {centre}"
+                )
+            return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+
+
+def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
+    axis = slider_axis(scene, name)
+    joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
+    guide = next(key for key, joint in joints.items() if joint.kind == "prismatic")
+    held = [(key, other) for key, joint in joints.items() for other in joint.links if other in links]
+    if not held or axis is None:
+        raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none")
+    key, carrier = held[0]
+    weights = port_weights(seat_of(scene, key, links[carrier]), np.array([joints[key].at]))[0]
+    extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
+    loads = tuple(
+        slider_pattern(x, weights)
+        for x in scene.loads.values()
+        if x.link == name and isinstance(x, ForceLoad)
+    )
+    mass = scene.links[name].mass + extra
+    return Slider(name, mass, axis, guide, key, numbers[carrier], weights, loads)

@@ -1,0 +1,152 @@
+"""Initial states that satisfy the equation: at rest, or quasi-static."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg
+from jaxtyping import Float
+
+from kedfem.dynamics.condensed import (
+    Nodal,
+    Rotation,
+    Substructure,
+    coupled,
+    factored,
+    substructure,
+)
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.state import LinkState, Nominal, Rayleigh
+from kedfem.errors import SolveError
+from kedfem.links.record import Link, mass_times
+
+TURNING_SWEEPS = 20
+CONVERGED = 1e-9  # change of a sweep, of the deflection
+
+
+@dataclass(frozen=True, slots=True)
+class Deflected:
+    """A link's given start: u, v (n, 3) δ and δ' in world components, g_rate (n, 3) rate of δ in the link frame."""
+
+    u: Nodal
+    v: Nodal
+    g_rate: Nodal
+
+
+def initial_states(
+    links: Sequence[Link], joints: Sequence[Attachment], at: Sequence[Nominal], damping: Rayleigh,
+    deflected: Sequence[Deflected],
+) -> list[LinkState]:  # fmt: skip
+    """States with given δ, δ' and the acceleration that equation (20) then asks for, joints closed, [KED, eq. (20)].
+
+    Parameters
+    ----------
+    at : orientation and P − M R0'' of each link now
+    deflected : joints closed
+    """
+    parts = [mass_substructure(link, joint) for link, joint in zip(links, joints, strict=True)]
+    g = [x.u @ now.R for x, now in zip(deflected, at, strict=True)]
+    Kg = [_stiffness_times(link, x) for link, x in zip(links, g, strict=True)]
+    Cg1 = [damping_times(link, damping, x.g_rate) for link, x in zip(links, deflected, strict=True)]
+    f = [a + b for a, b in zip(Kg, Cg1, strict=True)]
+    # the mass is the same in every frame, so the accelerations can be found in the link frames
+    a_link, forces = coupled(
+        parts, [now.R for now in at], [now.F @ now.R - x for now, x in zip(at, f, strict=True)]
+    )
+    states = []
+    for k, (link, start, now) in enumerate(zip(links, deflected, at, strict=True)):
+        a = a_link[k] @ now.R.T
+        C = (
+            np.stack([damping_times(link, damping, g[k]), Cg1[k], np.zeros_like(a)])
+            if damping.present
+            else None
+        )
+        Mu, Mv, Ma = (mass_times(link.mass, x) for x in (start.u, start.v, a))
+        states.append(
+            LinkState(start.u, start.v, a, Mu, Mv, Ma, g[k], now.R, Kg[k], f[k], C, now.F, forces[k])
+        )
+    return states
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×²."""
+
+    at: Sequence[Nominal]
+    spin: Sequence[Rotation]
+
+
+def quasi_static(
+    links: Sequence[Link], joints: Sequence[Attachment], instants: Sequence[Instant]
+) -> list[list[Nodal]]:
+    """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
+
+    The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
+    frequency).
+
+    Returns
+    -------
+    per instant, per link (n, 3), world components
+    """
+    parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(links, joints, strict=True)]
+    return [_turning(links, parts, instant) for instant in instants]
+
+
+def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Instant) -> list[Nodal]:
+    """Static deflection, then sweeps with the inertia that it has as it turns."""
+    R = [now.R for now in instant.at]
+    load = [now.F @ now.R for now in instant.at]
+    spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
+    g, _ = coupled(parts, R, load)
+    before = np.inf
+    for _ in range(TURNING_SWEEPS):
+        inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
+        new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)])
+        change, size = _change(new, g)
+        if change > 0.5 * before:
+            break
+        before, g = change, new
+        if change <= CONVERGED * size:
+            break
+    return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
+
+
+def _change(new: Sequence[Nodal], old: Sequence[Nodal]) -> tuple[float, float]:
+    """Largest change and largest value."""
+    change = max(float(np.abs(x - y).max()) for x, y in zip(new, old, strict=True))
+    return change, max(float(np.abs(x).max()) for x in new)
+
+
+def mass_substructure(link: Link, joint: Attachment) -> Substructure:
+    """The link condensed with A = M, by conjugate gradients: a mass matrix needs no factorisation."""
+
+    def solve(b: Nodal) -> Nodal:
+        return np.stack([_mass_solution(m, b[:, k]) for k, m in enumerate(link.mass)], axis=1)
+
+    def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
+        return np.stack([solve(b.reshape(-1, 3)).ravel() for b in B.T], axis=1) if B.shape[1] else B
+
+    return substructure(joint, link.n, solve, solve_many)
+
+
+def _mass_solution(m: sp.csr_array, b: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    if not b.any():
+        return np.zeros_like(b)
+    d = m.diagonal()
+    preconditioner = scipy.sparse.linalg.LinearOperator(m.shape, lambda x: np.asarray(x).ravel() / d)
+    x, failed = scipy.sparse.linalg.cg(m, b, rtol=1e-13, atol=0.0, maxiter=2000, M=preconditioner)
+    if failed:
+        raise SolveError(
+            "mass: conjugate gradients must converge, got no solution after 2000 sweeps (badly shaped elements?)"
+        )
+    return np.asarray(x)
+
+
+def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:
+    """C0 g = α M g + β K0 g, link frame."""
+    return np.asarray(damping.alpha * mass_times(link.mass, g) + damping.beta * _stiffness_times(link, g))
+
+
+def _stiffness_times(link: Link, g: Nodal) -> Nodal:
+    return np.asarray((link.K0 @ g.ravel()).reshape(-1, 3))

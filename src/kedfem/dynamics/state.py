@@ -1,0 +1,77 @@
+"""What a link carries from step to step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.scheme import Scheme
+
+Nodal = Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rayleigh:
+    """C0 = α M + β K0 on the rate of the co-rotated deformation: R C0 Rᵀ(δ' − ω × δ); alpha [1/s], beta [s]."""
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    @property
+    def present(self) -> bool:
+        """Whether there is any damping."""
+        return self.alpha != 0 or self.beta != 0
+
+
+@dataclass(frozen=True, slots=True)
+class Nominal:
+    """What rigid motion and loads do to one link at one time.
+
+    R : (3, 3) orientation, link to world
+    F : (n, 3) P − M R0'', world components [N]
+    """
+
+    R: Float[np.ndarray, "3 3"]
+    F: Nodal
+
+
+@dataclass(frozen=True, slots=True)
+class LinkState:
+    """Elastic state of one link at one time; all (n, 3).
+
+    u, v, a : δ, δ', δ'', world components [m, m/s, m/s²; third row of a beam: ψ]
+    Mu, Mv, Ma : the same times the mass
+    g : δ in the link frame; R : (3, 3) the link's orientation
+    Kg : K0 g, link frame [N]
+    f : internal force K0 g + C0 g', link frame [N]
+    C : (3, n, 3) C0 times (g, g', g''), link frame, None without damping
+    F : P − M R0'', world components [N]
+    port_forces : (q,) λ on the link at its ports, link frame [N]
+    """
+
+    u: Nodal
+    v: Nodal
+    a: Nodal
+    Mu: Nodal
+    Mv: Nodal
+    Ma: Nodal
+    g: Nodal
+    R: Float[np.ndarray, "3 3"]
+    Kg: Nodal
+    f: Nodal
+    C: Float[np.ndarray, "3 n 3"] | None
+    F: Nodal
+    port_forces: Float[np.ndarray, " q"]
+
+
+def accelerated(scheme: Scheme, u1: Nodal, u: Nodal, v: Nodal, a: Nodal) -> tuple[Nodal, Nodal]:
+    """Rate and acceleration at the end of the step from the displacement there, Newmark's formulas."""
+    a1 = u1 - u
+    a1 *= scheme.a0
+    b = scheme.acceleration
+    a1 -= b[1] * v
+    a1 -= b[2] * a
+    v1 = (scheme.h * scheme.gamma) * a1
+    v1 += v
+    v1 += (scheme.h * (1 - scheme.gamma)) * a
+    return v1, a1
