@@ -1,0 +1,256 @@
+"""The whole job: a scene in; time series, animation, plots and a picture out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.transient import Snapshot, Steps, drive_range, steps_of, transient
+from kedfem.errors import OutputError
+from kedfem.links.recovery import StressRecovery, stress_recovery
+from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.path import Path, path
+from kedfem.output.frames import link_fields
+from kedfem.output.picture import write_picture
+from kedfem.output.plots import write_plots
+from kedfem.output.vtu import AnimationWriter, remove_animation
+from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results.recording import Recorded, recording, rows
+from kedfem.scene import Scene, time_grid, turn_steps
+
+STEM = "animation"
+SMALL_DEFLECTION = (
+    0.01  # of a link's length: above, the linear equation is off by several percent (docs/theory.md)
+)
+ROWS = 256  # steps kept before they go to the results file
+
+T = TypeVar("T")
+Watch = Callable[[str, int, int], None]
+"""Told of progress: (stage, done, total)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A scene with everything that does not need a time step."""
+
+    scene: Scene
+    linkage: Linkage
+    path: Path
+    model: Model
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """The highest von Mises stress of all animation frames [Pa]: where and when; the frame's file.
+
+    deflection : the largest deflection of a link in any frame, of the link's size [-]
+    """
+
+    stress: float
+    link: str
+    at: tuple[float, float, float]
+    time: float
+    angle: float
+    frame: FilePath
+    deflection: float
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user."""
+
+    folder: FilePath
+    results: Results
+    peak: Peak | None
+    seconds: dict[str, float]
+    warnings: tuple[str, ...] = ()
+
+
+def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
+    """Run a scene and write its results.
+
+    Parameters
+    ----------
+    scene : validated scene
+    watch : told of progress
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user; rows and frames up to there are kept and marked as interrupted.
+    """
+    clock = Clock(watch)
+    folder = ready_folder(scene.results_folder)
+    ready = prepared(scene, clock.stage)
+    solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
+    recorded = clock.timed("probes", lambda: recording(scene, ready.model))
+    recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
+    peak = clock.timed("steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch))
+    results = read_results(folder / "results.h5")
+    warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
+    warnings = (*deflection_warning(peak), *warnings)
+    return Run(folder, results, peak, clock.seconds, warnings)
+
+
+def prepared(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
+    """Rigid path and elastic model of a scene; nothing is solved.
+
+    Raises
+    ------
+    MotionError, MeshError, SceneError
+    """
+    stage("motion")
+    joined = linkage(scene)
+    along = path(joined, *drive_range(scene))
+    stage("mesh and matrices")
+    return Prepared(scene, joined, along, elastic_model(scene, joined))
+
+
+@dataclass
+class Clock:
+    """Seconds of each stage, told to the watcher as it begins."""
+
+    watch: Watch
+    seconds: dict[str, float] = field(default_factory=dict)
+    _name: str = ""
+    _since: float = 0.0
+
+    def stage(self, name: str) -> None:
+        """End the running stage and begin the next."""
+        now = perf_counter()
+        if self._name:
+            self.seconds[self._name] = now - self._since
+        self._name, self._since = name, now
+        if name:
+            self.watch(name, 0, 0)
+
+    def timed(self, name: str, work: Callable[[], T]) -> T:
+        """Do the work of one stage."""
+        self.stage(name)
+        out = work()
+        self.stage("")
+        return out
+
+
+def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
+    """Numbers of the time steps that become animation frames."""
+    animation, grid = scene.output.animation, time_grid(scene)
+    if animation is None:
+        return np.zeros(0, int)
+    turn = turn_steps(scene) or float(grid.steps)
+    first = 0.0 if animation.last_turns is None else max(0.0, grid.steps - animation.last_turns * turn)
+    count = int((grid.steps - first) * animation.frames_per_turn / turn + 1e-9)
+    steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_turn
+    return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
+
+
+def deflection_warning(peak: Peak | None) -> tuple[str, ...]:
+    """A warning where links bend so much that the linear equation with nominal frames is far from the truth."""
+    if peak is None or peak.deflection < SMALL_DEFLECTION:
+        return ()
+    return (
+        f"links deflect by up to {100 * peak.deflection:.2g} % of their length; equation (20) takes that as small: "
+        f"expect the results to be trustworthy below {100 * SMALL_DEFLECTION:.0f} % only",
+    )
+
+
+def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
+    return [stress_recovery(link) for link in model.links] if scene.output.animation else []
+
+
+def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
+             folder: FilePath, watch: Watch) -> Peak | None:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation."""
+    scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
+    wanted = set(frame_steps(scene).tolist())
+    frames = AnimationWriter(folder, STEM)
+    peak: Peak | None = None
+    channels = [each.channel for each in recorded]
+    notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    with ResultsWriter(
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
+    ) as writer:
+        table = _Table(writer, channels)
+        if not wanted:
+            remove_animation(folder, STEM)
+        try:
+            for snapshot in transient(scene, ready.linkage, ready.path, model, solver):
+                table.add(snapshot, rows(recorded, snapshot))
+                if snapshot.step in wanted:
+                    peak = _framed(ready, recoveries, frames, snapshot, peak)
+                watch("steps", snapshot.step, steps)
+        finally:
+            table.flush()
+    return peak
+
+
+@dataclass
+class _Table:
+    """Rows that wait for the results file."""
+
+    writer: ResultsWriter
+    channels: list[Channel]
+    when: list[tuple[float, float]] = field(default_factory=list)
+    values: list[dict[str, Float[np.ndarray, " c"]]] = field(default_factory=list)
+
+    def add(self, snapshot: Snapshot, row: dict[str, Float[np.ndarray, " c"]]) -> None:
+        """One more row."""
+        self.when.append((snapshot.t, snapshot.phi))
+        self.values.append(row)
+        if len(self.when) >= ROWS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Bring the rows to the disk."""
+        if self.when:
+            time, angle = np.array(self.when).T
+            block = {c.name: np.array([row[c.name] for row in self.values]) for c in self.channels}
+            self.when, self.values = [], []
+            self.writer.append(time, angle, block)
+
+
+def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: AnimationWriter, snapshot: Snapshot,
+            peak: Peak | None) -> Peak | None:  # fmt: skip
+    """Write one frame; the higher of its peak stress and the highest so far."""
+    animation = ready.scene.output.animation
+    fields = link_fields(ready.model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
+    file = frames.add(snapshot.t, fields)
+    highest = max(fields, key=lambda f: float(f.von_mises.max()))
+    node = int(highest.von_mises.argmax())
+    stress = float(highest.von_mises[node])
+    deflection = max(
+        _deflection(f.displacement, link.X) for f, link in zip(fields, ready.model.links, strict=True)
+    )
+    if peak is not None and stress <= peak.stress:
+        return replace(peak, deflection=max(peak.deflection, deflection))
+    x, y, z = (float(v) for v in highest.points[node])
+    before = peak.deflection if peak else 0.0
+    return Peak(stress, highest.name, (x, y, z), snapshot.t, snapshot.phi, file, max(before, deflection))
+
+
+def _deflection(u: Float[np.ndarray, "n 3"], X: Float[np.ndarray, "n 3"]) -> float:
+    """Largest displacement of a link, of its size."""
+    return float(np.linalg.norm(u, axis=1).max() / np.ptp(X, axis=0).max())
+
+
+def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:
+    """Table, plots and picture; a picture that cannot be drawn is a warning."""
+    if scene.output.csv:
+        write_csv(results, folder / "results.csv")
+    if scene.output.plots:
+        write_plots(results, folder / "plots")
+    picture = folder / "worst.png"
+    picture.unlink(missing_ok=True)
+    if not (scene.output.picture and peak):
+        return ()
+    title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s, drive {np.degrees(peak.angle):.1f}°"
+    try:
+        write_picture(peak.frame, picture, title)
+    except OutputError as err:
+        return (str(err),)
+    return ()

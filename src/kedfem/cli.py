@@ -1,0 +1,213 @@
+"""The command line: the only place that prints. Heavy imports happen inside the commands."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+
+from kedfem.errors import KedfemError, SceneError
+
+if TYPE_CHECKING:
+    from kedfem.analysis import Run
+
+USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
+KINDS = ("four-bar", "slider-crank", "single-arm")
+
+app = typer.Typer(
+    name="kedfem",
+    help="How much the links of a moving mechanism bend, vibrate and are stressed.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+out, err = Console(highlight=False), Console(stderr=True, highlight=False)
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+) -> None:
+    if version:
+        from kedfem import __version__
+
+        out.print(f"kedfem {__version__}")
+        raise typer.Exit
+    del context
+
+
+@app.command()
+def run(scene: ScenePath) -> None:
+    """Analyse a scene: time series, animation, plots, a picture."""
+    from kedfem.analysis import analyse
+    from kedfem.report import run_tables
+    from kedfem.scene import read_scene
+
+    loaded = read_scene(scene)
+    file = loaded.results_folder / "results.h5"
+    before = _version(file)
+    try:
+        with _progress() as watch:
+            done = analyse(loaded, watch)
+    except KeyboardInterrupt:
+        _interrupted(file, _version(file) != before)
+    for table in run_tables(loaded, done):
+        out.print(table)
+    for warning in done.warnings:
+        err.print(f"warning: {warning}", style="yellow", markup=False)
+    _say_where(done)
+
+
+@app.command()
+def check(scene: ScenePath) -> None:
+    """Show what would be modelled and its cost; solve nothing."""
+    from kedfem.analysis import prepared
+    from kedfem.report import check_tables
+    from kedfem.scene import read_scene
+
+    loaded = read_scene(scene)
+    with _progress() as watch:
+        ready = prepared(loaded, lambda stage: watch(stage, 0, 0))
+    for table in check_tables(ready):
+        out.print(table)
+
+
+@app.command()
+def new(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + ".")],
+    path: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Default: KIND.toml here.")] = None,
+) -> None:
+    """Write a commented scene to start from."""
+    from importlib.resources import files
+
+    from kedfem.errors import OutputError
+
+    if kind not in KINDS:
+        raise SceneError(f"KIND: must be one of {', '.join(KINDS)}, got '{kind}'")
+    target = path or Path(f"{kind}.toml")
+    text = (files("kedfem") / "templates" / f"{kind.replace('-', '_')}.toml").read_text(encoding="utf-8")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise OutputError(f"{target}: must be a new file, got one that exists already") from None
+    except OSError as error:
+        raise OutputError(f"{target}: must be a file that can be written, got {error.strerror}") from None
+    out.print(f"{target} written; try: kedfem check {target}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def bench(
+    what: Annotated[str, typer.Argument(metavar="WHAT", help="One of: steps, growth, solvers, start.")],
+    folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),
+    quick: Annotated[bool, typer.Option("--quick", help="Small sizes only, to try it.")] = False,
+) -> None:
+    """Measure kedfem on this machine: ratios within one run."""
+    from kedfem.bench import BENCHMARKS
+
+    if what not in BENCHMARKS:
+        raise SceneError(f"WHAT: must be one of {', '.join(BENCHMARKS)}, got '{what}'")
+    with _progress() as watch:
+        text = BENCHMARKS[what](folder, quick, watch)
+    out.print(text, markup=False, soft_wrap=True)
+
+
+class _progress:  # noqa: N801
+    """Progress bars as a context: stages spin, counted work shows a bar."""
+
+    def __enter__(self) -> Callable[[str, int, int], None]:
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            SpinnerColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+        self._bars = Progress(
+            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True
+        )
+        self._bars.start()
+        self._stage, self._task = "", None
+        return self._watch
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+
+    def _watch(self, stage: str, done: int, total: int) -> None:
+        if stage != self._stage:
+            if self._task is not None:
+                self._bars.remove_task(self._task)
+            self._stage, self._task = stage, self._bars.add_task(stage, total=total or None)
+        if total and self._task is not None:
+            self._bars.update(self._task, completed=done, total=total)
+
+    _stage: str
+    _task: Any
+
+
+def _version(file: Path) -> tuple[int, int] | None:
+    """Something that changes with a file; None where there is none."""
+    return (file.stat().st_ino, file.stat().st_mtime_ns) if file.exists() else None
+
+
+def _interrupted(file: Path, begun: bool) -> NoReturn:
+    kept = (
+        f"what was computed is readable in {file} (status: interrupted)" if begun else "nothing was written"
+    )
+    err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
+    raise typer.Exit(INTERRUPTED)
+
+
+def _say_where(done: "Run") -> None:
+    for name, what in (
+        ("results.h5", "time series"),
+        ("results.csv", "the same as a table"),
+        ("animation.pvd", "animation, open in ParaView"),
+        ("plots", "plots"),
+        ("worst.png", "picture of the highest stress"),
+    ):
+        if (done.folder / name).exists():
+            out.print(f"{done.folder / name}  {what}", markup=False, soft_wrap=True)
+
+
+def main() -> None:
+    """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
+    try:
+        app()
+    except KedfemError as error:
+        err.print(
+            f"error: {error}" if "\n" not in str(error) else f"errors:\n{error}",
+            style="red",
+            markup=False,
+            soft_wrap=True,
+        )
+        sys.exit(USER_ERROR)
+    except KeyboardInterrupt:
+        err.print("interrupted", style="yellow")
+        sys.exit(INTERRUPTED)
+    except MemoryError:
+        err.print(
+            "error: analysis: must fit in memory, got more unknowns than it holds; take larger elements",
+            style="red",
+        )
+        sys.exit(USER_ERROR)
+    except Exception as error:
+        if os.environ.get("KEDFEM_DEBUG"):
+            raise
+        what = f"{type(error).__name__}: {error}"
+        err.print(
+            f"internal error: {what}\nThis is a defect of kedfem; KEDFEM_DEBUG=1 shows where.",
+            style="red",
+            markup=False,
+        )
+        sys.exit(DEFECT)

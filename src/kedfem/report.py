@@ -1,0 +1,118 @@
+"""Summary tables of a check and of a run, for the terminal."""
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from kedfem.analysis import Prepared, Run, frame_steps
+from kedfem.dynamics.cost import Cost, estimated_cost
+from kedfem.dynamics.model import Model
+from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.motion.path import Path
+from kedfem.scene import Scene, time_grid
+
+NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
+ELEMENTS = {"hexahedron27": "hex27", "hexahedron": "hex8", "line3": "beam3", "line": "beam2"}
+UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def with_prefix(value: float, unit: str) -> str:
+    """A number with an SI prefix: 1.23e7, Pa → 12.3 MPa.
+
+    >>> with_prefix(1.234e7, "Pa")
+    '12.34 MPa'
+    """
+    size = abs(value)
+    factor, prefix = next(((f, p) for f, p in UNITS if size >= f), (1.0, ""))
+    return f"{value / factor:.4g} {prefix}{unit}"
+
+
+def run_tables(scene: Scene, done: Run) -> list[Table]:
+    """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
+    table = Table(title=Text(scene.title or "Largest values"))
+    for column in ("channel", "component", "largest", "drive angle"):
+        left = column in ("channel", "component")
+        table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
+    channels = done.results.channels.values()
+    highest: dict[str, float] = {}
+    for channel, values in channels:
+        highest[channel.unit] = max(highest.get(channel.unit, 0.0), float(np.abs(values).max()))
+    for channel, values in channels:
+        k, c = np.unravel_index(np.abs(values).argmax(), values.shape)
+        value = float(values[k, c])
+        if abs(value) <= NOTHING * highest[channel.unit]:
+            table.add_row(channel.name, "", "≈ 0", "")
+            continue
+        angle = np.degrees(done.results.angle[k])
+        table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), f"{angle:.1f}°")
+    if done.peak:
+        p = done.peak
+        angle = np.degrees(p.angle)
+        table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), f"{angle:.1f}°")
+        table.caption = "links: the highest stress of all animation frames"
+    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=True)
+    for stage in done.seconds:
+        spent.add_column(stage, justify="right")
+    spent.add_row(*(f"{s:.2f}" for s in done.seconds.values()))
+    return [table, spent]
+
+
+def check_tables(ready: Prepared) -> list[Table]:
+    """What would be modelled: links, motion over the range, cost."""
+    return [_links(ready.model), _motion(ready), _cost(ready, estimated_cost(ready.scene, ready.model))]
+
+
+def _links(model: Model) -> Table:
+    table = Table(title="Elastic links")
+    for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
+        table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
+    for link in model.links:
+        quality = mesh_quality(HexMesh(link.X, link.cells)).least if link.kind == "solid" else None
+        table.add_row(link.name, ELEMENTS[link.cell_type], str(len(link.cells)), str(3 * link.n),
+                      f"{float(link.m1[:, 0].sum()):.4g} kg", "-" if quality is None else f"{quality:.2f}")  # fmt: skip
+    for slider in model.sliders:
+        table.add_row(
+            slider.name,
+            "rigid slider",
+            "-",
+            "1",
+            f"{slider.mass:.4g} kg, on {model.links[slider.carrier].name}",
+            "-",
+        )
+    table.caption = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined; quality: worst scaled Jacobian"
+    return table
+
+
+def _motion(ready: Prepared) -> Table:
+    along: Path = ready.path
+    table = Table(title="Rigid motion", show_header=False)
+    weakness, angle = along.weakest
+    low, high = np.degrees(along.phi[[0, -1]])
+    over = "repeats every turn" if along.periodic else f"{low:.4g}° to {high:.4g}°"
+    table.add_row("drive", f"joint {ready.scene.drive.joint}, {over}")
+    table.add_row(
+        "closest to a dead point",
+        f"at {np.degrees(angle):.4g}° (smallest singular value {weakness:.2g} of the largest)",
+    )
+    if ready.linkage.redundant:
+        table.add_row("redundant joint equations", "at joints " + ", ".join(ready.linkage.redundant))
+    for k, name in enumerate(ready.linkage.bodies[1:], start=1):
+        turned = np.degrees(
+            np.arccos(np.clip((np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2, -1, 1))
+        ).max()
+        table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the drawn position")
+    return table
+
+
+def _cost(ready: Prepared, cost: Cost) -> Table:
+    grid = time_grid(ready.scene)
+    table = Table(title="Cost (estimated)", show_header=False)
+    table.add_row("steps", f"{grid.steps} of {grid.step:.4g} s")
+    table.add_row("solver", ready.scene.analysis.solver)
+    table.add_row("time", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s")
+    table.add_row("memory", with_prefix(cost.memory, "B"))
+    table.add_row(
+        "animation frames",
+        f"{len(frame_steps(ready.scene))}, about {with_prefix(cost.frame_bytes, 'B')} each",
+    )
+    return table

@@ -1,0 +1,199 @@
+"""From elastic states to rows of channels: probes, joint forces, drive torque."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.dynamics.condensed import port_vectors
+from kedfem.dynamics.loads import nominal_acceleration
+from kedfem.dynamics.model import Model, Slider
+from kedfem.dynamics.transient import Snapshot
+from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows, von_mises
+from kedfem.motion.linkage import unit
+from kedfem.results.records import Channel
+from kedfem.scene import Probe, Scene
+
+Row = Float[np.ndarray, " c"]
+XYZ = ("x", "y", "z")
+STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
+UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A channel and how a snapshot fills a row of it."""
+
+    channel: Channel
+    row: Callable[[Snapshot], Row]
+
+
+def recording(scene: Scene, model: Model) -> list[Recorded]:
+    """All channels that a scene asks for.
+
+    Raises
+    ------
+    SceneError
+        If a probe is outside its link.
+    """
+    probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
+    joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
+    return [*probes, *joints, _torque(scene, model), _rigid_torque(model), _energy(model)]
+
+
+def rows(recorded: Sequence[Recorded], snapshot: Snapshot) -> dict[str, Row]:
+    """One row of every channel."""
+    return {each.channel.name: each.row(snapshot) for each in recorded}
+
+
+def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
+    k = _number(model, probe.link)
+    link = model.links[k]
+    at = point_rows(link, f"output.probes.{name}.at", np.asarray(probe.at))
+    key = f"probes/{name}/{probe.quantity}"
+    place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
+    if probe.quantity == "stress":
+        dofs, dense = _compact(at.stress)
+
+        def stress(snapshot: Snapshot) -> Row:
+            s = dense @ snapshot.states[k].g.ravel()[dofs]
+            return np.append(s, von_mises(s[None, :]))
+
+        return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
+    nodes = np.flatnonzero(at.value)
+    weights = at.value[nodes]
+    field = {"displacement": "u", "velocity": "v", "acceleration": "a"}[probe.quantity]
+    columns = XYZ if link.kind == "solid" else ("x", "y")
+
+    def vector(snapshot: Snapshot) -> Row:
+        state = snapshot.states[k]
+        x = weights @ getattr(state, field)[nodes]
+        turned = x @ state.R @ link.axes if probe.frame == "link" else x
+        return np.asarray(turned[: len(columns)])
+
+    description = f"elastic {probe.quantity} {place}"
+    return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
+
+
+def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
+    """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
+    slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
+    if slider is not None:
+        return [_slider_force(scene, model, slider, name)]
+    held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
+    if not held:
+        return []
+    k = _number(model, held[0])
+    other = next(link for link in scene.joints[name].links if link != held[0])
+    label = f"of joint {name} on link {held[0]} from {other}"
+    force = Channel(f"joints/{name}/force", XYZ, "N", "world", f"force {label}")
+    moment = Channel(
+        f"joints/{name}/moment", XYZ, "N m", "world", f"moment {label}, about the joint's nominal point"
+    )
+    at = np.asarray(scene.joints[name].at)
+    return [
+        Recorded(force, lambda snapshot: _wrench(model, snapshot, k, name, at)[0]),
+        Recorded(moment, lambda snapshot: _wrench(model, snapshot, k, name, at)[1]),
+    ]
+
+
+def _wrench(
+    model: Model, snapshot: Snapshot, k: int, joint: str, at: Float[np.ndarray, "3"]
+) -> tuple[Row, Row]:
+    """Force and moment about `at` of one joint on link k, world components, from its port forces."""
+    attachment, state = model.joints[k], snapshot.states[k]
+    here = [name == joint for name in attachment.joints]
+    f = port_vectors(attachment, state.port_forces)[here]
+    if model.links[k].kind == "beam":  # third component is a moment
+        return state.R @ (f.sum(axis=0) * forces_only(model.links[k])), f.sum(axis=0) * [0, 0, 1]
+    arms = attachment.points[here] - at
+    return state.R @ f.sum(axis=0), state.R @ np.cross(arms, f).sum(axis=0)
+
+
+def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> Recorded:
+    """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it."""
+    others = [j for j, joint in scene.joints.items() if slider.name in joint.links and j != slider.guide]
+    if name == slider.guide:
+        description = f"force of joint {name} on slider {slider.name} from ground"
+
+        def guide(snapshot: Snapshot) -> Row:
+            pairs = [(k, j) for k in range(len(model.links)) for j in others]
+            zero = np.zeros(3)
+            return np.asarray(np.sum([_wrench(model, snapshot, k, j, zero)[0] for k, j in pairs], axis=0))
+
+        return Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)
+    carrier = model.links[slider.carrier]
+    description = f"force of joint {name} on link {carrier.name} from slider {slider.name}"
+    gravity = np.asarray(scene.gravity)
+
+    def pin(snapshot: Snapshot) -> Row:
+        motion, k, state = snapshot.motion, snapshot.k, snapshot.states[slider.carrier]
+        body = model.bodies[slider.carrier]
+        nominal = nominal_acceleration(carrier, motion, body, k) + motion.R2[k, body] @ (
+            slider.weights @ carrier.X
+        )
+        a = nominal + slider.weights @ state.a
+        if carrier.kind == "beam":
+            a = a * [1, 1, 0]
+        loads = sum(
+            (x.factor(np.array([snapshot.t]))[0] * x.forces.sum(axis=0) for x in slider.loads), np.zeros(3)
+        )
+        force = _wrench(model, snapshot, slider.carrier, name, np.zeros(3))[0]
+        return np.asarray(force - slider.mass * (a - gravity) + loads)
+
+    return Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)
+
+
+def _torque(scene: Scene, model: Model) -> Recorded:
+    """Torque of the drive on its link, about the driven joint's axis."""
+    joint = scene.joints[scene.drive.joint]
+    k = next(_number(model, link) for link in joint.links if link != "ground")
+    axis, at = unit(joint.axis or (0, 0, 1)), np.asarray(joint.at)
+    channel = Channel(
+        "drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {model.links[k].name}"
+    )
+    return Recorded(channel, lambda s: np.array([_wrench(model, s, k, scene.drive.joint, at)[1] @ axis]))
+
+
+def _rigid_torque(model: Model) -> Recorded:
+    """The drive's torque if all links were rigid: virtual work of P − M R0'' along the drive, −Σ F · ∂R0/∂φ."""
+    channel = Channel(
+        "drive/rigid_torque", ("torque",), "N m", "world", "torque of the drive were all links rigid"
+    )
+
+    def torque(snapshot: Snapshot) -> Row:
+        motion, k, work = snapshot.motion, snapshot.k, 0.0
+        for link, body, state in zip(model.links, model.bodies, snapshot.states, strict=True):
+            v, w = motion.v_phi[k, body], motion.omega_phi[k, body]
+            if link.kind == "beam":
+                v = np.array([v[0], v[1], w[2]])
+            N = motion.R[k, body] @ (link.X.T @ state.F) * forces_only(link)  # Σ (R X) ⊗ F
+            moment = np.array([N[1, 2] - N[2, 1], N[2, 0] - N[0, 2], N[0, 1] - N[1, 0]])
+            work += float(state.F.sum(axis=0) @ v + w @ moment)
+        return np.array([-work])
+
+    return Recorded(channel, torque)
+
+
+def forces_only(link: Link) -> Row:
+    """Rows of a state that are forces: of a beam the third is a moment."""
+    return np.array([1.0, 1.0, 0.0 if link.kind == "beam" else 1.0])
+
+
+def _energy(model: Model) -> Recorded:
+    """Strain energy ½ gᵀ K0 g of all links, [KED, eq. (13)]."""
+    channel = Channel("energy/strain", ("strain",), "J", "", "strain energy of all links")
+    return Recorded(channel, lambda s: np.array([sum(0.5 * float(np.vdot(x.g, x.Kg)) for x in s.states)]))
+
+
+def _number(model: Model, name: str) -> int:
+    return next(k for k, link in enumerate(model.links) if link.name == name)
+
+
+def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:
+    """The columns that a matrix uses, and the matrix on them, dense."""
+    columns = np.unique(matrix.indices)
+    return columns, matrix[:, columns].toarray()
