@@ -1,0 +1,17 @@
+"""Benchmarks: every figure in docs/performance.md comes from here, by `kedfem bench WHAT`."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from kedfem.bench.growth import bench_growth
+from kedfem.bench.machine import Watch
+from kedfem.bench.solvers import bench_solvers
+from kedfem.bench.start import bench_start
+from kedfem.bench.steps import bench_steps
+
+BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
+    "steps": bench_steps,
+    "growth": bench_growth,
+    "solvers": bench_solvers,
+    "start": bench_start,
+}

@@ -1,0 +1,76 @@
+"""One link growing to half a million unknowns: assembling, factoring, solving, memory. Each size in its own process."""
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kedfem.bench.machine import Watch, markdown, seconds, write_loglog, write_page
+
+SIZES = ((20, 4, 4), (32, 7, 7), (48, 10, 10), (58, 14, 14), (72, 17, 17))
+
+
+def bench_growth(folder: Path, quick: bool, watch: Watch) -> str:
+    """Time and memory against unknowns; table and plot go to the folder."""
+    sizes = SIZES[:2] if quick else SIZES
+    found = []
+    for number, size in enumerate(sizes):
+        watch("growth", number, len(sizes))
+        command = [sys.executable, "-m", "kedfem.bench.growth", *map(str, size)]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        found.append(json.loads(done.stdout))
+    rows = [
+        (f"{f['unknowns']:,}", f"{f['assemble']:.2f}", f"{f['factor']:.2f}", f"{1e3 * f['solve']:.1f}",
+         f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}")
+        for f in found
+    ]  # fmt: skip
+    header = ("unknowns", "assemble [s]", "factor [s]", "solve [ms]", "assemble / factor", "peak memory [GB]")
+    slopes = {key: _slope(found, key) for key in ("factor", "solve", "memory")}
+    growth = ", ".join(f"{key} ∝ N^{slope:.2f}" for key, slope in slopes.items())
+    note = f"Growth between the last two sizes: {growth}.\n\n![growth](growth.png)"
+    text = markdown("One solid link, 27-node hexahedra, growing", "kedfem bench growth", header, rows, note)
+    write_page(folder, "growth", text)
+    N = [f["unknowns"] for f in found]
+    curves = {name: (N, [f[name] for f in found]) for name in ("assemble", "factor", "solve")}
+    write_loglog(folder, "growth", curves, ("unknowns in one link", "seconds"))
+    return text
+
+
+def _slope(found: list[dict[str, float]], key: str) -> float:
+    a, b = found[-2:]
+    return float(np.log(b[key] / a[key]) / np.log(b["unknowns"] / a["unknowns"]))
+
+
+def one_size(size: tuple[int, int, int]) -> dict[str, float]:
+    """Measure one block of so many elements."""
+    from kedfem.dynamics.cholesky import Cholesky
+    from kedfem.dynamics.condensed import effective_matrix
+    from kedfem.dynamics.scheme import generalised_alpha
+    from kedfem.links.build import link_axes
+    from kedfem.links.solid import solid_link
+    from kedfem.mesh import link_mesh
+    from kedfem.scene import Bar, LinkScene, Material, Meshing
+
+    shape = Bar(between=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), width=0.2, thickness=0.2)
+    scene = LinkScene(material="steel", shape=shape, mesh=Meshing(elements=size))
+    material = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
+    mesh = link_mesh("block", scene, Path())
+    kept: dict[str, Any] = {}
+    assemble = seconds(lambda: kept.update(link=solid_link("block", mesh, material, link_axes(scene))), 1)
+    link = kept["link"]
+    a0 = generalised_alpha(1e-4, 1.0).a0
+    A = effective_matrix(link, a0, 1.0)
+    factor = seconds(lambda: kept.update(factor=Cholesky(A, "block")), 1)
+    b = np.random.default_rng(1).standard_normal(3 * link.n)
+    solve = seconds(lambda: kept["factor"].solve(b), 5)
+    memory = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {"unknowns": 3 * link.n, "assemble": assemble, "factor": factor, "solve": solve, "memory": memory}
+
+
+if __name__ == "__main__":
+    nx, ny, nz = (int(a) for a in sys.argv[1:4])
+    json.dump(one_size((nx, ny, nz)), sys.stdout)
