@@ -1,0 +1,55 @@
+"""Structured hexahedra on mapped unit cubes, made into links."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kedfem.links.record import Link
+from kedfem.links.solid import solid_link
+from kedfem.mesh import HexMesh
+from kedfem.mesh.hexahedra import HEX8, HEX27
+from kedfem.scene import Material
+
+Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def mapped_mesh(
+    counts: tuple[int, int, int], mapping: Mapping, nodes: int = 27, closed: bool = False
+) -> HexMesh:
+    """counts elements along the unit cube's coordinates (r, s, t), each node at mapping(r, s, t).
+
+    closed : the face r = 1 is the face r = 0 again, as in a ring.
+    """
+    order = 2 if nodes == 27 else 1
+    size = order * np.array(counts) + 1
+    axes = [np.arange(n) for n in size]
+    r, s, t = (i.ravel() / (n - 1) for i, n in zip(np.meshgrid(*axes, indexing="ij"), size, strict=True))
+    corners = np.stack(np.meshgrid(*(order * np.arange(c) for c in counts), indexing="ij"), -1).reshape(-1, 3)
+    inside = HEX27 + 1 if nodes == 27 else (HEX8 + 1) // 2
+    index = corners[:, None, :] + inside
+    if closed:
+        index[..., 0] %= size[0] - 1
+    cells = np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), tuple(size))
+    used, renumbered = np.unique(cells, return_inverse=True)
+    return HexMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
+
+
+def box(lengths: tuple[float, float, float], start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mapping:
+    """The unit cube stretched and moved."""
+    return lambda r, s, t: (
+        start[0] + lengths[0] * r,
+        start[1] + lengths[1] * s,
+        start[2] + lengths[2] * t,
+    )
+
+
+def mapped_link(
+    counts: tuple[int, int, int], mapping: Mapping, material: Material, nodes: int = 27, closed: bool = False
+) -> Link:
+    """The link of a mapped mesh, its axes those of the world."""
+    return solid_link("test", mapped_mesh(counts, mapping, nodes, closed), material, np.eye(3))
+
+
+def model(counts: tuple[int, ...], link: Link, kind: str = "hex27") -> str:
+    """Mesh and unknowns in words."""
+    return f"{kind} {'×'.join(map(str, counts))}, {3 * link.n:,} unknowns"
