@@ -150,7 +150,7 @@ class CondensedSteps:
         self.factorisations = len(self.parts)
 
     def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-        """States of all links one step later.
+        """States of all links one step later, [KED, eq. (20)].
 
         Parameters
         ----------
@@ -180,6 +180,7 @@ class CondensedSteps:
     def _next(
         self, k: int, s: LinkState, at: Nominal, g: Nodal, rhs: Nodal, port_force: Float[np.ndarray, " q"]
     ) -> LinkState:
+        """State of link k at the end of the step; δ = T g, [KED, eq. (5)], and the rest by recurrence."""
         link, scheme = self.links[k], self.scheme
         u = g @ at.R.T
         Mu = mass_times(link.mass, u)

@@ -83,7 +83,7 @@ class LiteralSteps:
         self.factorisations = 0
 
     def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-        """States of all links one step later; see `CondensedSteps.advance`."""
+        """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.advance`."""
         K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
         A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]

@@ -58,7 +58,13 @@ def slider_pattern(load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern
 def _pattern(where: str, load: Load, link: Link) -> Pattern:
     match load:
         case ForceLoad():
-            weights = point_rows(link, f"{where}.at", np.asarray(load.at)).value
+            rows = point_rows(link, f"{where}.at", np.asarray(load.at))
+            beside = float(np.linalg.norm(rows.X - load.at))
+            if link.kind == "beam" and beside > 1e-6 * float(np.ptp(link.X, axis=0).max()):
+                raise SceneError(
+                    f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
+                )
+            weights = rows.value
         case BodyLoad():
             weights = link.volume
         case SurfaceLoad() if link.kind == "solid":

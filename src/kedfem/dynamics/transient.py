@@ -15,7 +15,8 @@ from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_stat
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.path import Path, cross_matrix
+from kedfem.motion.newton import cross_matrix
+from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import MotionLaw, Scene, drive_angle, time_grid
 

@@ -1,0 +1,139 @@
+"""Faults that only the meshed links reveal: seats, probes, loads and bodies, each with its message."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from kedfem.dynamics.cholesky import Cholesky
+from kedfem.dynamics.model import elastic_model
+from kedfem.errors import KedfemError, SolveError
+from kedfem.motion.linkage import linkage
+from kedfem.results.recording import recording
+from kedfem.scene import scene_from
+
+from .test_dynamics import four_bar
+
+
+def arm(fidelity: str = "solid") -> dict[str, Any]:
+    """One bar, 0.5 m along x, hinged at its left end face."""
+    elements = [4, 1, 1] if fidelity == "solid" else 2
+    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
+    return {
+        "links": {
+            "arm": {"fidelity": fidelity, "material": "steel", "shape": shape, "mesh": {"elements": elements}}
+        },
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 10}},
+        "analysis": {"turns": 0.1},
+    }
+
+
+def fault(raw: dict[str, Any]) -> str:
+    scene = scene_from(raw)
+    with pytest.raises(KedfemError) as found:
+        recording(scene, elastic_model(scene, linkage(scene)))
+    return str(found.value)
+
+
+@pytest.mark.parametrize("fidelity", ["solid", "beam"])
+def test_joint_that_does_not_touch_its_link(fidelity: str) -> None:
+    raw = arm(fidelity)
+    raw["joints"]["A"]["at"] = [-0.1, 0]
+    what = "a bore or a flat face of" if fidelity == "solid" else "a node of"
+    nearest = "(0, 0, 0), 0.1 m"
+    assert fault(raw) == (
+        f"joints.A: must sit on {what} link 'arm' at (-0.1, 0, 0), got none there (nearest node {nearest} away)"
+    )
+
+
+def test_joint_beside_the_bore_of_a_plate() -> None:
+    raw = four_bar("plate")
+    raw["points"]["D"] = [0.9144, 0, 0]
+    raw["joints"]["D"]["at"] = [0.9144, 0.004]
+    raw["bodies"] = {}
+    assert fault(raw).startswith(
+        "joints.D: must sit on a bore or a flat face of link 'rocker' at (0.9144, 0.004, 0)"
+    )
+
+
+def test_hinge_across_a_flat_face() -> None:
+    raw = arm()
+    raw["joints"]["A"]["axis"] = "x"
+    assert fault(raw) == (
+        "joints.A: must sit on a bore of link 'arm', or on a flat face that contains its axis, "
+        "got a flat face across the axis: give the link a bore about the joint's axis"
+    )
+
+
+@pytest.mark.parametrize("quantity", ["stress", "displacement"])
+@pytest.mark.parametrize("fidelity", ["solid", "beam"])
+def test_probe_outside_its_link(fidelity: str, quantity: str) -> None:
+    raw = arm(fidelity)
+    raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.05], "quantity": quantity}}}
+    assert fault(raw) == "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
+
+
+def test_force_outside_its_link() -> None:
+    raw = arm()
+    raw["loads"] = {"push": {"kind": "force", "link": "arm", "at": [0.6, 0], "vector": [0, 1]}}
+    assert fault(raw) == "loads.push.at: must lie in link 'arm', got (0.6, 0, 0), 0.1 m outside it"
+
+
+def test_force_beside_a_beams_axis() -> None:
+    raw = arm("beam")
+    raw["loads"] = {"push": {"kind": "force", "link": "arm", "at": [0.5, 0.01], "vector": [1, 0]}}
+    assert fault(raw) == "loads.push.at: must lie on the axis of beam 'arm', got 0.01 m beside it"
+
+
+def test_surface_force_on_no_face() -> None:
+    raw = arm()
+    raw["loads"] = {"push": {"kind": "surface", "link": "arm", "at": [0.25, 0], "vector": [0, 1]}}
+    assert fault(raw).startswith(
+        "loads.push.at: must sit on a bore or a flat face of link 'arm' at (0.25, 0, 0)"
+    )
+
+
+def test_body_on_no_seat() -> None:
+    raw = arm()
+    raw["bodies"] = {"lump": {"kind": "point_mass", "link": "arm", "at": [0.25, 0.5], "mass": 1}}
+    assert fault(raw).startswith(
+        "bodies.lump.at: must sit on a bore or a flat face of link 'arm' at (0.25, 0.5, 0)"
+    )
+
+
+def body() -> dict[str, Any]:
+    inertia = [1e-3, 1e-3, 1e-3, 0, 0, 0]
+    return {
+        "kind": "rigid_body",
+        "link": "arm",
+        "at": [0.5, 0],
+        "mass": 1,
+        "inertia": inertia,
+        "centre": [0.5, 0],
+    }
+
+
+def test_full_inertia_on_a_flat_face() -> None:
+    raw = arm()
+    raw["bodies"] = {"tool": body()}
+    assert fault(raw) == (
+        "bodies.tool.at: a rigid body with full inertia must sit on a bore, got a flat face of 'arm'"
+    )
+
+
+def test_body_beside_a_beams_node() -> None:
+    raw = arm("beam")
+    raw["bodies"] = {"tool": body() | {"centre": [0.5, 0.1]}}
+    assert fault(raw) == (
+        "bodies.tool.centre: a body on a planar beam must have its centre at its point (0.5, 0.0, 0.0), "
+        "got (0.5, 0.1, 0.0)"
+    )
+
+
+def test_matrix_that_is_not_positive_definite() -> None:
+    with pytest.raises(
+        SolveError, match=r"^links.arm: effective matrix must be positive definite, got a pivot ≤ 0"
+    ):
+        Cholesky(sp.csr_array(np.diag([1.0, -1.0])), "links.arm")
