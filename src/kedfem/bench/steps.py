@@ -1,6 +1,7 @@
 """The condensed step against the literal one, in one run: time per step, share of the triangular solves, agreement."""
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from statistics import median
@@ -8,10 +9,10 @@ from time import perf_counter
 
 import numpy as np
 
-from kedfem.bench.machine import Watch, markdown, seconds, write_loglog, write_page
+from kedfem.bench.machine import Watch, markdown, write_loglog, write_page
 from kedfem.bench.scenes import bar_four_bar
 from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.transient import Steps, drive_range, steps_of, transient
 from kedfem.motion.linkage import linkage
@@ -22,21 +23,31 @@ SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100
 
 
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """Unknowns, factorisations, median seconds of a step, share of the solves in it, states after the first steps."""
+
+    unknowns: int
+    factorisations: int
+    step: float
+    share: float
+    states: list[list[LinkState]]
+
+
 def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     """Median time of a step of both solvers at several sizes; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
     rows, unknowns, condensed_times, literal_times = [], [], [], []
     for number, size in enumerate(sizes):
         watch("steps", number, len(sizes))
-        model, solver, condensed, fast = _stepped(bar_four_bar(size), CONDENSED_STEPS)
-        _, _, literal, slow = _stepped(bar_four_bar(size, "literal"), LITERAL_STEPS)
-        share = _solve_seconds(solver, fast) / condensed
-        unknowns.append(model.unknowns)
-        condensed_times.append(condensed)
-        literal_times.append(literal)
+        fast = _stepped(bar_four_bar(size), CONDENSED_STEPS)
+        slow = _stepped(bar_four_bar(size, "literal"), LITERAL_STEPS)
+        unknowns.append(fast.unknowns)
+        condensed_times.append(fast.step)
+        literal_times.append(slow.step)
         rows.append((
-            f"{model.unknowns:,}", f"{1e3 * literal:.1f}", f"{1e3 * condensed:.2f}", f"{literal / condensed:.0f}",
-            f"{100 * share:.0f} %", str(solver.factorisations), f"{_difference(fast[: len(slow)], slow):.1e}",
+            f"{fast.unknowns:,}", f"{1e3 * slow.step:.1f}", f"{1e3 * fast.step:.2f}", f"{slow.step / fast.step:.0f}",
+            f"{100 * fast.share:.0f} %", str(fast.factorisations), f"{_difference(fast.states, slow.states):.1e}",
         ))  # fmt: skip
     header = ("unknowns", "literal [ms/step]", "condensed [ms/step]", "ratio", "of it triangular solves",
               "factorisations in the run", "difference of u after 5 steps")  # fmt: skip
@@ -51,29 +62,42 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     return text
 
 
-def _stepped(scene: Scene, steps: int) -> tuple[Model, Steps, float, list[list[LinkState]]]:
-    """Model, solver, median seconds of a step, states of the first steps."""
+def _stepped(scene: Scene, steps: int) -> "_Measured":
+    """Take some steps of a scene and measure them."""
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
     solver = steps_of(scene, model)
     run = transient(scene, joined, along, model, solver)
     next(run)
-    times, states, since = [], [], perf_counter()
+    watch = _Stopwatch(solver)
+    times: list[float] = []
+    states: list[list[LinkState]] = []
+    since = perf_counter()
     for snapshot in islice(run, steps):
         times.append(perf_counter() - since)
-        states.append(snapshot.states)
-        states[:-LITERAL_STEPS] = [] if len(states) <= LITERAL_STEPS else states[:-LITERAL_STEPS]
+        if len(states) < LITERAL_STEPS:
+            states.append(snapshot.states)
         since = perf_counter()
-    return model, solver, median(times), states
+    return _Measured(model.unknowns, solver.factorisations, median(times), watch.seconds / sum(times), states)
 
 
-def _solve_seconds(solver: Steps, states: list[list[LinkState]]) -> float:
-    """Seconds of one solve with every link's factor."""
-    if not isinstance(solver, CondensedSteps):
-        raise TypeError("only the condensed solver has constant factors")
-    pairs = zip(solver.parts, states[-1], strict=True)
-    return sum(seconds(partial(part.solve, state.g), 15) for part, state in pairs)
+class _Stopwatch:
+    """Adds up the seconds of the triangular solves within the steps."""
+
+    def __init__(self, solver: Steps) -> None:
+        self.seconds = 0.0
+        if isinstance(solver, CondensedSteps):
+            solver.parts = [replace(part, solve=self._timed(part.solve)) for part in solver.parts]
+
+    def _timed(self, solve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+        def timed(r: np.ndarray) -> np.ndarray:
+            since = perf_counter()
+            out = solve(r)
+            self.seconds += perf_counter() - since
+            return out
+
+        return timed
 
 
 def _difference(fast: list[list[LinkState]], slow: list[list[LinkState]]) -> float:
