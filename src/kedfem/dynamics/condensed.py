@@ -14,11 +14,10 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import LinkState, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link, mass_times
 
 ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
-Nodal = Float[np.ndarray, "n 3"]
 Rotation = Float[np.ndarray, "3 3"]
 
 
@@ -88,8 +87,8 @@ def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q
 
 
 def coupled(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[Nodal]
-) -> tuple[list[Nodal], list[Float[np.ndarray, " q"]]]:
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf]
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
     """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
 
     The mechanism of [KED, eq. (19)]: joints make shared points move together.

@@ -11,10 +11,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Nodal, Rotation, port_columns
+from kedfem.dynamics.condensed import Rotation, port_columns
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import LinkState, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link
 
 

@@ -9,7 +9,6 @@ import scipy.sparse.linalg
 from jaxtyping import Float
 
 from kedfem.dynamics.condensed import (
-    Nodal,
     Rotation,
     Substructure,
     coupled,
@@ -17,7 +16,7 @@ from kedfem.dynamics.condensed import (
     substructure,
 )
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.state import LinkState, Nominal, Rayleigh
+from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
@@ -79,7 +78,7 @@ class Instant:
 
 def quasi_static(
     links: Sequence[Link], joints: Sequence[Attachment], instants: Sequence[Instant]
-) -> list[list[Nodal]]:
+) -> list[list[NodalOf]]:
     """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
 
     The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
@@ -93,7 +92,7 @@ def quasi_static(
     return [_turning(links, parts, instant) for instant in instants]
 
 
-def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Instant) -> list[Nodal]:
+def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Instant) -> list[NodalOf]:
     """Static deflection, then sweeps with the inertia that it has as it turns."""
     R = [now.R for now in instant.at]
     load = [now.F @ now.R for now in instant.at]
@@ -112,7 +111,7 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
 
 
-def _change(new: Sequence[Nodal], old: Sequence[Nodal]) -> tuple[float, float]:
+def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, float]:
     """Largest change and largest value."""
     change = max(float(np.abs(x - y).max()) for x, y in zip(new, old, strict=True))
     return change, max(float(np.abs(x).max()) for x in new)

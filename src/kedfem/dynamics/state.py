@@ -8,6 +8,7 @@ from jaxtyping import Float
 from kedfem.dynamics.scheme import Scheme
 
 Nodal = Float[np.ndarray, "n 3"]
+NodalOf = Float[np.ndarray, "_ 3"]  # of several links, each with its own n
 
 
 @dataclass(frozen=True, slots=True)

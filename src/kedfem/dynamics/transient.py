@@ -83,13 +83,13 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
             yield Snapshot(first + k, motion, k, states)
 
 
-def load_factors(model: Model, t: Float[np.ndarray, " T"]) -> list[Float[np.ndarray, "l T"]]:
+def load_factors(model: Model, t: Float[np.ndarray, " T"]) -> list[Float[np.ndarray, "_ T"]]:
     """Factors of all loads at given times, per link."""
     return [np.array([load.factor(t) for load in loads]).reshape(len(loads), len(t)) for loads in model.loads]
 
 
 def nominal(
-    model: Model, factors: list[Float[np.ndarray, "l T"]], motion: RigidMotion, k: int
+    model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion, k: int
 ) -> list[Nominal]:
     """Orientation and P − M R0'' of all links at time point k."""
     return [
@@ -119,7 +119,7 @@ def first_states(
     return initial_states(model.links, model.joints, instants[0].at, model.damping, start)
 
 
-def instant(model: Model, factors: list[Float[np.ndarray, "l T"]], motion: RigidMotion, k: int) -> Instant:
+def instant(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion, k: int) -> Instant:
     """Orientation, load and spin of all links at time point k."""
     W = cross_matrix(motion.omega[k])
     spin = cross_matrix(motion.alpha[k]) + W @ W
