@@ -3,17 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-import skfem
 from jaxtyping import Float, Int
-from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-
-CYLINDER_TOLERANCE = 1e-3  # of the radius, between the corner nodes of one bore
-PLANE_TOLERANCE = 1e-6  # of the link's size
-SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved face
+from kedfem.links.surface import PLANE_TOLERANCE, cylinder, flat_face, smooth_face, sphere, surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +84,9 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
     MeshError
         If no face does.
     """
-    facets = _flat_face(link, point)
+    facets = flat_face(link, point)
     if not len(facets):
-        facets = _smooth_face(link, point)
+        facets = smooth_face(link, point)
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
     return _facet_seat(link, facets)
@@ -110,54 +104,6 @@ def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
     on = surface(link, seat.facets)
     local = np.einsum("fqm,fq->fm", on.N, on.dA)
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
-
-
-@dataclass(frozen=True, slots=True)
-class Surface:
-    """Quadrature on facets of a solid, in the elements' own functions: x (f, q, 3) [m], dA (f, q) [m²],
-    N (f, q, m) and the functions' numbers dofs (f, m)."""
-
-    x: Float[np.ndarray, "f q 3"]
-    dA: Float[np.ndarray, "f q"]
-    N: Float[np.ndarray, "f q m"]
-    dofs: Int[np.ndarray, "f m"]
-
-
-def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
-    """Gauss points on facets: the area element of [KED, eqs. (15)(16)], √(a_r a_s − a_rs²) = |x_r × x_s|."""
-    mesh, elem = link.basis.mesh, link.basis.elem
-    elements = mesh.f2t[0, facets]
-    local = np.argmax(mesh.t[:8, elements][:, None] == mesh.facets[:, facets][None], axis=0)  # (4, f)
-    corners = np.asarray(elem.doflocs)[local]  # (4, f, 3)
-    fixed = np.ptp(corners, axis=0).argmin(axis=1)
-    face = 2 * fixed + corners[0, np.arange(len(facets)), fixed].astype(int)
-    dofs = link.basis.element_dofs[:, elements].T
-    x, dA, N = (
-        np.empty((len(facets), 16, 3)),
-        np.empty((len(facets), 16)),
-        np.empty((len(facets), 16, dofs.shape[1])),
-    )
-    for which in np.unique(face):
-        here = face == which
-        shape, gradient, weights = _face_functions(elem, which // 2, which % 2)
-        nodes = link.X[dofs[here]]
-        tangents = np.einsum("qmk,fmj->kfqj", gradient, nodes)
-        N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
-        dA[here] = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=2) * weights
-    return Surface(x, dA, N, dofs)
-
-
-def _face_functions(elem: skfem.Element, fixed: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N (q, m), its derivatives along the face (q, m, 2) and weights (q,) on one face of [0, 1]³."""
-    r, w = np.polynomial.legendre.leggauss(4)
-    r, w = (r + 1) / 2, w / 2
-    across = [k for k in range(3) if k != fixed]
-    points = np.full((3, 16), float(side))
-    points[across] = np.stack(np.meshgrid(r, r, indexing="ij")).reshape(2, 16)
-    pairs = [elem.lbasis(points, i) for i in range(len(elem.doflocs))]
-    shape = np.stack([np.broadcast_to(N, 16) for N, _ in pairs], axis=1)
-    gradient = np.stack([np.asarray(dN)[across].T for _, dN in pairs], axis=1)
-    return shape, gradient, np.outer(w, w).ravel()
 
 
 def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
@@ -197,100 +143,14 @@ def _surface_at(
     link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
 ) -> Int[np.ndarray, " f"]:
     if axis is not None:
-        bore = _cylinder(link, point, axis)
+        bore = cylinder(link, point, axis)
         if len(bore):
             return bore
     else:
-        ball = _sphere(link, point)
+        ball = sphere(link, point)
         if len(ball):
             return ball
-    return _flat_face(link, point)
-
-
-def _boundary(
-    link: Link,
-) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f 4 3"], Float[np.ndarray, "f 3"]]:
-    """Boundary facets with their corners and outward unit normals."""
-    mesh = link.basis.mesh
-    facets = mesh.boundary_facets()
-    corners = mesh.doflocs[:, mesh.facets[:, facets]].transpose(2, 1, 0)
-    inner = link.X[mesh.t[:8, mesh.f2t[0, facets]]].mean(axis=0)
-    # the four corners of a facet may be numbered in any order: two largest independent edges span it
-    edges = corners[:, 1:] - corners[:, :1]
-    crosses = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in ((0, 1), (1, 2), (0, 2))], axis=1)
-    largest = np.linalg.norm(crosses, axis=2).argmax(axis=1)
-    normal = crosses[np.arange(len(facets)), largest]
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    outward = np.sign(np.einsum("fk,fk->f", normal, corners.mean(axis=1) - inner))
-    return facets, corners, normal * outward[:, None]
-
-
-def _cylinder(
-    link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]
-) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest closed bore about the axis."""
-    facets, corners, normals = _boundary(link)
-    r = corners - point
-    r = r - (r @ axis)[..., None] * axis
-    radius = np.linalg.norm(r, axis=2)
-    mean = radius.mean(axis=1)
-    inward = np.einsum("fk,fk->f", normals, r.mean(axis=1)) < -0.5 * np.linalg.norm(r.mean(axis=1), axis=1)
-    size = np.ptp(link.X, axis=0).max()
-    round_ = (np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean) & (mean > 1e-6 * size) & inward
-    if not round_.any():
-        return facets[:0]
-    same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
-    centre = r[same].mean(axis=(0, 1))
-    closed = np.linalg.norm(centre) < 0.3 * mean[same].min()  # facets all round, not on one side only
-    return facets[same] if closed else facets[:0]
-
-
-def _sphere(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest sphere about the point."""
-    facets, corners, _ = _boundary(link)
-    radius = np.linalg.norm(corners - point, axis=2)
-    mean = radius.mean(axis=1)
-    round_ = np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean
-    if round_.sum() < 6:  # a few facets may be equidistant by chance
-        return facets[:0]
-    same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
-    return facets[same] if same.sum() >= 6 else facets[:0]
-
-
-def _flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the plane face that the point lies in: within its plane and inside its extent."""
-    facets, corners, normals = _boundary(link)
-    size = np.ptp(link.X, axis=0).max()
-    centre = corners.mean(axis=1)
-    height = np.abs(np.einsum("fck,fk->fc", corners - point, normals)).max(axis=1)
-    touching = height <= 1e-6 * size
-    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    near = touching & (np.linalg.norm(centre - point, axis=1) <= 1.01 * reach)
-    if not near.any():
-        return facets[:0]
-    normal = normals[near][np.linalg.norm(centre[near] - point, axis=1).argmin()]
-    return np.asarray(facets[touching & (normals @ normal > 1 - 1e-6)])
-
-
-def _smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the curved face at a point: from the facet there over all edges that are not sharp."""
-    facets, corners, normals = _boundary(link)
-    centre = corners.mean(axis=1)
-    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    height = np.abs(np.einsum("fk,fk->f", centre - point, normals))
-    near = np.flatnonzero((np.linalg.norm(centre - point, axis=1) <= 1.05 * reach) & (height <= 0.15 * reach))
-    if not len(near):
-        return facets[:0]
-    # facets are neighbours if they share an edge, two of their corner nodes
-    numbers = np.sort(link.basis.mesh.facets[:, facets].T, axis=1)
-    shared = sp.csr_array((np.ones(numbers.size), numbers.ravel(), 4 * np.arange(len(facets) + 1)))
-    common = sp.coo_array(shared @ shared.T)
-    first, second = (index[common.data == 2] for index in common.coords)
-    smooth = np.einsum("ek,ek->e", normals[first], normals[second]) > SMOOTH
-    joined = sp.csr_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(facets),) * 2)
-    face = connected_components(joined, directed=False)[1]
-    seed = near[height[near].argmin()]
-    return np.asarray(facets[face == face[seed]])
+    return flat_face(link, point)
 
 
 def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:
