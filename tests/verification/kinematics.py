@@ -48,7 +48,9 @@ def errors(name: str, got: Curve, wanted: Curve, model: str) -> list[Row]:
     ]
 
 
-def implicit(f1: np.ndarray, fy: np.ndarray, f11: np.ndarray, f1y: np.ndarray, fyy: np.ndarray) -> Sequence[np.ndarray]:
+def implicit(
+    f1: np.ndarray, fy: np.ndarray, f11: np.ndarray, f1y: np.ndarray, fyy: np.ndarray
+) -> Sequence[np.ndarray]:
     """y' and y'' of f(x, y) = 0 from its partial derivatives."""
     y1 = -f1 / fy
     return y1, -(f11 + 2 * f1y * y1 + fyy * y1**2) / fy
@@ -56,10 +58,10 @@ def implicit(f1: np.ndarray, fy: np.ndarray, f11: np.ndarray, f1y: np.ndarray, f
 
 def angle_of(
     joints: JointTable, name: str, axis: Sequence[float], drawn: float, other: str | None = None,
-    motion: dict[str, object] | None = None, sliders: tuple[str, ...] = (),
+    law: dict[str, object] = TURN,
 ) -> tuple[Curve, Curve]:  # fmt: skip
     """Angle of a link about an axis drawn in another one (the ground), with rates; and the drive's."""
-    scene = linkage_scene(joints, motion=motion or TURN, sliders=sliders)
+    scene = linkage_scene(joints, motion=law)
     m = motion_at(scene, T)
     i, j = body(scene, name), 0 if other is None else body(scene, other)
     a = m.R[:, j] @ np.asarray(axis)
@@ -68,7 +70,10 @@ def angle_of(
     return (drawn + turned(m, i, np.asarray(axis), j), *rates), drive_angle(scene.drive.motion, T)
 
 
-@case("Four-bar", "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar")
+@case(
+    "Four-bar",
+    "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar",
+)
 def planar_four_bar() -> list[Row]:
     """The linkage of the source's example (Nath and Ghosh 1980), drawn at 60°, a full turn by a cycloidal law."""
     a, b, c, d = 0.3048, 0.9144, 0.762, 0.9144
@@ -114,10 +119,14 @@ def planar_slider_crank() -> list[Row]:
     s = np.sqrt(rod**2 - (r * sin) ** 2)
     first = -r * sin - r**2 * sin * cos / s
     second = -r * cos - r**2 * (cos**2 - sin**2) / s - r**4 * (sin * cos) ** 2 / s**3
-    return errors("slider", got, in_time((r * cos + s, first, second), drive), "3 links, 3 revolutes, a slide")
+    return errors(
+        "slider", got, in_time((r * cos + s, first, second), drive), "3 links, 3 revolutes, a slide"
+    )
 
 
-@case("Spatial slider-crank", "E. J. Haug, Computer-Aided Kinematics and Dynamics of Mechanical Systems (1989)")
+@case(
+    "Spatial slider-crank", "E. J. Haug, Computer-Aided Kinematics and Dynamics of Mechanical Systems (1989)"
+)
 def slider_crank_in_space() -> list[Row]:
     """Crank 0.08 m about an axis along x at y = 0.1, z = 0.12; rod 0.3 m; slider on x: x² = l² − y_B² − z_B².
 
@@ -146,7 +155,10 @@ def universal_joint() -> list[Row]:
     return errors("driven shaft", got, wanted, "3 links, 4 revolutes")
 
 
-@case("Bennett linkage", "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes")
+@case(
+    "Bennett linkage",
+    "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes",
+)
 def bennett() -> list[Row]:
     """a = 0.3 m, α = 40°, β = 75°: tan(θ1/2) tan(θ2/2) = sin((β+α)/2) / sin((β−α)/2); a full turn, over-constrained."""
     a, alpha, beta, t1 = 0.3, np.radians(40), np.radians(75), 1.0
@@ -172,7 +184,7 @@ def bricard() -> list[Row]:
     t1, right = 0.6, np.pi / 2
     t2 = np.arccos(-np.cos(t1) / (1 + np.cos(t1)))
     joints = revolute_loop(np.full(6, 0.3), np.array([right, -right] * 3), np.array([t1, t2] * 3))
-    got, drive = angle_of(joints, "link2", joints["B"][4], t2, "link1", motion={**RISE, "angle": 1.0})
+    got, drive = angle_of(joints, "link2", joints["B"][4], t2, "link1", law={**RISE, "angle": 1.0})
     s, c = np.sin(t1 + drive[0]), np.cos(t1 + drive[0])
     y = np.arccos(-c / (1 + c))
     sy, cy = np.sin(y), np.cos(y)
@@ -180,7 +192,10 @@ def bricard() -> list[Row]:
     return errors("second joint angle", got, in_time((y, *rates), drive), "5 links, 6 revolutes")
 
 
-@case("RSSR", "R. S. Hartenberg, J. Denavit, Kinematic Synthesis of Linkages (1964): constant distance of the ball centres")
+@case(
+    "RSSR",
+    "R. S. Hartenberg, J. Denavit, Kinematic Synthesis of Linkages (1964): constant distance of the ball centres",
+)
 def spatial_four_bar() -> list[Row]:
     """Crank 0.1 m about z, rocker 0.25 m about x; one ball is a universal joint, so that the coupler cannot spin."""
     drawn = 1.0
@@ -191,7 +206,9 @@ def spatial_four_bar() -> list[Row]:
     w = rssr_points(phi, phi)[0] - RSSR_PIVOT
     C = ((w**2).sum(axis=1) + r**2 - length2) / (2 * r)  # w_y cos ψ + w_z sin ψ = C
     mid, half = np.arctan2(w[:, 2], w[:, 1]), np.arccos(C / np.hypot(w[:, 1], w[:, 2]))
-    psi = min((np.unwrap(mid + s * half) for s in (1, -1)), key=lambda y: abs(np.angle(np.exp(1j * (y[0] - drawn)))))
+    psi = min(
+        (np.unwrap(mid + s * half) for s in (1, -1)), key=lambda y: abs(np.angle(np.exp(1j * (y[0] - drawn))))
+    )
     psi = psi + 2 * np.pi * np.round((drawn - psi[0]) / (2 * np.pi))
     P, Q = rssr_points(phi, psi)
     zero = np.zeros_like(phi)
@@ -202,5 +219,7 @@ def spatial_four_bar() -> list[Row]:
         return np.einsum("tk,tk->t", x, y)
 
     d = P - Q
-    rates = implicit(dot(d, P1), -dot(d, Q1), dot(P1, P1) + dot(d, P2), -dot(P1, Q1), dot(Q1, Q1) - dot(d, Q2))
+    rates = implicit(
+        dot(d, P1), -dot(d, Q1), dot(P1, P1) + dot(d, P2), -dot(P1, Q1), dot(Q1, Q1) - dot(d, Q2)
+    )
     return errors("rocker angle", got, in_time((psi, *rates), drive), "4 links, 4 revolutes, a ball")

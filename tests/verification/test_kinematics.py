@@ -84,7 +84,9 @@ def test_joints_stay_closed_and_links_rigid(scene: Scene) -> None:
         i, j = (0 if name == "ground" else body(scene, name) for name in joint.links)
         axis = np.array(joint.axis or (0, 0, 0))
         if joint.kind in {"revolute", "spherical"}:
-            for one, other in zip(place(m, i, np.array(joint.at)), place(m, j, np.array(joint.at)), strict=True):
+            for one, other in zip(
+                place(m, i, np.array(joint.at)), place(m, j, np.array(joint.at)), strict=True
+            ):
                 assert_allclose(one, other, atol=1e-11)  # accelerations of up to 100 m/s²
         if joint.kind == "revolute":
             assert_allclose(m.R[:, i] @ axis, m.R[:, j] @ axis, atol=1e-13)

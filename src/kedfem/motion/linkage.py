@@ -22,6 +22,7 @@ class Linkage:
     rows : as arrays
     joints : for each row the joint's name
     size : characteristic length, makes rows and columns comparable [m]
+    centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     redundant : joints whose rows repeat what others already hold
     drive : name of the driven joint or None
     """
@@ -30,6 +31,7 @@ class Linkage:
     rows: Rows
     joints: tuple[str, ...]
     size: float
+    centre: Float[np.ndarray, "3"]
     redundant: tuple[str, ...]
     drive: str | None
 
@@ -43,17 +45,18 @@ def linkage(scene: Scene) -> Linkage:
         If the linkage cannot move, has a dead point as drawn, or keeps a free motion.
     """
     bodies = (GROUND, *scene.links)
-    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies)]
+    points = np.array([joint.at for joint in scene.joints.values()])
+    centre = points.mean(axis=0)
+    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
     driven = scene.drive.joint if scene.drive else None
     if driven:
         i, j, axis = _driven_pair(scene, driven, bodies)
         rows.append(drive_row(driven, i, j, axis))
-    points = np.array([joint.at for joint in scene.joints.values()])
-    size = max(float(np.ptp(points, axis=0).max()), 1e-3 * float(np.abs(points).max()), 1e-9)
+    size = float(np.ptp(points, axis=0).max()) or 1.0
     J = drawn_jacobian(rows, len(bodies), size)
-    _check_mobility(J, rows, bodies, driven, size, points.mean(axis=0))
+    _check_mobility(J, rows, bodies, driven)
     names = tuple(row.joint for row in rows)
-    return Linkage(bodies, stacked(rows), names, size, _redundant(J, names), driven)
+    return Linkage(bodies, stacked(rows), names, size, centre, _redundant(J, names), driven)
 
 
 def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
@@ -61,12 +64,12 @@ def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
     return np.asarray(np.asarray(axis) / np.linalg.norm(axis))
 
 
-def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Row]:
+def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
     joint = scene.joints[name]
     # the ground, where there is one, is body j: directions are fixed in it
     i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
     axis = None if joint.axis is None else unit(joint.axis)
-    return joint_rows(joint.kind, name, i, j, np.asarray(joint.at), axis)
+    return joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
 
 
 def _driven_pair(scene: Scene, name: str, bodies: tuple[str, ...]) -> tuple[int, int, Float[np.ndarray, "3"]]:
@@ -90,18 +93,11 @@ def scaled(J: Float[np.ndarray, "... m k"], rows: Rows, size: float) -> Float[np
     return np.asarray(J * row * column)
 
 
-def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str | None,
-                    size: float, centre: Float[np.ndarray, "3"]) -> None:  # fmt: skip
-    if J.shape[1] == 0:
-        return
+def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str | None) -> None:
     _, s, Vt = scipy.linalg.svd(J)
     rank = int((s > RANK_TOLERANCE * s[0]).sum())
     without = J[[row.b_drive is None for row in rows]]
-    mobility = (
-        J.shape[1] - int(np.linalg.matrix_rank(without, tol=RANK_TOLERANCE * s[0]))
-        if len(without)
-        else J.shape[1]
-    )
+    mobility = J.shape[1] - int(np.linalg.matrix_rank(without, tol=RANK_TOLERANCE * s[0]))
     if drive and mobility == 0:
         raise MotionError(
             f"joints.{drive}: its drive must be able to move the linkage, got a structure without any mobility "
@@ -114,13 +110,13 @@ def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], dri
             f"joints.{drive}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
             "draw it at another angle or drive another joint"
         )
-    motion = _free_motion(Vt[rank:].reshape(-1, len(bodies) - 1, 6), bodies[1:], size, centre)
+    motion = _free_motion(Vt[rank:].reshape(-1, len(bodies) - 1, 6), bodies[1:])
     raise MotionError(
         f"joints: every motion must be held or driven, got free motion left at drive angle 0 deg: {motion}"
     )
 
 
-def _free_motion(null: np.ndarray, links: tuple[str, ...], size: float, centre: np.ndarray) -> str:
+def _free_motion(null: np.ndarray, links: tuple[str, ...]) -> str:
     """Free motions in words: which links can still turn or slide, and how."""
     norm = np.linalg.norm(null, axis=2).max(axis=0)
     moving = [name for name, x in zip(links, norm, strict=True) if x > 1e-6]
@@ -135,8 +131,6 @@ def _free_motion(null: np.ndarray, links: tuple[str, ...], size: float, centre: 
 
 def _redundant(J: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:
     """Joints that own the dependent rows, by rank-revealing QR of Jᵀ."""
-    if J.shape[1] == 0:
-        return ()
     _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
     rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
     return tuple(sorted({names[k] for k in pivot[rank:]}))

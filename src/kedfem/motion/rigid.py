@@ -7,7 +7,9 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.path import OPEN, Path, closed, cross_matrix, derivatives, predicted
+from kedfem.motion.newton import OPEN, closed, cross_matrix, derivatives
+from kedfem.motion.path import Path, predicted
+from kedfem.motion.rows import cross
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +66,12 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
         )
     first, second, _ = derivatives(link, poses, phi)
     s, ss, a = speed[:, None, None], speed[:, None, None] ** 2, acceleration[:, None, None]
-    (v1, w1), (v2, w2) = first, second
+    R, (v1, w1), (v2, w2) = poses[0], first, second
     omega, alpha = w1 * s, w2 * ss + w1 * a
-    W = cross_matrix(omega)
-    R2 = (cross_matrix(alpha) + W @ W) @ poses[0]
-    return RigidMotion(t, phi, *poses, omega, alpha, v1 * s, R2, v2 * ss + v1 * a, w1, v1)
+    W, c = cross_matrix(omega), link.centre
+    R2 = (cross_matrix(alpha) + W @ W) @ R
+    # bodies turn about the linkage's centre c in their poses: a point is at p + c + R (X − c)
+    c_now = R @ c
+    p, v_phi = poses[1] + c - c_now, v1 - cross(w1, c_now)
+    p2 = v2 * ss + v1 * a - R2 @ c
+    return RigidMotion(t, phi, R, p, omega, alpha, v_phi * s, R2, p2, w1, v_phi)

@@ -1,0 +1,137 @@
+"""Random rotations, random valid hexahedra and random beams: what the laws are tried on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import Phase, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from kedfem.links.beam import beam_link
+from kedfem.links.record import Link, Section
+from kedfem.links.solid import solid_link
+from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh.hexahedra import HEX27, extruded, linear, rectangle_quads
+from kedfem.scene import Material
+
+# shrinking is left out: a smaller seed is no simpler mesh
+LAW = settings(
+    max_examples=20, deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate]
+)
+VALID = 0.05  # least scaled Jacobian of a random element: det J > 0 at every node and Gauss point
+# any material serves a law; this one is not close to a special case (ν = 0, ν = 1/2)
+MATERIAL = Material(density=2700.0, youngs_modulus=70e9, poisson_ratio=0.33)
+
+seeds = st.integers(0, 2**32 - 1)
+_angles = st.floats(-3.1, 3.1, allow_nan=False)  # up to half a turn about any axis
+rotations = st.tuples(_angles, _angles, _angles).map(lambda v: Rotation.from_rotvec(v).as_matrix())
+planar_rotations = _angles.map(lambda a: Rotation.from_rotvec([0, 0, a]).as_matrix())
+vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rigid motion at one instant: x = R X + p, x' = ω × (x − p) + v."""
+
+    R: np.ndarray
+    p: np.ndarray
+    omega: np.ndarray
+    v: np.ndarray
+
+    def moved(self, X: np.ndarray) -> np.ndarray:
+        return X @ self.R.T + self.p
+
+    def velocity(self, X: np.ndarray) -> np.ndarray:
+        return np.cross(self.omega, X @ self.R.T) + self.v
+
+
+motions = st.builds(Motion, rotations, vectors, vectors, vectors)
+
+
+@st.composite
+def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = (8, 27)) -> HexMesh:
+    """One element or a patch of 2 × 2 × 1, all nodes moved at random as far as det J allows."""
+    random = np.random.default_rng(draw(seeds))
+    along, across = draw(st.sampled_from([(1, 1), (2, 2)]))
+    sides = random.uniform(0.3, 1.0, 3)
+    mesh = extruded(*rectangle_quads(sides[0], sides[1], along, across), sides[2], 1)
+    mesh = mesh if draw(st.sampled_from(nodes)) == 27 else linear(mesh)
+    spacing = sides / np.array([along, across, 1]) / (2 if mesh.cells.shape[1] == 27 else 1)
+    return distorted(mesh, draw(st.floats(0.0, 0.5)) * spacing * random.uniform(-1, 1, mesh.points.shape))
+
+
+def distorted(mesh: HexMesh, moves: np.ndarray) -> HexMesh:
+    """The mesh with its nodes moved, less far until it is valid."""
+    for part in 0.5 ** np.arange(20):
+        changed = HexMesh(mesh.points + part * moves, mesh.cells)
+        if mesh_quality(changed).least >= VALID:
+            return changed
+    raise ValueError("the mesh is not valid as it is")
+
+
+def solid(mesh: HexMesh, axes: np.ndarray | None = None) -> Link:
+    return solid_link("any", mesh, MATERIAL, np.eye(3) if axes is None else axes)
+
+
+def rotated(mesh: HexMesh, motion: Motion) -> HexMesh:
+    return HexMesh(motion.moved(mesh.points), mesh.cells)
+
+
+def ring(moves: np.ndarray | float = 0.0, around: int = 8) -> HexMesh:
+    """Hexahedra about a bore of radius 0.1 along z, outer radius 0.25, thickness 0.2; other nodes may move."""
+    radii = np.linspace(0.1, 0.25, 3)
+    angle = np.arange(2 * around) * np.pi / around
+    plane = np.stack([np.outer(np.cos(angle), radii), np.outer(np.sin(angle), radii)], axis=-1).reshape(-1, 2)
+    quad9 = HEX27[[*range(4), *range(8, 12), 24]][:, :2]  # VTK: corners, middles of sides, middle
+    middle = 2 * np.arange(around)[:, None] + 1
+    cells = (middle + quad9[:, 1]) % (2 * around) * 3 + 1 + quad9[:, 0]
+    mesh = extruded(plane, cells, 0.2, 1)
+    off_bore = np.hypot(*mesh.points[:, :2].T) > 0.11
+    return distorted(mesh, np.where(off_bore[:, None], moves * np.ones_like(mesh.points), 0.0))
+
+
+@st.composite
+def rings(draw: st.DrawFn) -> HexMesh:
+    random = np.random.default_rng(draw(seeds))
+    return ring(draw(st.floats(0.0, 0.03)) * random.uniform(-1, 1, (144, 3)))
+
+
+@dataclass(frozen=True)
+class Beam:
+    """What a planar beam is made from; the link is made in the test (strategies must not run checked code)."""
+
+    points: np.ndarray
+    section: Section
+    elements: int
+    nodes: int
+
+    def link(self, R: np.ndarray | None = None) -> Link:
+        points = self.points if R is None else self.points @ R.T
+        return beam_link("any", points, self.section, MATERIAL, self.elements, self.nodes)
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@st.composite
+def beams(draw: st.DrawFn) -> Beam:
+    """One to three straight segments, 2- or 3-node elements."""
+    random = np.random.default_rng(draw(seeds))
+    steps = random.uniform(0.3, 1.0, (draw(st.integers(1, 3)), 1)) * np.array([[1.0, 0.0, 0.0]])
+    steps[:, 1] = random.uniform(-0.5, 0.5, len(steps))
+    points = np.concatenate([random.uniform(-1, 1, (1, 3)), steps]).cumsum(axis=0)
+    section = Section(*random.uniform(0.01, 0.1, 2).tolist())
+    return Beam(points, section, draw(st.integers(1, 2)), draw(st.sampled_from([2, 3])))
+
+
+@st.composite
+def curved_elements(draw: st.DrawFn) -> np.ndarray:
+    """Nodes (m, 2) of one beam element: 2 nodes, or 3 on a curve that does not turn back."""
+    random = np.random.default_rng(draw(seeds))
+    ends = np.array([[0.0, 0.0], [1.0, 0.0]]) * random.uniform(0.2, 2.0)
+    nodes = ends if draw(st.booleans()) else np.vstack([ends, ends.mean(axis=0)])
+    bend = draw(st.floats(0.0, 0.2)) * ends[1, 0]
+    nodes[2:] += bend * random.uniform(-1, 1, 2)
+    turn = Rotation.from_rotvec([0, 0, random.uniform(-3, 3)]).as_matrix()[:2, :2]
+    return nodes @ turn.T + random.uniform(-1, 1, 2)
