@@ -82,7 +82,7 @@ def test_meshio_reads_what_was_written(tmp_path: Path) -> None:
 
 
 def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
-    import pyvista  # noqa: PLC0415
+    import pyvista
 
     written = links()
     grid = pyvista.read(AnimationWriter(tmp_path, "run").add(0.125, written))
@@ -98,7 +98,7 @@ def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
 
 def test_vtk_takes_27_nodes_in_our_order(tmp_path: Path) -> None:
     """The volume by VTK's own shape functions is the exact one, and so is det J at every Gauss point."""
-    import pyvista  # noqa: PLC0415
+    import pyvista
 
     cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [warped()])).GetCell(0)
     points = np.array([cell.GetPoints().GetPoint(i) for i in range(27)])
@@ -125,7 +125,7 @@ def test_the_list_names_whole_frames_in_order_after_each(tmp_path: Path) -> None
 
 
 def test_vtk_reads_the_list(tmp_path: Path) -> None:
-    import pyvista  # noqa: PLC0415
+    import pyvista
 
     animation = AnimationWriter(tmp_path, "run")
     for time in (0.0, 0.5):
@@ -197,7 +197,7 @@ def results(n: int = 721, turns: float = 2.0) -> Results:
 
 
 def pixels(path: Path) -> np.ndarray:
-    from PIL import Image  # noqa: PLC0415
+    from PIL import Image
 
     with Image.open(path) as image:
         return np.asarray(image.convert("RGB"), float)
@@ -254,7 +254,7 @@ def test_results_that_are_not_finite_are_plotted(tmp_path: Path) -> None:
 
 
 def test_stale_plots_go_and_a_users_pictures_stay(tmp_path: Path) -> None:
-    from PIL import Image  # noqa: PLC0415
+    from PIL import Image
 
     write_plots(results(), tmp_path)
     Image.new("RGB", (4, 4)).save(tmp_path / "photo.png")

@@ -1,4 +1,4 @@
-"""What a run will cost, estimated from the sizes alone; docs/performance.md has the measurements behind it."""
+"""What a run will cost, estimated from the sizes alone: right within a factor of two or three."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -8,9 +8,11 @@ import numpy as np
 from kedfem.dynamics.model import Model
 from kedfem.scene import Scene, time_grid
 
-FILL, FILL_POWER = 12.0, 1.28  # entries of a link's factor: FILL · unknowns^FILL_POWER
-FLOPS_PER_ENTRY2 = 2.5e-3  # factorisation flops ≈ this · entries² / unknowns · 1e3
-OVERHEAD = 2.0e-4  # seconds of a step beside the solves: coupling, probes
+# of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
+FACTOR_FLOPS, SOLVE_BYTES, FACTOR_BYTES = 1.0e4, 45.0, 22.0  # times N^1.5
+LINK_BYTES, ASSEMBLY_BYTES = 5e3, 1.5e4  # times N: kept for each link; for one link at a time while it is assembled
+OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
+ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +28,12 @@ class Cost:
 def estimated_cost(scene: Scene, model: Model) -> Cost:
     """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
     N = np.array([3.0 * link.n for link in model.links])
-    entries = FILL * N**FILL_POWER
     bandwidth, rate = _machine()
+    step = OVERHEAD + float((SOLVE_BYTES * N**1.5 + 8 * ARRAY_PASSES * N).sum()) / bandwidth
     return Cost(
-        factor=float((entries**2 / N).sum() / rate),
-        steps=time_grid(scene).steps * float(OVERHEAD + (2.3 * 8 * entries / bandwidth).sum()),
-        memory=float(8 * entries.sum() + 2500 * N.sum()),
+        factor=FACTOR_FLOPS * float((N**1.5).sum()) / rate,
+        steps=time_grid(scene).steps * step,
+        memory=float((FACTOR_BYTES * N**1.5 + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
         frame_bytes=float(40 * N.sum()),
     )
 
