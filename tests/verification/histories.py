@@ -8,8 +8,8 @@ import numpy as np
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.start import initial_states
-from kedfem.dynamics.state import LinkState, Rayleigh
+from kedfem.dynamics.start import Deflected, initial_states
+from kedfem.dynamics.state import LinkState, Nominal, Rayleigh
 from kedfem.links.record import Link
 
 from .cases import Row, case
@@ -50,13 +50,13 @@ class Run:
 def history(run: Run, steps: int) -> Iterator[LinkState]:
     """All states from t = 0."""
     link, joint = [run.link], [run.joint]
-    u, v, g_rate = run.start or [np.zeros((run.link.n, 3))] * 3
-    states = initial_states(link, joint, [run.R(0.0)], [run.forces(0.0)], run.damping, [u], [v], [g_rate])
+    start = Deflected(*(run.start or [np.zeros((run.link.n, 3))] * 3))
+    states = initial_states(link, joint, [Nominal(run.R(0.0), run.forces(0.0))], run.damping, [start])
     solver = CondensedSteps(link, joint, run.scheme, run.damping)
     yield states[0]
     for k in range(1, steps + 1):
         t = k * run.scheme.h
-        states = solver.advance(states, [run.R(t)], [run.forces(t)])
+        states = solver.advance(states, [Nominal(run.R(t), run.forces(t))])
         yield states[0]
 
 
