@@ -79,7 +79,8 @@ def _links(model: Model) -> Table:
             f"{slider.mass:.4g} kg, on {model.links[slider.carrier].name}",
             "-",
         )
-    table.caption = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined; quality: worst scaled Jacobian"
+    joined = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined"
+    table.caption = f"{joined}; quality: worst scaled Jacobian"
     return table
 
 
