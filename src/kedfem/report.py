@@ -80,7 +80,7 @@ def _links(model: Model) -> Table:
             "-",
         )
     joined = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined"
-    table.caption = f"{joined}; quality: worst scaled Jacobian"
+    table.caption = f"{joined}; mass: with what is attached; quality: worst scaled Jacobian"
     return table
 
 

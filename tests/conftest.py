@@ -1,0 +1,38 @@
+"""For all tests: shapes of arrays are checked as they run, nothing needs a display, random tests repeat in CI."""
+
+import os
+from collections.abc import Callable
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin
+
+from beartype import beartype
+from hypothesis import settings
+from jaxtyping import AbstractArray, install_import_hook
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+settings.register_profile("here", deadline=None)
+settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
+IN_CI = bool(os.environ.get("CI"))
+settings.load_profile("ci" if IN_CI else "here")
+CHECKED = ["kedfem"] if IN_CI else [f"kedfem.{room}" for room in ("mesh", "links", "output", "scene.laws")]
+
+
+def shapes_checked(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, or beartype's version of it that checks arrays: mypy has seen to the other annotations."""
+    arrays = {name: hint for name, hint in function.__annotations__.items() if of_arrays(hint)}
+    if not arrays:
+        return function
+    function.__annotations__ = arrays
+    return beartype(function)
+
+
+def of_arrays(hint: object) -> bool:
+    """Whether an annotation stands for an array, one or None, or so many of them."""
+    if get_origin(hint) in (UnionType, Union, tuple):
+        kinds = set(get_args(hint)) - {NoneType}
+        return bool(kinds) and all(of_arrays(kind) for kind in kinds)
+    return isinstance(hint, type) and issubclass(hint, AbstractArray)
+
+
+# before the first import of kedfem; what runs in every step twice as long, so only in CI
+install_import_hook(CHECKED, "tests.conftest.shapes_checked")

@@ -1,0 +1,346 @@
+"""The command line as a user meets it: tables, messages, exit codes, Ctrl-C, and what --help does not load."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import kedfem
+from kedfem.cli import DEFECT, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.results import Results, read_results
+
+SOURCE = Path(kedfem.__file__).parents[1]
+ARM = """
+title = "Arm [bold]nose[/nose]"
+[points]
+A = [0, 0]
+B = [0.6, 0]
+[links.arm]
+fidelity = "beam"
+material = "aluminium"
+shape = { kind = "bar", between = ["A", "B"], width = 0.01, thickness = 0.025 }
+mesh = { elements = 2 }
+[joints.A]
+kind = "revolute"
+links = ["ground", "arm"]
+at = "A"
+[drive]
+joint = "A"
+motion = { kind = "constant_speed", speed = "60 rpm" }
+[damping]
+ratio = 0.02
+frequencies = [5, 200]
+[analysis]
+turns = TURNS
+steps_per_turn = 360
+[output]
+plots = false
+picture = false
+animation = { frames_per_turn = 36 }
+[output.probes.middle_and_tip]
+link = "arm"
+at = "B"
+quantity = "displacement"
+[output.probes.velocity_of_the_tip_of_the_long_and_slender_arm]
+link = "arm"
+at = "B"
+quantity = "velocity"
+"""
+
+
+class Said(NamedTuple):
+    """What a command left: exit code, standard output, standard error."""
+
+    code: int
+    out: str
+    err: str
+
+
+Command = Callable[..., Said]
+
+
+@pytest.fixture
+def run_kedfem(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Command:
+    """kedfem in this process, in a folder of its own, on a terminal of 80 columns; it never shows a traceback."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.delenv("KEDFEM_DEBUG", raising=False)
+
+    def command(*arguments: str | Path) -> Said:
+        monkeypatch.setattr(sys, "argv", ["kedfem", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = Said(int(end.value.code or 0), *capsys.readouterr())
+        assert "Traceback" not in said.out + said.err
+        return said
+
+    return command
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """A small scene."""
+    path = tmp_path / "arm.toml"
+    path.write_text(ARM.replace("TURNS", "1"), encoding="utf-8")
+    return path
+
+
+def process(code: str, *arguments: str | Path, folder: Path) -> "subprocess.Popen[str]":
+    """Python in a process of its own that Ctrl-C reaches, whatever the one that runs the tests ignores."""
+    program = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n{code}"
+    environment = os.environ | {"PYTHONPATH": str(SOURCE), "COLUMNS": "80", "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=folder, env=environment, stdout=pipe, stderr=pipe, text=True)
+
+
+MAIN = "from kedfem.cli import main; main()"
+
+
+def test_help_names_every_command_and_each_explains_itself(run_kedfem: Command) -> None:
+    said = run_kedfem("--help")
+    assert said.code == 0
+    for name in ("run", "check", "new", "bench"):
+        assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), (
+            f"{name} is cut off or missing"
+        )
+        assert run_kedfem(name, "--help").code == 0
+
+
+def test_version(run_kedfem: Command) -> None:
+    assert run_kedfem("--version").out == f"kedfem {kedfem.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments", [(), ("runn",), ("run",), ("run", "a", "b"), ("bench", "nothing"), ("check", "--fast")]
+)
+def test_a_command_that_cannot_be_understood_is_the_users_error(
+    run_kedfem: Command, arguments: tuple[str, ...]
+) -> None:
+    assert run_kedfem(*arguments).code == USER_ERROR
+
+
+def test_help_loads_no_heavy_library(tmp_path: Path) -> None:
+    heavy = [
+        "cvxopt",
+        "gmsh",
+        "h5py",
+        "matplotlib",
+        "meshio",
+        "numpy",
+        "pint",
+        "pyvista",
+        "scipy",
+        "skfem",
+        "vtk",
+        "vtkmodules",
+    ]
+    code = (
+        "import sys, atexit\n"
+        f"atexit.register(lambda: print('loaded', [m for m in {heavy} if m in sys.modules]))\n" + MAIN
+    )
+    out, err = process(code, "--help", folder=tmp_path).communicate(timeout=60)
+    assert "loaded []" in out, err
+
+
+def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
+    run_kedfem: Command, arm: Path
+) -> None:
+    said = run_kedfem("run", arm)
+    assert said.code == 0
+    assert all(len(line) <= 80 for line in said.out.splitlines() if "/arm-results/" not in line)
+    for name in ("probes/middle_and_tip/displacement", "joints/A/force", "drive/torque", "links/arm"):
+        assert f" {name} " in said.out
+    long = "probes/velocity_of_the_tip_of_the_long_and_slender_arm/velocity"
+    assert long in "".join(re.findall(r"^│ (\S+) +│", said.out, re.MULTILINE))  # folded, not cut
+    assert "Arm [bold]nose[/nose]" in said.out  # a title is text, not markup
+    named = re.findall(r"^(\S*arm-results/\S+)  ", said.out, re.MULTILINE)
+    assert {Path(name).name for name in named} == {"results.h5", "animation.pvd"}
+    results = read_results(arm.with_name("arm-results") / "results.h5")
+    assert (results.status, len(results.time)) == ("complete", 361)
+
+
+def test_the_largest_value_of_the_table_is_that_of_the_file(run_kedfem: Command, arm: Path) -> None:
+    said = run_kedfem("run", arm)
+    _, tip = read_results(Path("arm-results/results.h5")).channels["probes/middle_and_tip/displacement"]
+    largest = abs(tip).max()
+    number, prefix = re.findall(r"and_tip/displacement +│ [xy] +│ +(-?[\d.]+) ([mµ]?)m ", said.out)[0]
+    # four digits are shown
+    assert abs(float(number)) * {"": 1, "m": 1e-3, "µ": 1e-6}[prefix] == pytest.approx(largest, rel=1e-3)
+
+
+def test_the_installed_command_is_the_same_main(arm: Path) -> None:
+    done = process(MAIN, "run", arm.name, folder=arm.parent)
+    out, err = done.communicate(timeout=120)
+    assert done.returncode == 0, err
+    assert "arm-results/results.h5  time series" in out
+    assert "Traceback" not in err
+
+
+def test_check_shows_what_would_be_modelled_and_writes_nothing(run_kedfem: Command, arm: Path) -> None:
+    said = run_kedfem("check", arm)
+    assert said.code == 0
+    # 2 beams of 3 nodes: 5 nodes with 3 unknowns; 0.6 m of 10 × 25 mm aluminium of 2700 kg/m³ (room for the alloy)
+    row = re.findall(r"│ arm +│ beam3 +│ +(\d+) │ +(\d+) │ +([\d.]+) kg │", said.out)[0]
+    assert row[:2] == ("2", "15")
+    assert float(row[2]) == pytest.approx(0.6 * 0.01 * 0.025 * 2700, rel=0.05)
+    assert "360 of" in said.out
+    assert [p.name for p in arm.parent.iterdir()] == [arm.name]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_new_writes_a_commented_scene_that_can_be_checked(run_kedfem: Command, kind: str) -> None:
+    said = run_kedfem("new", kind)
+    assert said.code == 0
+    assert f"kedfem check {kind}.toml" in said.out
+    template = files("kedfem") / "templates" / f"{kind.replace('-', '_')}.toml"
+    assert Path(f"{kind}.toml").read_text(encoding="utf-8") == template.read_text(encoding="utf-8")
+    assert run_kedfem("check", f"{kind}.toml").code == 0
+
+
+def test_new_refuses_a_kind_that_it_does_not_know(run_kedfem: Command) -> None:
+    said = run_kedfem("new", "tripod")
+    assert said.code == USER_ERROR
+    assert said.err == "error: KIND: must be one of four-bar, slider-crank, single-arm, got 'tripod'\n"
+    assert not list(Path().iterdir())
+
+
+def test_new_leaves_a_file_that_exists(run_kedfem: Command) -> None:
+    Path("mine.toml").write_text("precious")
+    said = run_kedfem("new", "single-arm", "mine.toml")
+    assert (said.code, said.err) == (
+        USER_ERROR,
+        "error: mine.toml: must be a new file, got one that exists already\n",
+    )
+    assert Path("mine.toml").read_text() == "precious"
+
+
+def test_new_needs_a_folder_that_is_there(run_kedfem: Command) -> None:
+    said = run_kedfem("new", "single-arm", "nowhere/mine.toml")
+    assert said.code == USER_ERROR
+    assert said.err.startswith("error: nowhere/mine.toml: must be a file that can be written, got ")
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_scene_that_is_not_there(run_kedfem: Command, command: str) -> None:
+    said = run_kedfem(command, "no.toml")
+    assert (said.code, said.err) == (USER_ERROR, "error: no.toml: must be a file, got nothing there\n")
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_broken_toml_is_named_with_its_line(run_kedfem: Command, command: str) -> None:
+    Path("broken.toml").write_text('[points]\nA = [0, 0]\ntitle = "no end\n')
+    said = run_kedfem(command, "broken.toml")
+    assert said.code == USER_ERROR
+    assert said.err.startswith("error: broken.toml, line 3: must be valid TOML, got: ")
+
+
+def test_all_faults_come_at_once_and_nothing_is_written(run_kedfem: Command, arm: Path) -> None:
+    text = (
+        arm.read_text(encoding="utf-8").replace("width = 0.01", "width = -0.01").replace("turns =", "trns =")
+    )
+    arm.write_text(text, encoding="utf-8")
+    said = run_kedfem("run", arm)
+    assert said.code == USER_ERROR
+    assert "links.arm.shape.width: must be positive [m], got -0.01" in said.err
+    assert "analysis.trns: unknown key, did you mean 'turns'?" in said.err
+    assert [p.name for p in arm.parent.iterdir()] == [arm.name]
+
+
+def test_a_file_in_the_way_of_the_output_folder(run_kedfem: Command, arm: Path) -> None:
+    arm.with_name("arm-results").write_text("precious")
+    said = run_kedfem("run", "arm.toml")
+    assert said.code == USER_ERROR
+    assert "error: output.folder: must be a writable folder, got arm-results (" in said.err
+    assert arm.with_name("arm-results").read_text() == "precious"
+
+
+def test_a_defect_of_kedfem_is_called_one(
+    run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: object) -> None:
+        raise RuntimeError("[/broken] inside")
+
+    monkeypatch.setattr("kedfem.analysis.analyse", failing)
+    said = run_kedfem("run", arm)
+    assert said.code == DEFECT
+    assert "internal error: RuntimeError: [/broken] inside" in said.err
+    assert "This is a defect of kedfem" in said.err
+
+
+def test_too_little_memory_is_said(run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("kedfem.analysis.analyse", failing)
+    said = run_kedfem("run", arm)
+    assert said.code == USER_ERROR
+    assert "must fit in memory" in said.err
+
+
+def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
+    run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_kedfem("run", arm)
+    file = arm.with_name("arm-results") / "results.h5"
+    before = file.read_bytes()
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("kedfem.analysis.prepared", interrupted)
+    said = run_kedfem("run", arm)
+    assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, "interrupted; nothing was written")
+    assert file.read_bytes() == before
+
+
+def test_ctrl_c_leaves_what_was_computed(arm: Path) -> None:
+    arm.write_text(ARM.replace("TURNS", "10000"), encoding="utf-8")
+    folder = arm.with_name("arm-results")
+    running = process(MAIN, "run", arm.name, folder=arm.parent)
+    try:
+        wait_for(
+            lambda: (folder / "animation_0050.vtu").exists() and (folder / "results.h5").exists(), running
+        )
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == INTERRUPTED
+    said = "interrupted; what was computed is readable in arm-results/results.h5 (status: interrupted)"
+    assert err.splitlines()[-1] == said
+    assert "Traceback" not in out + err
+    results = read_results(folder / "results.h5")
+    assert results.status == "interrupted"
+    assert len(results.time) > 256
+    expect_whole_animation(folder, results)
+
+
+def wait_for(condition: Callable[[], bool], running: "subprocess.Popen[str]") -> None:
+    """Until something is so, while a process runs."""
+    end = time.monotonic() + 60
+    while not condition():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def expect_whole_animation(folder: Path, results: Results) -> None:
+    """Every frame that is listed is there, none half-written, none beyond the rows; one may not be listed yet."""
+    listed = re.findall(r'timestep="([^"]*)".*file="([^"]*)"', (folder / "animation.pvd").read_text())
+    there = {path.name for path in folder.glob("*.vtu")}
+    assert {name for _, name in listed} <= there
+    assert len(there) - len(listed) in (0, 1)
+    assert all((folder / name).read_bytes().rstrip().endswith(b"</VTKFile>") for name in there)
+    assert float(listed[-1][0]) <= results.time[-1] + 1e-9
+    assert not [path.name for path in folder.iterdir() if ".part" in path.name]
