@@ -17,13 +17,13 @@ from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
-from kedfem.output.plots import write_plots
+from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
 from kedfem.results.recording import Recorded, recording, rows
 from kedfem.scene import Scene, time_grid, turn_steps
 
-STEM = "animation"
+STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 SMALL_DEFLECTION = (
     0.01  # of a link's length: above, the linear equation is off by several percent (docs/theory.md)
 )
@@ -175,7 +175,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:
-        table = _Table(writer, channels)
+        table = _Table(writer, channels, folder)
         if not wanted:
             remove_animation(folder, STEM)
         try:
@@ -191,10 +191,11 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
 
 @dataclass
 class _Table:
-    """Rows that wait for the results file."""
+    """Rows that wait for the results file; with the first of them an earlier run's pictures and table go."""
 
     writer: ResultsWriter
     channels: list[Channel]
+    folder: FilePath
     when: list[tuple[float, float]] = field(default_factory=list)
     values: list[dict[str, Float[np.ndarray, " c"]]] = field(default_factory=list)
 
@@ -211,7 +212,17 @@ class _Table:
             time, angle = np.array(self.when).T
             block = {c.name: np.array([row[c.name] for row in self.values]) for c in self.channels}
             self.when, self.values = [], []
+            first = self.writer.rows == 0
             self.writer.append(time, angle, block)
+            if first:
+                _remove_derived(self.folder)
+
+
+def _remove_derived(folder: FilePath) -> None:
+    """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
+    for name in (TABLE, PICTURE):
+        (folder / name).unlink(missing_ok=True)
+    remove_plots(folder / PLOTS)
 
 
 def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: AnimationWriter, snapshot: Snapshot,
@@ -241,16 +252,17 @@ def _deflection(u: Float[np.ndarray, "n 3"], X: Float[np.ndarray, "n 3"]) -> flo
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:
     """Table, plots and picture; a picture that cannot be drawn is a warning."""
     if scene.output.csv:
-        write_csv(results, folder / "results.csv")
+        write_csv(results, folder / TABLE)
     if scene.output.plots:
-        write_plots(results, folder / "plots")
-    picture = folder / "worst.png"
-    picture.unlink(missing_ok=True)
+        write_plots(results, folder / PLOTS)
     if not (scene.output.picture and peak):
         return ()
     title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s, drive {np.degrees(peak.angle):.1f}°"
+    animation = scene.output.animation
+    if animation and animation.exaggeration != 1.0:
+        title += f", deformation × {animation.exaggeration:g}"
     try:
-        write_picture(peak.frame, picture, title)
+        write_picture(peak.frame, folder / PICTURE, title)
     except OutputError as err:
         return (str(err),)
     return ()

@@ -326,6 +326,22 @@ def test_ctrl_c_leaves_what_was_computed(arm: Path) -> None:
     expect_whole_animation(folder, results)
 
 
+def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
+    run_kedfem: Command, arm: Path
+) -> None:
+    text = arm.read_text(encoding="utf-8")
+    arm.write_text(text.replace("plots = false", "plots = true\ncsv = true"), encoding="utf-8")
+    folder = arm.with_name(f"{arm.stem}-results")
+    assert run_kedfem("run", arm).code == 0
+    assert (folder / "results.csv").exists()
+    assert list((folder / "plots").glob("*.png"))
+    arm.write_text(
+        text.replace("animation = { frames_per_turn = 36 }", "animation = false"), encoding="utf-8"
+    )
+    assert run_kedfem("run", arm).code == 0
+    assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == ["results.h5"]
+
+
 def wait_for(condition: Callable[[], bool], running: "subprocess.Popen[str]") -> None:
     """Until something is so, while a process runs."""
     end = time.monotonic() + 60

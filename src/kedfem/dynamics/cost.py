@@ -10,7 +10,10 @@ from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
 FACTOR_FLOPS, SOLVE_BYTES, FACTOR_BYTES = 1.0e4, 45.0, 22.0  # times N^1.5
-LINK_BYTES, ASSEMBLY_BYTES = 5e3, 1.5e4  # times N: kept for each link; for one link at a time while it is assembled
+LINK_BYTES, ASSEMBLY_BYTES = (
+    5e3,
+    1.5e4,
+)  # times N: kept for each link; for one link at a time while it is assembled
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 

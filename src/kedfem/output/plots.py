@@ -56,7 +56,7 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
     OutputError
         The folder or a file cannot be written.
     """
-    _remove_stale(ready_folder(Path(folder)))
+    remove_plots(ready_folder(Path(folder)))
     if not len(results.time):
         return []
     along = abscissa(results.time, results.angle)
@@ -195,8 +195,8 @@ def _saved(path: Path, title: str) -> Iterator[Any]:
         figure.savefig(part, format="png", metadata={"Software": MARK})
 
 
-def _remove_stale(folder: Path) -> None:
-    """Delete the plots that this room wrote earlier, and nothing else."""
+def remove_plots(folder: Path) -> None:
+    """Delete the plots that kedfem wrote into a folder earlier, and nothing else."""
     from PIL import Image, UnidentifiedImageError
 
     for path in folder.glob("*.png"):
