@@ -1,7 +1,7 @@
 """The whole job: a scene in; time series, animation, plots and a picture out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from time import perf_counter
 from typing import TypeVar
@@ -15,7 +15,7 @@ from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
-from kedfem.output.frames import link_fields
+from kedfem.output.frames import link_fields, translation
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
@@ -46,18 +46,13 @@ class Prepared:
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """The highest von Mises stress of all animation frames [Pa]: where and when; the frame's file.
-
-    deflection : the largest deflection of a link in any frame, of the link's size [-]
-    """
+    """The highest von Mises stress of all animation frames [Pa]: where and when; the frame's file."""
 
     stress: float
     link: str
-    at: tuple[float, float, float]
     time: float
     angle: float
     frame: FilePath
-    deflection: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +85,12 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
-    peak = clock.timed("steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch))
+    peak, deflection = clock.timed(
+        "steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch)
+    )
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
-    warnings = (*deflection_warning(peak), *warnings)
+    warnings = (*deflection_warning(deflection), *warnings)
     return Run(folder, results, peak, clock.seconds, warnings)
 
 
@@ -149,12 +146,12 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
 
 
-def deflection_warning(peak: Peak | None) -> tuple[str, ...]:
+def deflection_warning(deflection: float) -> tuple[str, ...]:
     """A warning where links bend so much that the linear equation with nominal frames is far from the truth."""
-    if peak is None or peak.deflection < SMALL_DEFLECTION:
+    if deflection < SMALL_DEFLECTION:
         return ()
     return (
-        f"links deflect by up to {100 * peak.deflection:.2g} % of their length; equation (20) takes that as small: "
+        f"links deflect by up to {100 * deflection:.2g} % of their length; equation (20) takes that as small: "
         f"expect the results to be trustworthy below {100 * SMALL_DEFLECTION:.0f} % only",
     )
 
@@ -164,12 +161,13 @@ def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
 
 
 def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
-             folder: FilePath, watch: Watch) -> Peak | None:  # fmt: skip
-    """All time steps: rows to the results file, frames to the animation."""
+             folder: FilePath, watch: Watch) -> tuple[Peak | None, float]:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation; also the largest deflection of a link."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
+    deflection = 0.0
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     with ResultsWriter(
@@ -181,12 +179,13 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
         try:
             for snapshot in transient(scene, ready.linkage, ready.path, model, solver):
                 table.add(snapshot, rows(recorded, snapshot))
+                deflection = max(deflection, _deflection(model, snapshot))
                 if snapshot.step in wanted:
                     peak = _framed(ready, recoveries, frames, snapshot, peak)
                 watch("steps", snapshot.step, steps)
         finally:
             table.flush()
-    return peak
+    return peak, deflection
 
 
 @dataclass
@@ -234,19 +233,17 @@ def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: Animation
     highest = max(fields, key=lambda f: float(f.von_mises.max()))
     node = int(highest.von_mises.argmax())
     stress = float(highest.von_mises[node])
-    deflection = max(
-        _deflection(f.displacement, link.X) for f, link in zip(fields, ready.model.links, strict=True)
-    )
     if peak is not None and stress <= peak.stress:
-        return replace(peak, deflection=max(peak.deflection, deflection))
-    x, y, z = (float(v) for v in highest.points[node])
-    before = peak.deflection if peak else 0.0
-    return Peak(stress, highest.name, (x, y, z), snapshot.t, snapshot.phi, file, max(before, deflection))
+        return peak
+    return Peak(stress, highest.name, snapshot.t, snapshot.phi, file)
 
 
-def _deflection(u: Float[np.ndarray, "n 3"], X: Float[np.ndarray, "n 3"]) -> float:
-    """Largest displacement of a link, of its size."""
-    return float(np.linalg.norm(u, axis=1).max() / np.ptp(X, axis=0).max())
+def _deflection(model: Model, snapshot: Snapshot) -> float:
+    """Largest component of the displacement of any link, of the link's size [-]."""
+    return max(
+        float(np.abs(translation(link, state.u)).max() / np.ptp(link.X, axis=0).max())
+        for link, state in zip(model.links, snapshot.states, strict=True)
+    )
 
 
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:

@@ -161,9 +161,10 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 
 def _interrupted(file: Path, begun: bool) -> NoReturn:
-    kept = (
-        f"what was computed is readable in {file} (status: interrupted)" if begun else "nothing was written"
-    )
+    from kedfem.results import read_results
+
+    status = read_results(file).status if begun else ""
+    kept = f"what was computed is readable in {file} (status: {status})" if begun else "nothing was written"
     err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
     raise typer.Exit(INTERRUPTED)
 

@@ -110,7 +110,7 @@ def _cost(ready: Prepared, cost: Cost) -> Table:
     table = Table(title="Cost (estimated)", show_header=False)
     table.add_row("steps", f"{grid.steps} of {grid.step:.4g} s")
     table.add_row("solver", ready.scene.analysis.solver)
-    table.add_row("time", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s")
+    table.add_row("time (condensed)", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s")
     table.add_row("memory", with_prefix(cost.memory, "B"))
     table.add_row(
         "animation frames",

@@ -137,3 +137,14 @@ def test_matrix_that_is_not_positive_definite() -> None:
         SolveError, match=r"^links.arm: effective matrix must be positive definite, got a pivot ≤ 0"
     ):
         Cholesky(sp.csr_array(np.diag([1.0, -1.0])), "links.arm")
+
+
+@pytest.mark.parametrize("at", [[1, 0.5], [1, 1], [0.5, 0], [0.99, 0.3]])
+def test_a_probe_on_any_leg_of_a_bent_beam(at: list[float]) -> None:
+    raw = arm("beam")
+    raw["links"]["arm"]["shape"] = {
+        "kind": "polyline", "points": [[0, 0], [1, 0], [1, 1]], "width": 0.04, "thickness": 0.02,
+    }  # fmt: skip
+    raw["output"] = {"probes": {"p": {"link": "arm", "at": at, "quantity": "stress"}}}
+    scene = scene_from(raw)
+    assert recording(scene, elastic_model(scene, linkage(scene)))[0].channel.name == "probes/p/stress"

@@ -219,3 +219,44 @@ def test_changing_the_raw_scene_does_not_change_the_next_run() -> None:
     before = deepcopy(raw)
     run(raw)
     assert raw == before
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.8, 0.4])
+def test_recorded_torque_is_of_the_steps_end_and_of_order_two(rho_inf: float) -> None:
+    """A stiff arm swung by a smooth law: twice the steps, a quarter of the torque's error, whatever ρ∞."""
+    raw = spinning_beam()
+    raw["damping"] = {"beta": 2e-4}
+    raw["drive"]["motion"] = {"kind": "polynomial", "order": 7, "angle": 1, "rise": 0.1}
+    errors = []
+    reference = torque_of(raw, 3200, 1.0)
+    for steps in (200, 400):
+        errors.append(np.abs(torque_of(raw, steps, rho_inf) - reference[:: 3200 // steps]).max())
+    assert errors[0] < 0.02 * np.abs(reference).max()
+    assert 3.3 < errors[0] / errors[1] < 4.8
+
+
+def torque_of(raw: dict[str, Any], steps: int, rho_inf: float) -> np.ndarray:
+    """The hub's moment over time."""
+    raw["analysis"] = {"end_time": 0.1, "step": 0.1 / steps, "rho_inf": rho_inf, "initial": "quasi-static"}
+    _, _, snapshots = run(raw)
+    return np.array([x.states[0].port_forces[2] for x in snapshots])
+
+
+def test_a_force_on_a_slider_never_turns() -> None:
+    forces = []
+    for frame in ("world", "link"):
+        raw = slider_crank("rigid")
+        raw["loads"] = {
+            "push": {"kind": "force", "link": "piston", "at": "C", "vector": [-100, 0], "frame": frame}
+        }
+        _, _, snapshots = run(raw)
+        forces.append(np.array([x.states[1].port_forces for x in snapshots]))
+    assert_allclose(forces[1], forces[0], rtol=0, atol=1e-12 * np.abs(forces[0]).max())
+
+
+def test_one_step_of_a_table_that_ends_with_it() -> None:
+    raw = spinning_beam()
+    raw["drive"]["motion"] = {"kind": "table", "time": [0, 0.03, 0.06, 0.1], "angle": [0, 0.1, 0.4, 1]}
+    for initial in ("rest", "quasi-static"):
+        raw["analysis"] = {"end_time": 0.1, "step": 0.1, "initial": initial}
+        assert len(run(raw)[2]) == 2

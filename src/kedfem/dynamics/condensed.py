@@ -15,6 +15,7 @@ from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
+from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
 ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
@@ -110,7 +111,10 @@ def coupled(
         # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
         H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
         f = np.sum([b.T @ (part.S @ x) for part, b, x in zip(parts, RB, v, strict=True)], axis=0)
-        z = scipy.linalg.solve(H, f, assume_a="pos", check_finite=False)
+        try:
+            z = scipy.linalg.solve(H, f, assume_a="pos", check_finite=False)
+        except np.linalg.LinAlgError as error:
+            raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
     forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
     g = [x + (part.Y @ force).reshape(-1, 3) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
@@ -197,7 +201,24 @@ class CondensedSteps:
             Cg += self.damping.beta * Kg
             C = np.stack([Cg, *accelerated(scheme, Cg, *s.C)])
             f = Kg + C[1]
-        return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, port_force)
+        end_force = end_forces(scheme, self.parts[k].attachment, s, at.R, port_force)
+        return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, end_force)
+
+
+def end_forces(
+    scheme: Scheme, joint: Attachment, s: LinkState, R: Rotation, force: Float[np.ndarray, " q"]
+) -> Float[np.ndarray, " q"]:
+    """λ at the end of a step from the λ of its balance, (1 − α_f) λ1 + α_f λ0, all in the link frame at the end.
+
+    Parameters
+    ----------
+    s : state at the beginning
+    R : orientation at the end
+    """
+    if not scheme.alpha_f:
+        return force
+    before = port_rotation(joint, R.T @ s.R) @ s.port_forces
+    return np.asarray((force - scheme.alpha_f * before) / (1 - scheme.alpha_f))
 
 
 def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray, " q"]) -> None:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Rotation, port_columns
+from kedfem.dynamics.condensed import Rotation, end_forces, port_columns
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
@@ -124,7 +124,7 @@ class LiteralSteps:
             Cg = self.damping.alpha * Mu @ at.R + self.damping.beta * Kg
             C = np.stack([Cg, *accelerated(self.scheme, Cg, *s.C)])
             f = Kg + C[1]
-        port_forces = self._port_forces(k, A, u, rhs, at.R)
+        port_forces = end_forces(self.scheme, self.joints[k], s, at.R, self._port_forces(k, A, u, rhs, at.R))
         return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, port_forces)
 
     def _port_forces(

@@ -49,10 +49,8 @@ def patterns(scene: Scene, name: str, link: Link) -> tuple[Pattern, ...]:
 
 
 def slider_pattern(load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
-    """A concentrated force through given weights."""
-    return Pattern(
-        np.outer(weights, load.vector), load.frame == "link", lambda t: load_factor(load.factor, t)
-    )
+    """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
+    return Pattern(np.outer(weights, load.vector), False, lambda t: load_factor(load.factor, t))
 
 
 def _pattern(where: str, load: Load, link: Link) -> Pattern:

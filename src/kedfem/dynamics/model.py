@@ -99,10 +99,13 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
 
 def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     at = np.asarray(body.at)
-    hinges = (
-        unit(j.axis) for j in scene.joints.values() if j.axis and np.allclose(j.at, at, rtol=0, atol=1e-9)
+    near = 1e-6 * float(np.ptp(link.X, axis=0).max())
+    here = (
+        j
+        for j in scene.joints.values()
+        if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
     )
-    axis = next(hinges, None)
+    axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     seat = joint_seat(link, f"{where}.at", at, axis)
     match body:
         case Flywheel(mass=mass, inertia=inertia):

@@ -102,12 +102,14 @@ def first_states(
     scene: Scene, linkage: Linkage, along: Path, law: MotionLaw, model: Model
 ) -> list[LinkState]:
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
-    h = time_grid(scene).step
-    t = h * np.arange(3)
+    at_rest = scene.analysis.initial == "rest"
+    grid = time_grid(scene)
+    h = min(grid.step, grid.end / 2)
+    t = h * np.arange(1 if at_rest else 3)
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
     factors = load_factors(model, t)
-    instants = [instant(model, factors, motion, k) for k in range(3)]
-    if scene.analysis.initial == "rest":
+    instants = [instant(model, factors, motion, k) for k in range(len(t))]
+    if at_rest:
         start = [Deflected(*(np.zeros((link.n, 3)) for _ in range(3))) for link in model.links]
         return initial_states(model.links, model.joints, instants[0].at, model.damping, start)
     u = quasi_static(model.links, model.joints, instants)
@@ -127,9 +129,9 @@ def instant(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: Rigid
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:
-    """Least and greatest drive angle of the analysis, with room for the start's differences [rad]."""
+    """Least and greatest drive angle of the analysis [rad]."""
     grid = time_grid(scene)
-    t = grid.step * np.arange(max(grid.steps, 2) + 1)
+    t = grid.step * np.arange(grid.steps + 1)
     phi = drive_angle(scene.drive.motion, t)[0]
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 

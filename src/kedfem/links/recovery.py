@@ -205,12 +205,12 @@ def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, "3"]) 
 def _beam_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
     if link.section is None:
         raise SceneError(f"{where}: link '{link.name}' has no section")
-    best: tuple[float, int, float, float] = (np.inf, 0, 0.0, 0.0)
+    half = link.section.height / 2
+    found = []
     for e, cell in enumerate(link.cells):
         r, offset, gap = _beam_coordinates(link.X[cell][:, :2], point[:2])
-        best = min(best, (gap, e, r, offset))
-    gap, e, r, offset = best
-    beyond = max(abs(offset) - link.section.height / 2, gap)
+        found.append((float(np.hypot(gap, max(0.0, abs(offset) - half))), abs(offset), e, r, offset))
+    beyond, _, e, r, offset = min(found)
     if beyond > POINT_TOLERANCE * np.ptp(link.X, axis=0).max():
         raise SceneError(_outside(link, where, point, beyond))
     value = np.zeros(link.n)

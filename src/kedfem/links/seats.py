@@ -146,11 +146,9 @@ def _surface_at(
         bore = cylinder(link, point, axis)
         if len(bore):
             return bore
-    else:
-        ball = sphere(link, point)
-        if len(ball):
-            return ball
-    return flat_face(link, point)
+        return flat_face(link, point)
+    found = (sphere(link, point), *(cylinder(link, point, a) for a in link.axes.T), flat_face(link, point))
+    return next((facets for facets in found if len(facets)), found[0])
 
 
 def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.links.record import Link
 
 CYLINDER_TOLERANCE = 1e-3  # of the radius, between the corner nodes of one bore
 PLANE_TOLERANCE = 1e-6  # of the link's size
+FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
 SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved face
 
 
@@ -98,19 +99,26 @@ def cylinder(
     same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
     centre = r[same].mean(axis=(0, 1))
     closed = np.linalg.norm(centre) < 0.3 * mean[same].min()  # facets all round, not on one side only
-    return facets[same] if closed else facets[:0]
+    along = (corners[same] - point) @ axis
+    away = max(0.0, float(along.min()), -float(along.max()))
+    near = away <= FAR * (np.ptp(along) + mean[same].min())
+    return facets[same] if closed and near else facets[:0]
 
 
 def sphere(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest sphere about the point."""
-    facets, corners, _ = boundary(link)
+    """Facets of the smallest ball or ball seat about the point."""
+    facets, corners, normals = boundary(link)
     radius = np.linalg.norm(corners - point, axis=2)
     mean = radius.mean(axis=1)
     round_ = np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean
-    if round_.sum() < 6:  # a few facets may be equidistant by chance
+    if not round_.any():
         return facets[:0]
     same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
-    return facets[same] if same.sum() >= 6 else facets[:0]
+    if same.sum() < 12:  # a few facets may be equidistant by chance
+        return facets[:0]
+    # a cylinder's facets at one height are equidistant too, but their normals lie in a plane
+    spread = np.linalg.eigvalsh(normals[same].T @ normals[same] / same.sum())
+    return facets[same] if spread[0] > 0.05 else facets[:0]
 
 
 def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
@@ -124,8 +132,10 @@ def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"
     near = touching & (np.linalg.norm(centre - point, axis=1) <= 1.01 * reach)
     if not near.any():
         return facets[:0]
-    normal = normals[near][np.linalg.norm(centre[near] - point, axis=1).argmin()]
-    return np.asarray(facets[touching & (normals @ normal > 1 - 1e-6)])
+    seed = np.flatnonzero(near)[np.linalg.norm(centre[near] - point, axis=1).argmin()]
+    plane = touching & (normals @ normals[seed] > 1 - 1e-6)
+    first, second = neighbours(link, facets)
+    return np.asarray(facets[connected(seed, first, second, plane[first] & plane[second], len(facets))])
 
 
 def smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
@@ -137,13 +147,31 @@ def smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " 
     near = np.flatnonzero((np.linalg.norm(centre - point, axis=1) <= 1.05 * reach) & (height <= 0.15 * reach))
     if not len(near):
         return facets[:0]
-    # facets are neighbours if they share an edge, two of their corner nodes
-    numbers = np.sort(link.basis.mesh.facets[:, facets].T, axis=1)
-    shared = sp.csr_array((np.ones(numbers.size), numbers.ravel(), 4 * np.arange(len(facets) + 1)))
-    common = sp.coo_array(shared @ shared.T)
-    first, second = (index[common.data == 2] for index in common.coords)
+    first, second = neighbours(link, facets)
     smooth = np.einsum("ek,ek->e", normals[first], normals[second]) > SMOOTH
-    joined = sp.csr_array((np.ones(smooth.sum()), (first[smooth], second[smooth])), shape=(len(facets),) * 2)
-    face = connected_components(joined, directed=False)[1]
-    seed = near[height[near].argmin()]
-    return np.asarray(facets[face == face[seed]])
+    return np.asarray(facets[connected(int(near[height[near].argmin()]), first, second, smooth, len(facets))])
+
+
+def neighbours(
+    link: Link, facets: Int[np.ndarray, " f"]
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """Pairs of facets (their positions in the list) that share an edge, two of their corner nodes."""
+    numbers = np.sort(link.basis.mesh.facets[:, facets].T, axis=1)
+    corners = sp.csr_array((np.ones(numbers.size), numbers.ravel(), 4 * np.arange(len(facets) + 1)))
+    common = sp.coo_array(corners @ corners.T)
+    first, second = (index[common.data == 2] for index in common.coords)
+    return first, second
+
+
+def connected(
+    seed: int,
+    first: Int[np.ndarray, " k"],
+    second: Int[np.ndarray, " k"],
+    joined: Bool[np.ndarray, " k"],
+    size: int,
+) -> Bool[np.ndarray, " f"]:
+    """Which facets can be reached from one of them over the pairs that are joined."""
+    ones = np.ones(np.count_nonzero(joined))
+    graph = sp.csr_array((ones, (first[joined], second[joined])), shape=(size, size))
+    component = connected_components(graph, directed=False)[1]
+    return np.asarray(component == component[seed])

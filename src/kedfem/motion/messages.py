@@ -21,7 +21,7 @@ def stopped(link: Linkage, poses: Poses, phi: float) -> str:
     joint = link.joints[int(np.where(driven, 0, stress).argmax())]
     at = f"at drive angle {np.degrees(phi):.2f} deg"
     if s[-1] > NEAR_SINGULAR * s[0]:
-        apart = "its redundant joints no longer fit together {} (is an axis askew?)"
+        apart = "its redundant joints no longer fit together {} (is an axis askew, or one joint too many?)"
         got = apart.format(at) if link.redundant else f"it cannot be assembled any further {at}"
     elif stress[link.rows.driven].max() > IDLE:
         got = f"it locks (dead point) {at}"

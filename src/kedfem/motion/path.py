@@ -58,10 +58,26 @@ def path(link: Linkage, low: float, high: float) -> Path:
     start = (np.tile(np.eye(3), (1, len(link.bodies), 1, 1)), np.zeros((1, len(link.bodies), 3)))
     turn = 2 * np.pi
     if high > turn or low < -turn:
-        once = _branch(link, start, turn)
-        if np.abs(once[-1][1] - start[0]).max() < OPEN and np.abs(once[-1][2]).max() < OPEN * link.size:
+        once = _first_turn(link, start, turn, needed=high > turn)
+        if (
+            once
+            and np.abs(once[-1][1] - start[0]).max() < OPEN
+            and np.abs(once[-1][2]).max() < OPEN * link.size
+        ):
             return _checked(link, once, periodic=True)
     return _checked(link, _branch(link, start, low)[:0:-1] + _branch(link, start, high), periodic=False)
+
+
+def _first_turn(
+    link: Linkage, start: Poses, turn: float, needed: bool
+) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """A whole turn forwards; none if it cannot be made and is not needed, as where the drive turns backwards."""
+    try:
+        return _branch(link, start, turn)
+    except MotionError:
+        if needed:
+            raise
+        return []
 
 
 def predicted(along: Path, phi: Float[np.ndarray, " T"]) -> Poses:

@@ -211,7 +211,8 @@ def flywheel_faults(body: Entry, parts: Parts) -> Iterator[str]:
     if any(joint.record is None for joint in hinges):
         return
     turning = [joint.record.at for joint in hinges if joint.record.kind == "revolute"]
-    size = max((math.hypot(*at) for at in turning), default=0.0) + math.hypot(*body.record.at)
-    if not any(not math.dist(at, body.record.at) > 1e-6 * size for at in turning):
+    apart = [math.dist(joint.record.at, body.record.at) for joint in parts.joints.values() if joint.record]
+    near = 1e-9 + 1e-7 * max(apart, default=0.0)
+    if not any(not math.dist(at, body.record.at) > near for at in turning):
         at = ", ".join(f"{part:.6g}" for part in body.record.at)
         yield body.fault("at", f"must be the point of a revolute joint of links.{link_name} [m], got ({at})")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import combinations
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -15,8 +15,8 @@ from kedfem.scene.units import Length, PositiveLength, Quantity, fault
 
 
 def different(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
-    """Points of which each differs from the one before."""
-    for P, Q in pairwise(points):
+    """Points that all differ."""
+    for P, Q in combinations(points, 2):
         if math.dist(P, Q) == 0.0:
             raise fault(f"must be different points, got ({P[0]:.6g}, {P[1]:.6g}, {P[2]:.6g}) twice")
     return points

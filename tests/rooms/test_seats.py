@@ -1,0 +1,86 @@
+"""Which surface a joint, body or load finds on a link."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.dynamics.model import elastic_model
+from kedfem.errors import KedfemError
+from kedfem.links.build import bare_links
+from kedfem.links.seats import face_seat, joint_seat
+from kedfem.motion.linkage import linkage
+from kedfem.scene import scene_from
+
+from .test_dynamics import slider_crank
+
+
+def link_of(shape: dict[str, Any], **mesh: Any) -> Any:
+    """A single driven link of a shape, meshed."""
+    raw = {
+        "links": {"part": {"material": "steel", "shape": shape, "mesh": mesh}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
+        "analysis": {"turns": 1},
+    }
+    return bare_links(scene_from(raw))["part"]
+
+
+PLATE = {
+    "kind": "plate_link",
+    "between": [[0, 0], [0.2, 0]],
+    "width": 0.03,
+    "thickness": 0.02,
+    "bore_diameter": 0.01,
+}
+
+
+@pytest.mark.parametrize("layers", [1, 2, 3])
+def test_a_bore_is_found_whole_with_or_without_an_axis(layers: int) -> None:
+    link = link_of(PLATE, elements_across=1, layers=layers)
+    with_axis = joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+    without = joint_seat(link, "joints.A", np.zeros(3), None)
+    assert set(without.facets) == set(with_axis.facets)
+    assert_allclose(with_axis.origin, 0, atol=1e-7)  # the middle of the bore; a quadratic circle is off by 1e-5
+    assert_allclose(with_axis.spread.max(), 0.02 / np.sqrt(12), rtol=1e-6)  # uniform over its length
+
+
+def test_a_bore_far_along_its_axis_is_not_the_joints() -> None:
+    link = link_of(PLATE | {"offset": 0.5}, elements_across=1)
+    with pytest.raises(
+        KedfemError, match=r"^joints.A: must sit on a bore or a flat face of link 'part' at \(0, 0, 0\)"
+    ):
+        joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+
+
+def test_a_flat_seat_is_one_face_not_all_in_its_plane() -> None:
+    """A U with two feet in one plane: the joint's foot alone carries it."""
+    u = [[0, 0], [0.02, 0], [0.02, 0.08], [0.08, 0.08], [0.08, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
+    link = link_of({"kind": "extrusion", "thickness": 0.02, "outline": u}, size=0.02)
+    seat = face_seat(link, "loads.push.at", np.array([0.01, 0, 0]))
+    assert_allclose(seat.origin, [0.01, 0, 0], atol=1e-9)
+
+
+def test_the_middle_of_a_block_is_no_ball_seat() -> None:
+    block = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
+    link = link_of({"kind": "extrusion", "thickness": 0.1, "outline": block}, size=0.1)
+    with pytest.raises(KedfemError, match="must sit on"):
+        joint_seat(link, "joints.A", np.array([0.05, 0.05, 0]), None)
+
+
+def test_a_body_is_carried_by_its_own_links_hinge() -> None:
+    """A guide at the same point, declared first and of another link, does not lend the body its axis."""
+    raw = slider_crank("rigid")
+    plate = {"kind": "plate_link", "width": 0.02, "thickness": 0.02, "bore_diameter": 0.01}
+    for name, ends in (("crank", ["A", "B"]), ("rod", ["B", "C"])):
+        raw["links"][name] = {
+            "material": "steel",
+            "shape": {**plate, "between": ends},
+            "mesh": {"elements_across": 1},
+        }
+    raw["joints"] = {"guide": raw["joints"].pop("guide"), **raw["joints"]}
+    raw["bodies"] = {"lump": {"kind": "point_mass", "link": "rod", "at": "C", "mass": 0.5}}
+    scene = scene_from(raw)
+    model = elastic_model(scene, linkage(scene))
+    assert {link.name for link in model.links} == {"crank", "rod"}
