@@ -55,7 +55,7 @@ class ForceLoad(Record):
     vector: ForceVector
     """the force"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: turns with the link"""
+    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
     factor: FactorOverTime = ONE
     """a number, or `{ time = [...], value = [...] }`: linear between, held outside"""
 
@@ -69,7 +69,7 @@ class BodyLoad(Record):
     vector: BodyVector
     """the force per volume"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: turns with the link"""
+    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
     factor: FactorOverTime = ONE
     """a number, or `{ time = [...], value = [...] }`: linear between, held outside"""
 
@@ -85,7 +85,7 @@ class SurfaceLoad(Record):
     vector: SurfaceVector
     """the force per area"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: turns with the link"""
+    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
     factor: FactorOverTime = ONE
     """a number, or `{ time = [...], value = [...] }`: linear between, held outside"""
 
