@@ -87,6 +87,14 @@ def test_force_beside_a_beams_axis() -> None:
     assert fault(raw) == "loads.push.at: must lie on the axis of beam 'arm', got 0.01 m beside it"
 
 
+def test_displacement_beside_a_beams_axis() -> None:
+    raw = arm("beam")
+    raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.01], "quantity": "velocity"}}}
+    assert fault(raw) == (
+        "output.probes.tip.at: must lie on the axis of beam 'arm' for a velocity, got 0.01 m beside it"
+    )
+
+
 def test_surface_force_on_no_face() -> None:
     raw = arm()
     raw["loads"] = {"push": {"kind": "surface", "link": "arm", "at": [0.25, 0], "vector": [0, 1]}}

@@ -42,7 +42,9 @@ def test_a_bore_is_found_whole_with_or_without_an_axis(layers: int) -> None:
     with_axis = joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
     without = joint_seat(link, "joints.A", np.zeros(3), None)
     assert set(without.facets) == set(with_axis.facets)
-    assert_allclose(with_axis.origin, 0, atol=1e-7)  # the middle of the bore; a quadratic circle is off by 1e-5
+    assert_allclose(
+        with_axis.origin, 0, atol=1e-7
+    )  # the middle of the bore; a quadratic circle is off by 1e-5
     assert_allclose(with_axis.spread.max(), 0.02 / np.sqrt(12), rtol=1e-6)  # uniform over its length
 
 

@@ -3,10 +3,12 @@
 Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+import scipy.linalg
+from jaxtyping import Bool, Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
@@ -14,6 +16,8 @@ from kedfem.links.seats import Seat, holds, joint_seat, port_weights
 from kedfem.motion.linkage import GROUND, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
+
+DEPENDENT = 1e-9  # relative: ports of one seat repeat each other to rounding, others differ by far more
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +27,11 @@ class Attachment:
     nodes, weights : (b,) and (p, b): scalar port weights W of the nodes that carry any
     points : (p, 3) port points, reference position [m]
     joints : (p,) name of each port's joint
-    keep : (q,) which of the flattened (p, 3) components are held; closed under the link's rotation
+    keep : (q,) which of the flattened (p, 3) components are held; closed under the link's rotation; independent:
+        what other ports of the link imply is left out
     B : (q, k) held components, in world axes, from the interface unknowns z
+    shares : per link j (3p, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
+    loose : (3p, r) port forces of this link, world axes, that no λ tells: statically indeterminate
     """
 
     nodes: Int[np.ndarray, " b"]
@@ -33,6 +40,8 @@ class Attachment:
     joints: tuple[str, ...]
     keep: Int[np.ndarray, " q"]
     B: Float[np.ndarray, "q k"]
+    shares: tuple[Float[np.ndarray, "m _"], ...] = ()
+    loose: Float[np.ndarray, "m r"] = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass
@@ -102,7 +111,90 @@ def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
                 weights = port_weights(seats[link], point[None, :])[0]
                 ports[link].add(weights, point, name, components, first, block)
             unknowns += new
-    return {name: ports[name].attachment(links[name], unknowns) for name in links}
+    every = [ports[name].attachment(links[name], unknowns) for name in links]
+    return dict(zip(links, independent(every), strict=True))
+
+
+def independent(every: Sequence[Attachment]) -> list[Attachment]:
+    """Joints on one seat repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
+
+    With all rows W = L W_r of the independent ones W_r, (B − L B_r) z = 0. An orthonormal basis Z of these z makes
+    B_r Z the new B. L is scalar, so it commutes with the link's rotation.
+    """
+    relations = [_relation(each) for each in every]
+    B = np.vstack([each.B for each in every])
+    shares, loose = np.eye(len(B)), np.zeros((len(B), 0))
+    Z = np.eye(B.shape[1])
+    if not all(kept.all() for kept, _ in relations):
+        L = scipy.linalg.block_diag(*(L for _, L in relations))
+        kept = np.concatenate([kept for kept, _ in relations])
+        Z = _null_space(B - L @ B[kept])
+        shares, loose = _port_forces(L, B)
+    ends = np.cumsum([len(each.keep) for each in every])[:-1]
+    columns = np.cumsum([kept.sum() for kept, _ in relations])[:-1]
+    return [
+        replace(
+            each, keep=each.keep[kept], B=each.B[kept] @ Z, loose=_placed(each, theirs),
+            shares=tuple(_placed(each, x) for x in np.split(share, columns, axis=1)),
+        )
+        for each, (kept, _), share, theirs in zip(
+            every, relations, np.split(shares, ends), np.split(loose, ends), strict=True
+        )
+    ]  # fmt: skip
+
+
+def _relation(each: Attachment) -> tuple[Bool[np.ndarray, " h"], Float[np.ndarray, "h q"]]:
+    """Which held components are independent, and L: all from those."""
+    port, component = np.divmod(each.keep, 3)
+    kept, L = np.zeros(len(port), bool), np.zeros((len(port), len(port)))
+    for c in range(3):
+        at = np.flatnonzero(component == c)
+        if len(at):
+            # u, v(, w) are held by the same ports, so the choice is the same for them
+            chosen, coefficients = _independent_rows(each.weights[port[at]])
+            kept[at[chosen]] = True
+            L[np.ix_(at, at[chosen])] = coefficients
+    return kept, L[:, kept]
+
+
+def _independent_rows(W: Float[np.ndarray, "p b"]) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "p r"]]:
+    """Independent rows of W and the coefficients of all rows in them, by rank-revealing QR."""
+    R, order = scipy.linalg.qr(W.T, mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    r = int((size > DEPENDENT * size[0]).sum())
+    coefficients = np.zeros((len(W), r))
+    coefficients[order[:r]] = np.eye(r)
+    coefficients[order[r:]] = scipy.linalg.solve_triangular(R[:r, :r], R[:r, r:]).T
+    in_order = np.argsort(order[:r])
+    return order[:r][in_order], coefficients[:, in_order]
+
+
+def _port_forces(
+    L: Float[np.ndarray, "h q"], B: Float[np.ndarray, "h k"]
+) -> tuple[Float[np.ndarray, "h q"], Float[np.ndarray, "h r"]]:
+    """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = 0.
+
+    Returns
+    -------
+    (h, q) μ from λ, and (h, r) the μ that neither equation sees
+    """
+    G = np.vstack([L.T, B.T])
+    shares = np.linalg.pinv(G, rcond=DEPENDENT)[:, : L.shape[1]]
+    shares[np.abs(shares) < DEPENDENT] = 0.0  # rounding
+    return shares, _null_space(G)
+
+
+def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:
+    """Orthonormal basis of A x = 0, A of order one."""
+    _, s, Vt = np.linalg.svd(A)
+    return np.asarray(Vt[int((s > DEPENDENT).sum()) :].T)
+
+
+def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarray, "m c"]:
+    """Rows of held components among those of all components of all ports."""
+    out = np.zeros((3 * len(each.weights), rows.shape[1]))
+    out[each.keep] = rows
+    return out
 
 
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:

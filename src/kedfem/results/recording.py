@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import port_vectors
+from kedfem.dynamics.condensed import port_rotation
+from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.loads import nominal_acceleration
 from kedfem.dynamics.model import Model, Slider
 from kedfem.dynamics.transient import Snapshot
+from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import unit
@@ -20,6 +22,7 @@ from kedfem.scene import Probe, Scene
 Row = Float[np.ndarray, " c"]
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
+INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
@@ -63,6 +66,12 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
             return np.append(s, von_mises(s[None, :]))
 
         return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
+    beside = float(np.linalg.norm(at.X - probe.at))
+    if link.kind == "beam" and beside > 1e-6 * float(np.ptp(link.X, axis=0).max()):
+        raise SceneError(
+            f"output.probes.{name}.at: must lie on the axis of beam '{link.name}' for a {probe.quantity}, "
+            f"got {beside:.3g} m beside it"
+        )
     nodes = np.flatnonzero(at.value)
     weights = at.value[nodes]
     field = {"displacement": "u", "velocity": "v", "acceleration": "a"}[probe.quantity]
@@ -82,7 +91,7 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
     """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
     if slider is not None:
-        return [_slider_force(scene, model, slider, name)]
+        return _slider_force(scene, model, slider, name)
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
@@ -94,37 +103,70 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
         f"joints/{name}/moment", XYZ, "N m", "world", f"moment {label}, about the joint's nominal point"
     )
     at = np.asarray(scene.joints[name].at)
-    return [
-        Recorded(force, lambda snapshot: _wrench(model, snapshot, k, name, at)[0]),
-        Recorded(moment, lambda snapshot: _wrench(model, snapshot, k, name, at)[1]),
-    ]
+    if not _determinate(model, k, name, at):
+        return []
+    wrench = _wrench(model, k, name, at)
+    return [Recorded(force, lambda s: wrench(s)[0]), Recorded(moment, lambda s: wrench(s)[1])]
 
 
 def _wrench(
-    model: Model, snapshot: Snapshot, k: int, joint: str, at: Float[np.ndarray, "3"]
-) -> tuple[Row, Row]:
-    """Force and moment about `at` of one joint on link k, world components, from its port forces."""
-    attachment, state = model.joints[k], snapshot.states[k]
-    here = [name == joint for name in attachment.joints]
-    f = port_vectors(attachment, state.port_forces)[here]
-    if model.links[k].kind == "beam":  # third component is a moment
-        return state.R @ (f.sum(axis=0) * forces_only(model.links[k])), f.sum(axis=0) * [0, 0, 1]
-    arms = attachment.points[here] - at
-    return state.R @ f.sum(axis=0), state.R @ np.cross(arms, f).sum(axis=0)
+    model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]
+) -> Callable[[Snapshot], tuple[Row, Row]]:
+    """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
+    attachment, link = model.joints[k], model.links[k]
+    rows = _rows_of(attachment, joint)
+    arms = attachment.points[rows[::3] // 3] - at
+    shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
+
+    def wrench(snapshot: Snapshot) -> tuple[Row, Row]:
+        f = np.zeros(len(rows))
+        for j, share in shares:
+            state = snapshot.states[j]
+            f += share @ (port_rotation(model.joints[j], state.R) @ state.port_forces)
+        return _resultant(link, arms @ snapshot.states[k].R.T, f.reshape(-1, 3))
+
+    return wrench
 
 
-def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> Recorded:
+def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> bool:
+    """Whether statics tell what the joint exerts on link k, where several joints share its seat."""
+    attachment = model.joints[k]
+    rows = _rows_of(attachment, joint)
+    arms = attachment.points[rows[::3] // 3] - at
+    unknown = [_resultant(model.links[k], arms, f.reshape(-1, 3)) for f in attachment.loose[rows].T]
+    return bool(np.abs(unknown).max(initial=0.0) < INDETERMINATE)
+
+
+def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
+    """All three components of all ports of a joint."""
+    here = np.flatnonzero([name == joint for name in attachment.joints])
+    return (3 * here[:, None] + np.arange(3)).ravel()
+
+
+def _resultant(link: Link, arms: Float[np.ndarray, "p 3"], f: Float[np.ndarray, "p 3"]) -> tuple[Row, Row]:
+    """Force and moment of port forces, all in one frame."""
+    if link.kind == "beam":  # third component is a moment
+        return f.sum(axis=0) * forces_only(link), f.sum(axis=0) * [0, 0, 1]
+    return f.sum(axis=0), np.cross(arms, f).sum(axis=0)
+
+
+def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list[Recorded]:
     """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it."""
-    others = [j for j, joint in scene.joints.items() if slider.name in joint.links and j != slider.guide]
+    pins = [name] if name != slider.guide else [
+        j for j, joint in scene.joints.items() if slider.name in joint.links and j != name
+    ]  # fmt: skip
+    zero = np.zeros(3)
+    pairs = [(k, j) for k, x in enumerate(model.joints) for j in pins if j in x.joints]
+    if not all(_determinate(model, k, j, zero) for k, j in pairs):
+        return []
+    wrenches = [_wrench(model, k, j, zero) for k, j in pairs]
     if name == slider.guide:
         description = f"force of joint {name} on slider {slider.name} from ground"
 
         def guide(snapshot: Snapshot) -> Row:
-            pairs = [(k, j) for k in range(len(model.links)) for j in others]
-            zero = np.zeros(3)
-            return np.asarray(np.sum([_wrench(model, snapshot, k, j, zero)[0] for k, j in pairs], axis=0))
+            return np.asarray(np.sum([wrench(snapshot)[0] for wrench in wrenches], axis=0))
 
-        return Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)
+        return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)]
     carrier = model.links[slider.carrier]
     description = f"force of joint {name} on link {carrier.name} from slider {slider.name}"
     gravity = np.asarray(scene.gravity)
@@ -141,10 +183,9 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> Reco
         loads = sum(
             (x.factor(np.array([snapshot.t]))[0] * x.forces.sum(axis=0) for x in slider.loads), np.zeros(3)
         )
-        force = _wrench(model, snapshot, slider.carrier, name, np.zeros(3))[0]
-        return np.asarray(force - slider.mass * (a - gravity) + loads)
+        return np.asarray(wrenches[0](snapshot)[0] - slider.mass * (a - gravity) + loads)
 
-    return Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)
+    return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
 def _torque(scene: Scene, model: Model) -> Recorded:
@@ -155,7 +196,8 @@ def _torque(scene: Scene, model: Model) -> Recorded:
     channel = Channel(
         "drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {model.links[k].name}"
     )
-    return Recorded(channel, lambda s: np.array([_wrench(model, s, k, scene.drive.joint, at)[1] @ axis]))
+    wrench = _wrench(model, k, scene.drive.joint, at)
+    return Recorded(channel, lambda s: np.array([wrench(s)[1] @ axis]))
 
 
 def _rigid_torque(model: Model) -> Recorded:
