@@ -61,6 +61,9 @@ def write_loglog(folder: Path, name: str, curves: Mapping[str, tuple[Sequence[fl
     axes = figure.add_subplot()
     for (label, (x, y)), marker in zip(curves.items(), "osd^vx*" * 2, strict=False):
         axes.loglog(x, y, marker=marker, label=label)
+    sizes = sorted({value for x, _ in curves.values() for value in x})
+    axes.set_xticks(sizes, [f"{size:,.0f}" for size in sizes])
+    axes.set_xticks([], minor=True)
     axes.set_xlabel(labels[0])
     axes.set_ylabel(labels[1])
     axes.grid(visible=True, which="both", alpha=0.3)

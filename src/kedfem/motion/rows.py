@@ -38,8 +38,8 @@ class Row:
 
 def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors e1, e2 with e1 × e2 = axis."""
-    helper = np.eye(3)[np.abs(axis).argmin()]
-    e1 = cross(axis, helper)
+    aside = np.eye(3)[np.abs(axis).argmin()]
+    e1 = cross(axis, aside)
     e1 /= np.linalg.norm(e1)
     return e1, cross(axis, e1)
 
