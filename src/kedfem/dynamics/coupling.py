@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, joint_seat, port_weights
-from kedfem.motion.linkage import GROUND, unit
+from kedfem.motion.linkage import GROUND, joint_axis, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
 
@@ -202,7 +202,7 @@ def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     if scene.links[name].fidelity != "rigid":
         return None
     joint = next(j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links)
-    return unit(joint.axis or (0.0, 0.0, 1.0))
+    return joint_axis(joint)
 
 
 def seat_of(scene: Scene, name: str, link: Link) -> Seat:
@@ -226,9 +226,9 @@ def port_points(
     if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
         return at[None, :]
     seat = next(iter(seats.values()))
-    driven = scene.drive is not None and scene.drive.joint == name
+    driven = scene.drive.joint == name
     if joint.kind == "revolute":
-        axis = unit(joint.axis or (0.0, 0.0, 1.0))
+        axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
         centre = at + np.mean([(s.origin - at) @ axis for s in seats.values()]) * axis
         across = _widest_across(seat, axis)
@@ -261,7 +261,7 @@ def _widest_across(seat: Seat, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray
 
 def _components(scene: Scene, name: str, joint: Joint, link: Link) -> list[int]:
     """Which of a port's three components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
-    driven = scene.drive is not None and scene.drive.joint == name
+    driven = scene.drive.joint == name
     if link.kind == "solid" or joint.kind in {"weld", "prismatic"} or driven:
         return [0, 1, 2]
     return [0, 1]
@@ -276,5 +276,5 @@ def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], fir
         slider = others[0]
         return first_of[slider], sliders[slider][components, None], 0
     if joint.kind == "prismatic":
-        return unknowns, unit(joint.axis or (0.0, 0.0, 1.0))[components, None], 1
+        return unknowns, joint_axis(joint)[components, None], 1
     return unknowns, np.zeros((len(components), 0)), 0

@@ -21,7 +21,7 @@ from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene,
 class Slider:
     """A rigid slider on a line of the ground: its mass and forces ride on the link that it is joined to.
 
-    name, mass [kg], axis : of the slider
+    name, mass [kg] : of the slider
     guide, joint : its prismatic joint, and the joint with the elastic link
     carrier : number of that link
     weights : (n,) of the joint's point on the carrier
@@ -30,7 +30,6 @@ class Slider:
 
     name: str
     mass: float
-    axis: Float[np.ndarray, "3"]
     guide: str
     joint: str
     carrier: int
@@ -130,11 +129,10 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
 
 
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
-    axis = slider_axis(scene, name)
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     guide = next(key for key, joint in joints.items() if joint.kind == "prismatic")
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in links]
-    if not held or axis is None:
+    if not held:
         raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none")
     key, carrier = held[0]
     weights = port_weights(seat_of(scene, key, links[carrier]), np.array([joints[key].at]))[0]
@@ -145,4 +143,4 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
         if x.link == name and isinstance(x, ForceLoad)
     )
     mass = scene.links[name].mass + extra
-    return Slider(name, mass, axis, guide, key, numbers[carrier], weights, loads)
+    return Slider(name, mass, guide, key, numbers[carrier], weights, loads)

@@ -142,13 +142,13 @@ def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
 def _surface_at(
     link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
 ) -> Int[np.ndarray, " f"]:
-    if axis is not None:
-        bore = cylinder(link, point, axis)
-        if len(bore):
+    """A ball seat if no axis is given, else a bore about the axis (or one of the link's), else a flat face."""
+    if axis is None and len(ball := sphere(link, point)):
+        return ball
+    for candidate in link.axes.T if axis is None else (axis,):
+        if len(bore := cylinder(link, point, candidate)):
             return bore
-        return flat_face(link, point)
-    found = (sphere(link, point), *(cylinder(link, point, a) for a in link.axes.T), flat_face(link, point))
-    return next((facets for facets in found if len(facets)), found[0])
+    return flat_face(link, point)
 
 
 def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.rows import Row, Rows, drive_row, features, jacobian, joint_rows, stacked
-from kedfem.scene import Scene
+from kedfem.scene import Joint, Scene
 
 GROUND = "ground"
 RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
@@ -24,7 +24,7 @@ class Linkage:
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     redundant : joints whose rows repeat what others already hold
-    drive : name of the driven joint or None
+    drive : name of the driven joint
     """
 
     bodies: tuple[str, ...]
@@ -33,7 +33,7 @@ class Linkage:
     size: float
     centre: Float[np.ndarray, "3"]
     redundant: tuple[str, ...]
-    drive: str | None
+    drive: str
 
 
 def linkage(scene: Scene) -> Linkage:
@@ -48,10 +48,8 @@ def linkage(scene: Scene) -> Linkage:
     points = np.array([joint.at for joint in scene.joints.values()])
     centre = points.mean(axis=0)
     rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
-    driven = scene.drive.joint if scene.drive else None
-    if driven:
-        i, j, axis = _driven_pair(scene, driven, bodies)
-        rows.append(drive_row(driven, i, j, axis))
+    driven = scene.drive.joint
+    rows.append(drive_row(driven, *_pair(scene.joints[driven], bodies), joint_axis(scene.joints[driven])))
     size = float(np.ptp(points, axis=0).max()) or 1.0
     J = drawn_jacobian(rows, len(bodies), size)
     _check_mobility(J, rows, bodies, driven)
@@ -64,18 +62,22 @@ def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
     return np.asarray(np.asarray(axis) / np.linalg.norm(axis))
 
 
+def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
+    """Unit vector of a joint that has an axis: the scene gives one to hinges and asks sliding joints for theirs."""
+    return unit(joint.axis or (0.0, 0.0, 1.0))
+
+
 def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
     joint = scene.joints[name]
-    # the ground, where there is one, is body j: directions are fixed in it
-    i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
+    i, j = _pair(joint, bodies)
     axis = None if joint.axis is None else unit(joint.axis)
     return joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
 
 
-def _driven_pair(scene: Scene, name: str, bodies: tuple[str, ...]) -> tuple[int, int, Float[np.ndarray, "3"]]:
-    joint = scene.joints[name]
+def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
+    """Numbers of a joint's bodies; the ground, where there is one, comes second: directions are fixed in it."""
     i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
-    return i, j, unit(joint.axis or (0.0, 0.0, 1.0))
+    return i, j
 
 
 def drawn_jacobian(rows: list[Row], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
@@ -93,19 +95,19 @@ def scaled(J: Float[np.ndarray, "... m k"], rows: Rows, size: float) -> Float[np
     return np.asarray(J * row * column)
 
 
-def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str | None) -> None:
+def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str) -> None:
     _, s, Vt = scipy.linalg.svd(J)
     rank = int((s > RANK_TOLERANCE * s[0]).sum())
     without = J[[row.b_drive is None for row in rows]]
     mobility = J.shape[1] - int(np.linalg.matrix_rank(without, tol=RANK_TOLERANCE * s[0]))
-    if drive and mobility == 0:
+    if mobility == 0:
         raise MotionError(
             f"joints.{drive}: its drive must be able to move the linkage, got a structure without any mobility "
             "(the joints hold every link; is an axis askew, or one joint too many?)"
         )
     if rank == J.shape[1]:
         return
-    if drive and mobility == 1:
+    if mobility == 1:
         raise MotionError(
             f"joints.{drive}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
             "draw it at another angle or drive another joint"

@@ -6,7 +6,7 @@ A body's point is at p + R X (X: reference position, R = I there). Two kinds of 
 * turn: a_i · b_j = 0               a direction of body i stays perpendicular to a direction of body j
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -33,7 +33,7 @@ class Row:
     a: Vector
     b: Vector
     joint: str
-    b_drive: Vector | None = field(default=None)
+    b_drive: Vector | None = None
 
 
 def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:

@@ -15,7 +15,7 @@ from kedfem.dynamics.transient import Snapshot
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows, von_mises
-from kedfem.motion.linkage import unit
+from kedfem.motion.linkage import joint_axis
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
@@ -192,7 +192,7 @@ def _torque(scene: Scene, model: Model) -> Recorded:
     """Torque of the drive on its link, about the driven joint's axis."""
     joint = scene.joints[scene.drive.joint]
     k = next(_number(model, link) for link in joint.links if link != "ground")
-    axis, at = unit(joint.axis or (0, 0, 1)), np.asarray(joint.at)
+    axis, at = joint_axis(joint), np.asarray(joint.at)
     channel = Channel(
         "drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {model.links[k].name}"
     )
