@@ -12,10 +12,11 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.transient import Snapshot, Steps, drive_range, steps_of, transient
 from kedfem.errors import OutputError
+from kedfem.links.record import in_space
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
-from kedfem.output.frames import link_fields, translation
+from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
@@ -241,7 +242,7 @@ def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: Animation
 def _deflection(model: Model, snapshot: Snapshot) -> float:
     """Largest component of the displacement of any link, of the link's size [-]."""
     return max(
-        float(np.abs(translation(link, state.u)).max() / np.ptp(link.X, axis=0).max())
+        float(np.abs(in_space(link, state.u)).max() / np.ptp(link.X, axis=0).max())
         for link, state in zip(model.links, snapshot.states, strict=True)
     )
 

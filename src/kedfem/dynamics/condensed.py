@@ -19,7 +19,7 @@ from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
 ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
-Rotation = Float[np.ndarray, "3 3"]
+Rotation = Float[np.ndarray, "d d"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class Substructure:
 
         [λ; μ] = S ([W g; 0] − Cᵀ y),   S = (Cᵀ Ã⁻¹ C − diag(0, 1/κ))⁻¹,   g = y + Ã⁻¹ C [λ; μ].
 
-    solve : (n, 3) → (n, 3), Ã⁻¹
-    Y : (3n, q + e) Ã⁻¹ C
+    solve : (n, d) → (n, d), Ã⁻¹
+    Y : (dn, q + e) Ã⁻¹ C
     S : (q + e, q + e)
     anchors : (e,) components of the state
     """
@@ -54,11 +54,11 @@ def substructure(
     Parameters
     ----------
     n : functions of the link
-    solve, solve_many : Ã⁻¹ for one state (n, 3) and for columns (3n, k)
+    solve, solve_many : Ã⁻¹ for one state (n, d) and for columns (dn, k)
     anchors, kappa : components that Ã holds in addition to A, none if not given, and how stiffly [N/m]
     """
     held = np.zeros(0, int) if anchors is None else anchors
-    E = np.zeros((3 * n, len(held)))
+    E = np.zeros((attachment.components * n, len(held)))
     E[held, np.arange(len(held))] = 1.0
     C = np.concatenate([port_columns(attachment, n), E], axis=1)
     Y = solve_many(C)
@@ -68,12 +68,12 @@ def substructure(
 
 
 def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
-    """Wᵀ for all held components of a link with n functions, (3n, q)."""
-    p = len(attachment.weights)
-    W = np.zeros((p, 3, n, 3))
-    for k in range(3):
+    """Wᵀ for all held components of a link with n functions, (dn, q)."""
+    p, d = len(attachment.weights), attachment.components
+    W = np.zeros((p, d, n, d))
+    for k in range(d):
         W[:, k, attachment.nodes, k] = attachment.weights
-    return np.asarray(W.reshape(3 * p, 3 * n)[attachment.keep].T)
+    return np.asarray(W.reshape(d * p, d * n)[attachment.keep].T)
 
 
 def port_values(attachment: Attachment, u: Nodal) -> Float[np.ndarray, " q"]:
@@ -83,8 +83,8 @@ def port_values(attachment: Attachment, u: Nodal) -> Float[np.ndarray, " q"]:
 
 def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q"]:
     """R on all held components."""
-    keep = attachment.keep
-    return np.where(keep[:, None] // 3 == keep // 3, R[keep[:, None] % 3, keep % 3], 0.0)
+    port, component = np.divmod(attachment.keep, attachment.components)
+    return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
 
 
 def coupled(
@@ -96,11 +96,11 @@ def coupled(
 
     Parameters
     ----------
-    parts, R, rhs : per link; R link to world, rhs (n, 3) in the link frame
+    parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
 
     Returns
     -------
-    g : per link (n, 3), link frame
+    g : per link (n, d), link frame
     forces : per link (q,) λ on the link at its ports, link frame
     """
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
@@ -116,7 +116,7 @@ def coupled(
         except np.linalg.LinAlgError as error:
             raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
     forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
-    g = [x + (part.Y @ force).reshape(-1, 3) for part, x, force in zip(parts, y, forces, strict=True)]
+    g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
 
 
@@ -226,28 +226,38 @@ def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray,
     out[attachment.nodes] += attachment.weights.T @ port_vectors(attachment, force)
 
 
-def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p 3"]:
-    """Port forces as one vector per port, zero where a component is not held."""
-    full = np.zeros(3 * len(attachment.weights))
-    full[attachment.keep] = force
-    return full.reshape(-1, 3)
+def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p d"]:
+    """Port forces as one row per port, zero where a component is not held."""
+    full = np.zeros((len(attachment.weights), attachment.components))
+    full.ravel()[attachment.keep] = force
+    return full
 
 
 def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
-    """A = c_M M + c_K K0 in the link frame, (3n, 3n): constant because of [KED, eqs. (12)(14)]."""
-    M = sp.csr_array(sum(sp.kron(m, _unit(k), format="csr") for k, m in enumerate(link.mass)))
-    return sp.csr_array(c_M * M + c_K * link.K0)
+    """A = c_M M + c_K K0 in the link frame, (dn, dn): constant because of [KED, eqs. (12)(14)]."""
+    return sp.csr_array(c_M * mass_matrix(link) + c_K * link.K0)
+
+
+def mass_matrix(link: Link) -> sp.csr_array:
+    """M = m ⊗ I, (dn, dn), [KED, eqs. (9)(11)]."""
+    unit = np.eye(link.d)
+    return sp.csr_array(
+        sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass))
+    )
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
-    """Components that hold a link against rigid motion: of a beam a middle node's, of a solid those of three nodes."""
+    """Components that hold a link against rigid motion: a middle node's of a beam, those of d nodes far apart else."""
     if link.kind == "beam":
         return np.arange(3) + 3 * (link.n // 2)
-    first = int(np.linalg.norm(link.X - link.X.mean(axis=0), axis=1).argmax())
-    arms = link.X - link.X[first]
+    nodes = np.flatnonzero(link.one)
+    X = link.X[nodes]
+    first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
+    arms = X - X[first]
     second = int(np.linalg.norm(arms, axis=1).argmax())
     third = int(np.linalg.norm(np.cross(arms, arms[second]), axis=1).argmax())
-    return (3 * np.array([[first], [second], [third]]) + np.arange(3)).ravel()
+    far = nodes[[first, second, third][: link.d]]
+    return (link.d * far[:, None] + np.arange(link.d)).ravel()
 
 
 def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
@@ -257,9 +267,5 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     springs = sp.coo_array((np.full(len(anchors), kappa), (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     return substructure(
-        joint, link.n, lambda r: factor.solve(r.ravel()).reshape(-1, 3), factor.solve_many, anchors, kappa
+        joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
     )
-
-
-def _unit(k: int) -> sp.csr_array:
-    return sp.csr_array(([1.0], ([k], [k])), shape=(3, 3))

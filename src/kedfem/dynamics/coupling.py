@@ -25,17 +25,19 @@ class Attachment:
     """One link's share in the joints.
 
     nodes, weights : (b,) and (p, b): scalar port weights W of the nodes that carry any
+    components : d of the link
     points : (p, 3) port points, reference position [m]
     joints : (p,) name of each port's joint
-    keep : (q,) which of the flattened (p, 3) components are held; closed under the link's rotation; independent:
+    keep : (q,) which of the flattened (p, d) components are held; closed under the link's rotation; independent:
         what other ports of the link imply is left out
     B : (q, k) held components, in world axes, from the interface unknowns z
-    shares : per link j (3p, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
-    loose : (3p, r) port forces of this link, world axes, that no λ tells: statically indeterminate
+    shares : per link j (dp, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
+    loose : (dp, r) port forces of this link, world axes, that no λ tells: statically indeterminate
     """
 
     nodes: Int[np.ndarray, " b"]
     weights: Float[np.ndarray, "p b"]
+    components: int
     points: Float[np.ndarray, "p 3"]
     joints: tuple[str, ...]
     keep: Int[np.ndarray, " q"]
@@ -48,6 +50,7 @@ class Attachment:
 class _Ports:
     """Ports of one link while they are collected."""
 
+    link: Link
     weights: list[np.ndarray] = field(default_factory=list)
     points: list[np.ndarray] = field(default_factory=list)
     joints: list[str] = field(default_factory=list)
@@ -65,16 +68,17 @@ class _Ports:
         first: int,
         block: np.ndarray,
     ) -> None:
-        self.keep.extend(3 * len(self.weights) + c for c in held)
+        self.keep.extend(self.link.d * len(self.weights) + c for c in held)
         self.weights.append(weights)
         self.points.append(point)
         self.joints.append(joint)
         self.selection.append((first, block))
 
-    def attachment(self, link: Link, unknowns: int) -> Attachment:
+    def attachment(self, unknowns: int) -> Attachment:
+        d = self.link.d
         if not self.weights:
             none = np.zeros(0, int)
-            return Attachment(none, np.zeros((0, 0)), np.zeros((0, 3)), (), none, np.zeros((0, unknowns)))
+            return Attachment(none, np.zeros((0, 0)), d, np.zeros((0, 3)), (), none, np.zeros((0, unknowns)))
         B = np.zeros((len(self.keep), unknowns))
         row = 0
         for first, block in self.selection:
@@ -83,7 +87,7 @@ class _Ports:
         W = np.array(self.weights)
         nodes = np.flatnonzero(W.any(axis=0))
         return Attachment(
-            nodes, W[:, nodes], np.array(self.points), tuple(self.joints), np.array(self.keep), B
+            nodes, W[:, nodes], d, np.array(self.points), tuple(self.joints), np.array(self.keep), B
         )
 
 
@@ -95,7 +99,7 @@ def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
     MeshError
         If a joint finds no bore, face or node on one of its links.
     """
-    ports = {name: _Ports() for name in links}
+    ports = {name: _Ports(link) for name, link in links.items()}
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
@@ -103,16 +107,37 @@ def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
         held = [link for link in joint.links if link in links]
         seats = {link: seat_of(scene, name, links[link]) for link in held}
         others = [link for link in joint.links if link not in links]
+        if len({links[link].planar for link in held}) == 2:
+            unknowns += _mixed(scene, name, {link: (ports[link], seats[link]) for link in held}, unknowns)
+            continue
         points = port_points(scene, name, joint, seats, links) if held else np.zeros((0, 3))
         for point in points:
-            components = _components(scene, name, joint, links[held[0]])
+            components = _components(scene, name, joint, [links[link] for link in held])
             first, block, new = _target(joint, others, sliders, first_of, unknowns, components)
             for link in held:
                 weights = port_weights(seats[link], point[None, :])[0]
                 ports[link].add(weights, point, name, components, first, block)
             unknowns += new
-    every = [ports[name].attachment(links[name], unknowns) for name in links]
+    every = [ports[name].attachment(unknowns) for name in links]
     return dict(zip(links, independent(every), strict=True))
+
+
+def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first: int) -> int:
+    """A hinge between a planar link and one in space: the pin of the latter stays upright; two new unknowns."""
+    joint = scene.joints[name]
+    if joint.kind not in {"revolute", "spherical"}:
+        kinds = " and ".join(f"'{link}' ({ports.link.kind})" for link, (ports, _) in held.items())
+        raise MeshError(
+            f"joints.{name}: must be a hinge between a planar link and one in space, "
+            f"got a {joint.kind} joint of {kinds}"
+        )
+    for link, (ports, seat) in held.items():
+        points = port_points(scene, name, joint, {link: seat}, {link: ports.link})
+        for point in points:
+            components = [0, 1] if ports.link.planar else [0, 1, 2]
+            weights = port_weights(seat, point[None, :])[0]
+            ports.add(weights, point, name, components, first, np.eye(3)[components, :2])
+    return 2
 
 
 def independent(every: Sequence[Attachment]) -> list[Attachment]:
@@ -145,9 +170,9 @@ def independent(every: Sequence[Attachment]) -> list[Attachment]:
 
 def _relation(each: Attachment) -> tuple[Bool[np.ndarray, " h"], Float[np.ndarray, "h q"]]:
     """Which held components are independent, and L: all from those."""
-    port, component = np.divmod(each.keep, 3)
+    port, component = np.divmod(each.keep, each.components)
     kept, L = np.zeros(len(port), bool), np.zeros((len(port), len(port)))
-    for c in range(3):
+    for c in range(each.components):
         at = np.flatnonzero(component == c)
         if len(at):
             # u, v(, w) are held by the same ports, so the choice is the same for them
@@ -192,7 +217,7 @@ def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:
 
 def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarray, "m c"]:
     """Rows of held components among those of all components of all ports."""
-    out = np.zeros((3 * len(each.weights), rows.shape[1]))
+    out = np.zeros((each.components * len(each.weights), rows.shape[1]))
     out[each.keep] = rows
     return out
 
@@ -215,7 +240,7 @@ def seat_of(scene: Scene, name: str, link: Link) -> Seat:
 def port_points(
     scene: Scene, name: str, joint: Joint, seats: dict[str, Seat], links: dict[str, Link]
 ) -> Float[np.ndarray, "p 3"]:
-    """Points of a joint that its links share: 1 spherical, 2 revolute, 3 where turning is held too.
+    """Points of a joint that its links share: 1 spherical, 2 revolute, 3 where turning is held too; in a plane 1 or 2.
 
     Raises
     ------
@@ -227,6 +252,9 @@ def port_points(
         return at[None, :]
     seat = next(iter(seats.values()))
     driven = scene.drive.joint == name
+    if links[next(iter(seats))].planar:
+        across = seat.directions[0]
+        return np.array([at, at + 2 * seat.spread[0] * across][: 2 if driven or joint.kind == "weld" else 1])
     if joint.kind == "revolute":
         axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
@@ -259,12 +287,19 @@ def _widest_across(seat: Seat, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray
     return widest / np.linalg.norm(widest) if np.linalg.norm(widest) > 1e-9 else perpendiculars(axis)[0]
 
 
-def _components(scene: Scene, name: str, joint: Joint, link: Link) -> list[int]:
-    """Which of a port's three components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
-    driven = scene.drive.joint == name
-    if link.kind == "solid" or joint.kind in {"weld", "prismatic"} or driven:
+def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:
+    """Which of a port's components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
+    turning = scene.drive.joint == name or joint.kind in {"weld", "prismatic"}
+    if not any(link.planar for link in held):
         return [0, 1, 2]
-    return [0, 1]
+    if not turning or all(link.kind == "plane" for link in held):
+        return [0, 1]
+    if any(link.kind == "plane" for link in held):
+        kinds = " and ".join(f"'{link.name}' ({link.kind})" for link in held)
+        raise MeshError(
+            f"joints.{name}: must be a hinge between a beam and a plane link, got a {joint.kind} of {kinds}"
+        )
+    return [0, 1, 2]
 
 
 def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], first_of: dict[str, int],

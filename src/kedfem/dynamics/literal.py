@@ -11,7 +11,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Rotation, end_forces, port_columns
+from kedfem.dynamics.condensed import Rotation, end_forces, mass_matrix, port_columns, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
@@ -23,14 +23,14 @@ def rotated_stiffness(K0: sp.csr_array, R: Rotation) -> sp.csr_array:
 
     Parameters
     ----------
-    K0 : (3n, 3n) in the link frame
+    K0 : (dn, dn) in the link frame
     R : link to world
 
     Returns
     -------
-    (3n, 3n) in the world frame
+    (dn, dn) in the world frame
     """
-    blocks = sp.bsr_array(K0, blocksize=(3, 3))
+    blocks = sp.bsr_array(K0, blocksize=R.shape)
     return sp.csr_array(sp.bsr_array((R @ blocks.data @ R.T, blocks.indices, blocks.indptr), shape=K0.shape))
 
 
@@ -50,11 +50,11 @@ def shared_nodes(
     for link, joint in zip(links, joints, strict=True):
         W = port_columns(joint, link.n).T
         s = scipy.linalg.qr(W, pivoting=True, mode="r")[1][: len(W)] if len(W) else np.zeros(0, int)
-        m = np.setdiff1d(np.arange(3 * link.n), s)
+        m = np.setdiff1d(np.arange(link.unknowns), s)
         inverse = np.linalg.inv(W[:, s]) if len(W) else np.zeros((0, 0))
-        T = sp.lil_array((3 * link.n, len(m)))
+        T = sp.lil_array((link.unknowns, len(m)))
         T[m, np.arange(len(m))] = 1.0
-        Tz = np.zeros((3 * link.n, joint.B.shape[1]))
+        Tz = np.zeros((link.unknowns, joint.B.shape[1]))
         if len(s):
             near = np.flatnonzero(W[:, m].any(axis=0))
             T[np.ix_(s, near)] = -inverse @ W[:, m[near]]
@@ -74,12 +74,7 @@ class LiteralSteps:
         self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
         self.T, self.dependent = shared_nodes(links, joints)
         self.Wt = [port_columns(joint, link.n) for link, joint in zip(links, joints, strict=True)]
-        self.M = [
-            sp.csr_array(
-                sum(sp.kron(m, sp.diags_array(np.eye(3)[k]), format="csr") for k, m in enumerate(link.mass))
-            )
-            for link in links
-        ]
+        self.M = [mass_matrix(link) for link in links]
         self.factorisations = 0
 
     def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
@@ -93,9 +88,9 @@ class LiteralSteps:
         )
         self.factorisations += 1
         u = self.T @ lu.solve(self.T.T @ np.concatenate([r.ravel() for r in rhs]))
-        parts = np.split(u, np.cumsum([3 * link.n for link in self.links])[:-1])
+        parts = np.split(u, np.cumsum([link.unknowns for link in self.links])[:-1])
         return [
-            self._next(k, states[k], at[k], parts[k].reshape(-1, 3), A[k], rhs[k])
+            self._next(k, states[k], at[k], parts[k].reshape(rhs[k].shape), A[k], rhs[k])
             for k in range(len(self.links))
         ]
 
@@ -108,7 +103,7 @@ class LiteralSteps:
         scheme = self.scheme
         b0, b1, b2 = scheme.acceleration
         history = (1 - scheme.alpha_m) * (b0 * s.u + b1 * s.v + b2 * s.a) - scheme.alpha_m * s.a
-        out = (self.M[k] @ history.ravel()).reshape(-1, 3)
+        out = (self.M[k] @ history.ravel()).reshape(history.shape)
         out = out + (1 - scheme.alpha_f) * at.F + scheme.alpha_f * (s.F - s.f @ s.R.T)
         if s.C is not None:
             out = out + (1 - scheme.alpha_f) * np.tensordot(scheme.rate, s.C, 1) @ at.R.T
@@ -117,8 +112,8 @@ class LiteralSteps:
     def _next(self, k: int, s: LinkState, at: Nominal, u: Nodal, A: sp.csr_array, rhs: Nodal) -> LinkState:
         v, a = accelerated(self.scheme, u, s.u, s.v, s.a)
         g = u @ at.R
-        Kg = (self.links[k].K0 @ g.ravel()).reshape(-1, 3)
-        Mu, Mv, Ma = ((self.M[k] @ x.ravel()).reshape(-1, 3) for x in (u, v, a))
+        Kg = (self.links[k].K0 @ g.ravel()).reshape(g.shape)
+        Mu, Mv, Ma = ((self.M[k] @ x.ravel()).reshape(x.shape) for x in (u, v, a))
         C, f = s.C, Kg
         if s.C is not None:
             Cg = self.damping.alpha * Mu @ at.R + self.damping.beta * Kg
@@ -136,6 +131,4 @@ class LiteralSteps:
             return np.zeros(0)
         world = np.linalg.solve(self.Wt[k][s], (A @ u.ravel() - rhs.ravel())[s])
         joint = self.joints[k]
-        full = np.zeros(3 * len(joint.weights))
-        full[joint.keep] = world
-        return np.asarray((full.reshape(-1, 3) @ R).ravel()[joint.keep])
+        return np.asarray((port_vectors(joint, world) @ R).ravel()[joint.keep])

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import SceneError
-from kedfem.links.record import Link
+from kedfem.links.record import Link, as_rows
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import face_seat, surface_weights
 from kedfem.motion.rigid import RigidMotion
@@ -21,12 +21,12 @@ from kedfem.scene import BodyLoad, ForceLoad, Load, Scene, SurfaceLoad, load_fac
 class Pattern:
     """Nodal forces of one load on one link.
 
-    forces : (n, 3) at factor one, reference components [N]
+    forces : (n, d) at factor one, reference components [N]
     follows : turns with the link
     factor : times (t,) → factors (t,)
     """
 
-    forces: Float[np.ndarray, "n 3"]
+    forces: Float[np.ndarray, "n d"]
     follows: bool
     factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
 
@@ -41,16 +41,20 @@ def patterns(scene: Scene, name: str, link: Link) -> tuple[Pattern, ...]:
     """
     out = []
     if any(scene.gravity):
-        out.append(Pattern(link.m1 * _planar(link, scene.gravity), False, np.ones_like))
+        out.append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, np.ones_like))
     for key, load in scene.loads.items():
         if load.link == name:
             out.append(_pattern(f"loads.{key}", load, link))
     return tuple(out)
 
 
-def slider_pattern(load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
+def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
     """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
-    return Pattern(np.outer(weights, load.vector), False, lambda t: load_factor(load.factor, t))
+    return Pattern(
+        np.outer(weights, as_rows(link, np.asarray(load.vector))),
+        False,
+        lambda t: load_factor(load.factor, t),
+    )
 
 
 def _pattern(where: str, load: Load, link: Link) -> Pattern:
@@ -69,19 +73,14 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
             weights = surface_weights(link, face_seat(link, f"{where}.at", np.asarray(load.at)))
         case _:
             raise SceneError(f"{where}: a surface force needs a solid link, got the beam '{link.name}'")
-    forces = np.outer(weights, _planar(link, load.vector))
+    forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
     return Pattern(forces, load.frame == "link", lambda t: load_factor(load.factor, t))
 
 
-def _planar(link: Link, vector: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
-    """A force on a beam acts in its plane: the third row is a moment."""
-    return np.asarray(vector) * ([1, 1, 0] if link.kind == "beam" else 1)
-
-
-def nominal_acceleration(link: Link, motion: RigidMotion, body: int, k: int) -> Float[np.ndarray, "3"]:
+def nominal_acceleration(link: Link, motion: RigidMotion, body: int, k: int) -> Float[np.ndarray, " d"]:
     """p'' of a link at time point k; of a planar beam (x'', y'', θ'')."""
     p2 = motion.p2[k, body]
-    return np.array([p2[0], p2[1], motion.alpha[k, body, 2]]) if link.kind == "beam" else p2
+    return np.array([p2[0], p2[1], motion.alpha[k, body, 2]]) if link.kind == "beam" else p2[: link.d]
 
 
 def applied(
@@ -91,7 +90,7 @@ def applied(
     motion: RigidMotion,
     body: int,
     k: int,
-) -> Float[np.ndarray, "n 3"]:
+) -> Float[np.ndarray, "n d"]:
     """P − M R0'' at time point k, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
 
     Parameters
@@ -99,9 +98,10 @@ def applied(
     factors : of each load at each time point
     body : the link's number in the motion
     """
-    F = link.mX @ -motion.R2[k, body].T
+    F = link.mX @ -motion.R2[k, body, : link.d].T
     F -= link.m1 * nominal_acceleration(link, motion, body, k)
     for load, factor in zip(loads, factors, strict=True):
         if factor[k]:
-            F += factor[k] * (load.forces @ motion.R[k, body].T if load.follows else load.forces)
+            R = motion.R[k, body, : link.d, : link.d]
+            F += factor[k] * (load.forces @ R.T if load.follows else load.forces)
     return np.asarray(F)

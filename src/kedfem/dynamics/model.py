@@ -55,7 +55,7 @@ class Model:
     @property
     def unknowns(self) -> int:
         """Elastic unknowns of all links before joints share any."""
-        return sum(3 * link.n for link in self.links)
+        return sum(link.unknowns for link in self.links)
 
     @property
     def coordinates(self) -> int:
@@ -138,7 +138,7 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     weights = port_weights(seat_of(scene, key, links[carrier]), np.array([joints[key].at]))[0]
     extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
     loads = tuple(
-        slider_pattern(x, weights)
+        slider_pattern(links[carrier], x, weights)
         for x in scene.loads.values()
         if x.link == name and isinstance(x, ForceLoad)
     )

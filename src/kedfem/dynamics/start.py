@@ -26,7 +26,7 @@ CONVERGED = 1e-9  # change of a sweep, of the deflection
 
 @dataclass(frozen=True, slots=True)
 class Deflected:
-    """A link's given start: u, v (n, 3) δ and δ' in world components, g_rate (n, 3) rate of δ in the link frame."""
+    """A link's given start: u, v (n, d) δ and δ' in world components, g_rate (n, d) rate of δ in the link frame."""
 
     u: Nodal
     v: Nodal
@@ -86,7 +86,7 @@ def quasi_static(
 
     Returns
     -------
-    per instant, per link (n, 3), world components
+    per instant, per link (n, d), world components
     """
     parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(links, joints, strict=True)]
     return [_turning(links, parts, instant) for instant in instants]
@@ -124,7 +124,7 @@ def mass_substructure(link: Link, joint: Attachment) -> Substructure:
         return np.stack([_mass_solution(m, b[:, k]) for k, m in enumerate(link.mass)], axis=1)
 
     def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
-        return np.stack([solve(b.reshape(-1, 3)).ravel() for b in B.T], axis=1) if B.shape[1] else B
+        return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
 
     return substructure(joint, link.n, solve, solve_many)
 
@@ -148,4 +148,4 @@ def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:
 
 
 def _stiffness_times(link: Link, g: Nodal) -> Nodal:
-    return np.asarray((link.K0 @ g.ravel()).reshape(-1, 3))
+    return np.asarray((link.K0 @ g.ravel()).reshape(g.shape))

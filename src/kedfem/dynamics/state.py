@@ -7,8 +7,8 @@ from jaxtyping import Float
 
 from kedfem.dynamics.scheme import Scheme
 
-Nodal = Float[np.ndarray, "n 3"]
-NodalOf = Float[np.ndarray, "_ 3"]  # of several links, each with its own n
+Nodal = Float[np.ndarray, "n d"]
+NodalOf = Float[np.ndarray, "_ _"]  # of several links, each with its own n
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,24 +28,24 @@ class Rayleigh:
 class Nominal:
     """What rigid motion and loads do to one link at one time.
 
-    R : (3, 3) orientation, link to world
-    F : (n, 3) P − M R0'', world components [N]
+    R : (d, d) orientation, link to world, of a plane link in its plane
+    F : (n, d) P − M R0'', world components [N]
     """
 
-    R: Float[np.ndarray, "3 3"]
+    R: Float[np.ndarray, "d d"]
     F: Nodal
 
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """Elastic state of one link at one time; all (n, 3).
+    """Elastic state of one link at one time; all (n, d).
 
     u, v, a : δ, δ', δ'', world components [m, m/s, m/s²; third row of a beam: ψ]
     Mu, Mv, Ma : the same times the mass
-    g : δ in the link frame; R : (3, 3) the link's orientation
+    g : δ in the link frame; R : (d, d) the link's orientation
     Kg : K0 g, link frame [N]
     f : internal force K0 g + C0 g', link frame [N]
-    C : (3, n, 3) C0 times (g, g', g''), link frame, None without damping
+    C : (3, n, d) C0 times (g, g', g''), link frame, None without damping
     F : P − M R0'', world components [N]
     port_forces : (q,) λ on the link at its ports, link frame [N]
     """
@@ -57,10 +57,10 @@ class LinkState:
     Mv: Nodal
     Ma: Nodal
     g: Nodal
-    R: Float[np.ndarray, "3 3"]
+    R: Float[np.ndarray, "d d"]
     Kg: Nodal
     f: Nodal
-    C: Float[np.ndarray, "3 n 3"] | None
+    C: Float[np.ndarray, "3 n d"] | None
     F: Nodal
     port_forces: Float[np.ndarray, " q"]
 

@@ -93,7 +93,7 @@ def nominal(
 ) -> list[Nominal]:
     """Orientation and P − M R0'' of all links at time point k."""
     return [
-        Nominal(motion.R[k, body], applied(link, loads, factor, motion, body, k))
+        Nominal(motion.R[k, body, : link.d, : link.d], applied(link, loads, factor, motion, body, k))
         for link, loads, factor, body in zip(model.links, model.loads, factors, model.bodies, strict=True)
     ]
 
@@ -110,7 +110,7 @@ def first_states(
     factors = load_factors(model, t)
     instants = [instant(model, factors, motion, k) for k in range(len(t))]
     if at_rest:
-        start = [Deflected(*(np.zeros((link.n, 3)) for _ in range(3))) for link in model.links]
+        start = [Deflected(*(np.zeros((link.n, link.d)) for _ in range(3))) for link in model.links]
         return initial_states(model.links, model.joints, instants[0].at, model.damping, start)
     u = quasi_static(model.links, model.joints, instants)
     g = [
@@ -125,7 +125,8 @@ def instant(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: Rigid
     """Orientation, load and spin of all links at time point k."""
     W = cross_matrix(motion.omega[k])
     spin = cross_matrix(motion.alpha[k]) + W @ W
-    return Instant(nominal(model, factors, motion, k), [spin[body] for body in model.bodies])
+    turning = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
+    return Instant(nominal(model, factors, motion, k), turning)
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:

@@ -56,19 +56,15 @@ def with_body(
     gamma[1:, 1:] = G
     W4 = sp.csr_array(seat.fit)
     m = sp.csr_array(link.mass[0] + W4.T @ sp.csr_array(gamma) @ W4)
-    return _with_mass(link, (m, m, m))
+    return _with_mass(link, (m,) * link.d)
 
 
 def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -> Link:
     """A link with a mass that follows one port point and does not turn with the link, such as a slider's [kg]."""
     w = sp.csr_array(weights[None, :])
     lump = sp.csr_array(mass * (w.T @ w))
-    x, _, z = link.mass
-    if link.kind == "beam":
-        xy = sp.csr_array(x + lump)
-        return _with_mass(link, (xy, xy, z))
-    m = sp.csr_array(x + lump)
-    return _with_mass(link, (m, m, m))
+    m = sp.csr_array(link.mass[0] + lump)
+    return _with_mass(link, (m, m, link.mass[2]) if link.kind == "beam" else (m,) * link.d)
 
 
 def _with_node_body(link: Link, seat: Seat, mass: float, inertia: float) -> Link:
@@ -79,6 +75,6 @@ def _with_node_body(link: Link, seat: Seat, mass: float, inertia: float) -> Link
 
 
 def _with_mass(link: Link, mass: Mass) -> Link:
-    m1, mX = mass_constants(mass, link.X * [1, 1, 0 if link.kind == "beam" else 1])
+    m1, mX = mass_constants(mass, link.one, link.X * [1, 1, 0 if link.planar else 1])
     read_only(m1, mX)
     return replace(link, mass=mass, m1=m1, mX=mX)

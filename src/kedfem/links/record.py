@@ -1,7 +1,8 @@
-"""The one record that every link has, solid or beam: DESIGN of the whole solver rests on it.
+"""The one record that every link has, whatever its fidelity: the whole solver rests on it.
 
-A link is a scalar function space {N_a} with a vector in R³ at each function. Its state is an array (n, 3), its mass
-scalar matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)].
+A link is a scalar function space {N_a} with a vector at each function. Its state is an array (n, d), its mass scalar
+matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, but for plane links, which know
+no third dimension.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-Mass = tuple[sp.csr_array, sp.csr_array, sp.csr_array]
+Mass = tuple[sp.csr_array, ...]
+Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +43,15 @@ class Link:
     """A link as the dynamics sees it; all arrays are for the drawn (reference) position, R = I.
 
     name : key of the link in the scene.
-    kind : ``solid``: rows of a state are (u, v, w); ``beam``: rows are (u, v, ψ), [KED, eq. (21)].
-    X : (n, 3) positions of the functions' nodes [m].
+    kind : ``solid``, ``spatial_beam``: rows of a state are (u, v, w); ``plane``: (u, v); ``beam``: (u, v, ψ),
+        [KED, eq. (21)].
+    X : (n, 3) coefficients of position, Σ N_a X_a = x: of nodal functions their nodes [m].
+    one : (n,) coefficients of the constant, Σ N_a one_a = 1 [-].
     cells, cell_type : elements in VTK order and their meshio name.
     axes : (3, 3) columns are the link axes (x along the link) in the reference position.
-    mass : one scalar (n, n) matrix per component [kg; ψ: kg m²]; for solids the same object three times.
-    K0 : (3n, 3n) stiffness in the link frame, dof 3·node + component [N/m].
-    m1 : (n, 3) mass times one, component by component [kg].
+    mass : one scalar (n, n) matrix per component [kg; ψ: kg m²]; but for beams all the same object.
+    K0 : (dn, dn) stiffness in the link frame, dof d·node + component [N/m].
+    m1 : (n, d) mass times one, component by component [kg].
     mX : (n, 3) mass times position [kg m].
     volume : (n,) ∫ N_a dV of the link alone, without attached bodies [m³].
     E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses.
@@ -56,14 +60,15 @@ class Link:
     """
 
     name: str
-    kind: Literal["solid", "beam"]
+    kind: Kind
     X: Float[np.ndarray, "n 3"]
+    one: Float[np.ndarray, " n"]
     cells: Int[np.ndarray, "e m"]
     cell_type: str
     axes: Float[np.ndarray, "3 3"]
     mass: Mass
     K0: sp.csr_array
-    m1: Float[np.ndarray, "n 3"]
+    m1: Float[np.ndarray, "n d"]
     mX: Float[np.ndarray, "n 3"]
     volume: Float[np.ndarray, " n"]
     E: float
@@ -73,21 +78,56 @@ class Link:
 
     @property
     def n(self) -> int:
-        """Number of scalar functions; the link has 3n unknowns."""
+        """Number of scalar functions; the link has d·n unknowns."""
         return len(self.X)
 
+    @property
+    def d(self) -> int:
+        """Components of a row of the state."""
+        return len(self.mass)
 
-def mass_times(mass: Mass, u: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    @property
+    def unknowns(self) -> int:
+        """d·n."""
+        return self.d * self.n
+
+    @property
+    def planar(self) -> bool:
+        """Whether the link moves in a plane z = constant only."""
+        return self.kind in {"plane", "beam"}
+
+
+def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray, "*k d"]:
+    """Forces or accelerations in space as rows of a link's state: a planar link takes what lies in its plane."""
+    match link.kind:
+        case "beam":
+            return vectors * [1.0, 1.0, 0.0]  # the third row is a moment
+        case _:
+            return vectors[..., : link.d]
+
+
+def in_space(link: Link, rows: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k 3"]:
+    """The translation that rows of a link's state mean, or the force."""
+    match link.kind:
+        case "beam":
+            return rows * [1.0, 1.0, 0.0]
+        case "plane":
+            return np.concatenate([rows, np.zeros((*rows.shape[:-1], 1))], axis=-1)
+        case _:
+            return rows
+
+
+def mass_times(mass: Mass, u: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
     """M u for a state u, component by component: M = m ⊗ I3, [KED, eqs. (9)(11)].
 
     Parameters
     ----------
-    mass : three (n, n) scalar matrices
-    u : (n, 3)
+    mass : d scalar matrices (n, n)
+    u : (n, d)
 
     Returns
     -------
-    (n, 3)
+    (n, d)
     """
     out = np.empty_like(u)
     for k, m in enumerate(mass):
@@ -96,15 +136,15 @@ def mass_times(mass: Mass, u: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 
 
 
 def mass_constants(
-    mass: Mass, X: Float[np.ndarray, "n 3"]
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    mass: Mass, one: Float[np.ndarray, " n"], X: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "n 3"]]:
     """(m·1, m·X): all that the inertia load −M R0'' needs of a link, [KED, eq. (17)].
 
     Returns
     -------
-    (n, 3) [kg] and (n, 3) [kg m]
+    (n, d) [kg] and (n, 3) [kg m]
     """
-    m1 = mass_times(mass, np.ones_like(X))
+    m1 = mass_times(mass, np.repeat(one[:, None], len(mass), axis=1))
     mX = np.asarray(mass[0] @ X)
     return m1, mX
 

@@ -139,10 +139,11 @@ def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndar
     m = scalar_mass(basis, on, material.density)
     mass: Mass = (m, m, m)
     X = np.ascontiguousarray(basis.doflocs.T)
-    m1, mX = mass_constants(mass, X)
-    read_only(X, m1, mX)
+    one = np.ones(len(X))
+    m1, mX = mass_constants(mass, one, X)
+    read_only(X, one, m1, mX)
     return Link(
-        name=name, kind="solid", X=X, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
+        name=name, kind="solid", X=X, one=one, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
         axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
         volume=m1[:, 0] / material.density,
         E=material.youngs_modulus, lame=material.lame(), basis=basis,

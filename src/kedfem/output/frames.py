@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from jaxtyping import Float
-
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Snapshot
-from kedfem.links.record import Link
+from kedfem.links.record import in_space
 from kedfem.links.recovery import StressRecovery, nodal_stress, von_mises
 from kedfem.output.vtu import LinkField
 
@@ -27,15 +24,10 @@ def link_fields(
     for link, body, recovery, state in zip(
         model.links, model.bodies, recoveries, snapshot.states, strict=True
     ):
-        displacement = translation(link, state.u)
+        displacement = in_space(link, state.u)
         stress = nodal_stress(recovery, state.g)
         points = motion.p[k, body] + link.X @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
             LinkField(link.name, link.cell_type, link.cells, points, displacement, stress, von_mises(stress))
         )
     return fields
-
-
-def translation(link: Link, u: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """The displacement in space of a state's rows: of a beam (u, v, ψ) → (u, v, 0)."""
-    return u * [1, 1, 0] if link.kind == "beam" else u

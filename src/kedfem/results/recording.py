@@ -9,11 +9,10 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.condensed import port_rotation
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.loads import nominal_acceleration
 from kedfem.dynamics.model import Model, Slider
 from kedfem.dynamics.transient import Snapshot
 from kedfem.errors import SceneError
-from kedfem.links.record import Link
+from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.results.records import Channel
@@ -75,12 +74,12 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
     nodes = np.flatnonzero(at.value)
     weights = at.value[nodes]
     field = {"displacement": "u", "velocity": "v", "acceleration": "a"}[probe.quantity]
-    columns = XYZ if link.kind == "solid" else ("x", "y")
+    columns = XYZ[:2] if link.planar else XYZ
 
     def vector(snapshot: Snapshot) -> Row:
         state = snapshot.states[k]
         x = weights @ getattr(state, field)[nodes]
-        turned = x @ state.R @ link.axes if probe.frame == "link" else x
+        turned = x @ state.R @ link.axes[: link.d, : link.d] if probe.frame == "link" else x
         return np.asarray(turned[: len(columns)])
 
     description = f"elastic {probe.quantity} {place}"
@@ -115,7 +114,7 @@ def _wrench(
     """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
     attachment, link = model.joints[k], model.links[k]
     rows = _rows_of(attachment, joint)
-    arms = attachment.points[rows[::3] // 3] - at
+    arms = _arms(attachment, joint, at)
     shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
 
     def wrench(snapshot: Snapshot) -> tuple[Row, Row]:
@@ -123,7 +122,8 @@ def _wrench(
         for j, share in shares:
             state = snapshot.states[j]
             f += share @ (port_rotation(model.joints[j], state.R) @ state.port_forces)
-        return _resultant(link, arms @ snapshot.states[k].R.T, f.reshape(-1, 3))
+        R = snapshot.motion.R[snapshot.k, model.bodies[k]]
+        return _resultant(link, arms @ R.T, f.reshape(-1, link.d))
 
     return wrench
 
@@ -132,22 +132,28 @@ def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -
     """Whether statics tell what the joint exerts on link k, where several joints share its seat."""
     attachment = model.joints[k]
     rows = _rows_of(attachment, joint)
-    arms = attachment.points[rows[::3] // 3] - at
-    unknown = [_resultant(model.links[k], arms, f.reshape(-1, 3)) for f in attachment.loose[rows].T]
+    arms, link = _arms(attachment, joint, at), model.links[k]
+    unknown = [_resultant(link, arms, f.reshape(-1, link.d)) for f in attachment.loose[rows].T]
     return bool(np.abs(unknown).max(initial=0.0) < INDETERMINATE)
 
 
 def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
-    """All three components of all ports of a joint."""
+    """All components of all ports of a joint."""
     here = np.flatnonzero([name == joint for name in attachment.joints])
-    return (3 * here[:, None] + np.arange(3)).ravel()
+    return (attachment.components * here[:, None] + np.arange(attachment.components)).ravel()
 
 
-def _resultant(link: Link, arms: Float[np.ndarray, "p 3"], f: Float[np.ndarray, "p 3"]) -> tuple[Row, Row]:
+def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "p 3"]:
+    """From a point to the ports of a joint, as drawn."""
+    return attachment.points[[name == joint for name in attachment.joints]] - at
+
+
+def _resultant(link: Link, arms: Float[np.ndarray, "p 3"], f: Float[np.ndarray, "p d"]) -> tuple[Row, Row]:
     """Force and moment of port forces, all in one frame."""
     if link.kind == "beam":  # third component is a moment
-        return f.sum(axis=0) * forces_only(link), f.sum(axis=0) * [0, 0, 1]
-    return f.sum(axis=0), np.cross(arms, f).sum(axis=0)
+        return in_space(link, f).sum(axis=0), f.sum(axis=0) * [0, 0, 1]
+    force = in_space(link, f)
+    return force.sum(axis=0), np.cross(arms, force).sum(axis=0)
 
 
 def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list[Recorded]:
@@ -174,14 +180,11 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     def pin(snapshot: Snapshot) -> Row:
         motion, k, state = snapshot.motion, snapshot.k, snapshot.states[slider.carrier]
         body = model.bodies[slider.carrier]
-        nominal = nominal_acceleration(carrier, motion, body, k) + motion.R2[k, body] @ (
-            slider.weights @ carrier.X
-        )
-        a = nominal + slider.weights @ state.a
-        if carrier.kind == "beam":
-            a = a * [1, 1, 0]
+        nominal = motion.p2[k, body] + motion.R2[k, body] @ (slider.weights @ carrier.X)
+        a = nominal + in_space(carrier, slider.weights @ state.a)
+        t = np.array([snapshot.t])
         loads = sum(
-            (x.factor(np.array([snapshot.t]))[0] * x.forces.sum(axis=0) for x in slider.loads), np.zeros(3)
+            (x.factor(t)[0] * in_space(carrier, carrier.one @ x.forces) for x in slider.loads), np.zeros(3)
         )
         return np.asarray(wrenches[0](snapshot)[0] - slider.mass * (a - gravity) + loads)
 
@@ -210,19 +213,15 @@ def _rigid_torque(model: Model) -> Recorded:
         motion, k, work = snapshot.motion, snapshot.k, 0.0
         for link, body, state in zip(model.links, model.bodies, snapshot.states, strict=True):
             v, w = motion.v_phi[k, body], motion.omega_phi[k, body]
-            if link.kind == "beam":
-                v = np.array([v[0], v[1], w[2]])
-            N = motion.R[k, body] @ (link.X.T @ state.F) * forces_only(link)  # Σ (R X) ⊗ F
+            N = motion.R[k, body] @ (link.X.T @ in_space(link, state.F))  # Σ (R X) ⊗ F
             moment = np.array([N[1, 2] - N[2, 1], N[2, 0] - N[0, 2], N[0, 1] - N[1, 0]])
-            work += float(state.F.sum(axis=0) @ v + w @ moment)
+            total = link.one @ state.F
+            if link.kind == "beam":
+                moment[2] += total[2]
+            work += float(in_space(link, total) @ v + w @ moment)
         return np.array([-work])
 
     return Recorded(channel, torque)
-
-
-def forces_only(link: Link) -> Row:
-    """Rows of a state that are forces: of a beam the third is a moment."""
-    return np.array([1.0, 1.0, 0.0 if link.kind == "beam" else 1.0])
 
 
 def _energy(model: Model) -> Recorded:
