@@ -114,8 +114,8 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     m1, mX = mass_constants(mass, one, X * [1, 1, 0])
     read_only(X, one, cells, m1, mX)
     return Link(
-        name=name, kind="beam", X=X, one=one, cells=cells, cell_type=CELL_TYPES[nodes], axes=line_axes(points[0], points[-1]),
-        mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        name=name, kind="beam", X=X, one=one, cells=cells, cell_type=CELL_TYPES[nodes],
+        axes=line_axes(points[0], points[-1]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=E, lame=material.lame(), section=section,
     )  # fmt: skip
 

@@ -145,7 +145,7 @@ def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
 
 def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "p 3"]:
     """From a point to the ports of a joint, as drawn."""
-    return attachment.points[[name == joint for name in attachment.joints]] - at
+    return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
 
 
 def _resultant(link: Link, arms: Float[np.ndarray, "p 3"], f: Float[np.ndarray, "p d"]) -> tuple[Row, Row]:
