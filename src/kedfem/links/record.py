@@ -6,13 +6,13 @@ no third dimension.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-Mass = tuple[sp.csr_array, ...]
+Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
+Mass = tuple[Matrix, ...]
 Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
@@ -57,6 +57,8 @@ class Link:
     E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses.
     section : of a beam, else None.
     basis : scikit-fem basis of a solid (for this room only), else None.
+    full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
+        dense. Else None.
     """
 
     name: str
@@ -67,7 +69,7 @@ class Link:
     cell_type: str
     axes: Float[np.ndarray, "3 3"]
     mass: Mass
-    K0: sp.csr_array
+    K0: Matrix
     m1: Float[np.ndarray, "n d"]
     mX: Float[np.ndarray, "n 3"]
     volume: Float[np.ndarray, " n"]
@@ -75,6 +77,8 @@ class Link:
     lame: tuple[float, float]
     section: Section | None = None
     basis: Any = None
+    full: "Link | None" = None
+    Q: Float[np.ndarray, "_ n"] | None = None
 
     @property
     def n(self) -> int:

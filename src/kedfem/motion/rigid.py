@@ -1,6 +1,6 @@
 """Rigid motion R, p, R'', p'' of all links at many times at once, [KED, eqs. (2)(3)]."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -35,6 +35,10 @@ class RigidMotion:
     p2: Float[np.ndarray, "T B 3"]
     omega_phi: Float[np.ndarray, "T B 3"]
     v_phi: Float[np.ndarray, "T B 3"]
+
+    def part(self, first: int, end: int) -> "RigidMotion":
+        """The time points from one number up to another."""
+        return RigidMotion(*(getattr(self, field.name)[first:end] for field in fields(self)))
 
 
 Drive = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
