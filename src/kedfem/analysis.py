@@ -9,14 +9,13 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.transient import Steps, drive_range, steps_of, transient
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.record import in_space
 from kedfem.links.recovery import StressRecovery, stress_recovery
-from kedfem.motion.linkage import Linkage, linkage
-from kedfem.motion.path import Path, path
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
@@ -34,16 +33,6 @@ ROWS = 256  # steps kept before they go to the results file
 T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
 """Told of progress: (stage, done, total)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A scene with everything that does not need a time step."""
-
-    scene: Scene
-    linkage: Linkage
-    path: Path
-    model: Model
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +72,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     """
     clock = Clock(watch)
     folder = ready_folder(scene.results_folder)
-    ready = prepared(scene, clock.stage)
+    ready = meshed(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
@@ -94,20 +83,6 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (*deflection_warning(deflection), *warnings)
     return Run(folder, results, peak, clock.seconds, warnings)
-
-
-def prepared(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
-    """Rigid path and elastic model of a scene; nothing is solved.
-
-    Raises
-    ------
-    MotionError, MeshError, SceneError
-    """
-    stage("motion")
-    joined = linkage(scene)
-    along = path(joined, *drive_range(scene))
-    stage("mesh and matrices")
-    return Prepared(scene, joined, along, elastic_model(scene, joined))
 
 
 @dataclass

@@ -4,7 +4,8 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.analysis import Prepared, Run, frame_steps
+from kedfem.accuracy.prepared import Prepared
+from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
 from kedfem.mesh import HexMesh, mesh_quality

@@ -50,9 +50,16 @@ class Basis:
         return int(self.needed.shape[1] + np.count_nonzero(left > tolerance))
 
 
-def bases(model: Model, instants: Sequence[Instant], levels: int = LANCZOS) -> list[Basis]:
-    """A basis for every link of a model, from instants spread over the analysis."""
-    parts = static_parts(model)
+def bases(
+    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure], levels: int = LANCZOS
+) -> list[Basis]:
+    """A basis for every link of a model, from instants spread over the analysis.
+
+    Parameters
+    ----------
+    parts : `static_parts` of the model
+    levels : modes per instant
+    """
     deflections: list[list[NodalOf]] = [[] for _ in model.links]
     for instant in instants:
         for kept, found in zip(deflections, excited(model, parts, instant, levels), strict=True):
@@ -132,6 +139,31 @@ def energy_sorted(
     functions, weights = _orthonormal(S, H, INDEPENDENT)
     size = np.sqrt((weights**2).sum()) or 1.0
     return Basis(np.concatenate([rigid, E], axis=1), functions, weights / size)
+
+
+def enriched(
+    link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: int
+) -> Float[np.ndarray, "n s"]:
+    """The functions of a reduced link and those components of deflections that have most strain energy beside them.
+
+    Parameters
+    ----------
+    deflections : of the link that it was made from
+    most : functions to add
+    """
+    full, Q = _made_from(link)
+    H = energy_product(full)
+    S = np.concatenate(deflections, axis=1)
+    own = _orthonormal(Q, H, INDEPENDENT)[0]
+    S = S - Q @ (Q.T @ np.asarray(full.mass[0] @ S))
+    S = S - own @ (own.T @ np.asarray(H @ S))
+    return np.concatenate([Q, _orthonormal(S, H, 1e-10)[0][:, :most]], axis=1)
+
+
+def _made_from(link: Link) -> tuple[Link, Float[np.ndarray, "n s"]]:
+    if link.full is None or link.Q is None:
+        raise ValueError(f"link {link.name} is not reduced")
+    return link.full, link.Q
 
 
 def energy_product(link: Link) -> sp.csr_array:
