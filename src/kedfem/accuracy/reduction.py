@@ -17,7 +17,8 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.reduction import bases, enriched, reduced_model, static_parts
+from kedfem.dynamics.model import reduced_model
+from kedfem.dynamics.reduction import bases, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
 from kedfem.motion.rigid import RigidMotion, rigid_motion

@@ -6,7 +6,7 @@ later. Taken apart into scalar components and sorted by strain energy, the first
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,12 +14,11 @@ from jaxtyping import Float
 
 from kedfem.dynamics.condensed import Rotation, Substructure, coupled, factored
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import mass_orthonormal, reduced, scalar_block
+from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: functions below repeat others
@@ -132,7 +131,7 @@ def energy_sorted(
     """Scalar components of deflections, orthonormal in an energy-like product and sorted by their weight in it."""
     H = energy_product(link)
     S = np.concatenate(deflections, axis=1)
-    rigid = mass_orthonormal(link, _rigid_functions(link))
+    rigid = mass_orthonormal(link, rigid_functions(link))
     S, E = (x - rigid @ (rigid.T @ np.asarray(link.mass[0] @ x)) for x in (S, ports))
     E = _orthonormal(E, H, 1e-10)[0]
     S = S - E @ (E.T @ np.asarray(H @ S))
@@ -151,19 +150,13 @@ def enriched(
     deflections : of the link that it was made from
     most : functions to add
     """
-    full, Q = _made_from(link)
+    full, Q = link.full or link, on_functions(link)
     H = energy_product(full)
     S = np.concatenate(deflections, axis=1)
     own = _orthonormal(Q, H, INDEPENDENT)[0]
     S = S - Q @ (Q.T @ np.asarray(full.mass[0] @ S))
     S = S - own @ (own.T @ np.asarray(H @ S))
     return np.concatenate([Q, _orthonormal(S, H, 1e-10)[0][:, :most]], axis=1)
-
-
-def _made_from(link: Link) -> tuple[Link, Float[np.ndarray, "n s"]]:
-    if link.full is None or link.Q is None:
-        raise ValueError(f"link {link.name} is not reduced")
-    return link.full, link.Q
 
 
 def energy_product(link: Link) -> sp.csr_array:
@@ -178,37 +171,6 @@ def port_functions(link: Link, joint: Attachment, part: Substructure) -> Float[n
     for k, (p, c) in enumerate(zip(port, component, strict=True)):
         out[:, p] += part.Y[:, k].reshape(-1, link.d)[:, c]
     return out
-
-
-def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
-    """The changed copy of a model whose links move in the span of given functions; None leaves a link as it is."""
-    links = [x if Q is None else reduced(x, Q) for x, Q in zip(model.links, functions, strict=True)]
-    joints = [_on_functions(joint, link) for joint, link in zip(model.joints, links, strict=True)]
-    loads = [tuple(_projected(x, link) for x in each) for each, link in zip(model.loads, links, strict=True)]
-    sliders = tuple(
-        slider if (Q := links[slider.carrier].Q) is None else replace(
-            slider, weights=slider.weights @ Q,
-            loads=tuple(_projected(x, links[slider.carrier]) for x in slider.loads),
-        )
-        for slider in model.sliders
-    )  # fmt: skip
-    return replace(model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=sliders)
-
-
-def _on_functions(joint: Attachment, link: Link) -> Attachment:
-    if link.Q is None:
-        return joint
-    return replace(joint, nodes=np.arange(link.n), weights=joint.weights @ link.Q[joint.nodes])
-
-
-def _projected(load: Pattern, link: Link) -> Pattern:
-    return load if link.Q is None else replace(load, forces=link.Q.T @ load.forces)
-
-
-def _rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
-    """1 and the coordinates, of planar links x and y; about the middle, so that they are far from dependent."""
-    X = link.X[:, :2] if link.planar else link.X
-    return np.concatenate([link.one[:, None], X - np.outer(link.one, X[link.one != 0].mean(axis=0))], axis=1)
 
 
 def _orthonormal(

@@ -1,6 +1,7 @@
 """The elastic motion step by step: M δ'' + C δ' + K δ = P − M R0'', [KED, eq. (20)]."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,12 @@ from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import MotionLaw, Scene, drive_angle, time_grid
+from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
+from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, time_grid, turn_steps
 
 POINTS = 256  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
+KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
 Steps = CondensedSteps | LiteralSteps | DenseSteps
@@ -53,16 +55,14 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    grid, law = time_grid(scene), scene.drive.motion
+    law = scene.drive.motion
     states = first_states(scene, linkage, along, law, model)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
     length = block_length(model)
-    for first in range(1, grid.steps + 1, POINTS):
-        t = grid.step * np.arange(first, min(first + POINTS, grid.steps + 1))
-        motion = rigid_motion(linkage, along, t, drive_angle(law, t))
-        for k in range(0, len(t), length):
+    for first, motion in motions(scene, linkage, along):
+        for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
             forcing = forcings(model, load_factors(model, part.t), part)
             links, state = solver.advance(state, forcing)
@@ -74,6 +74,30 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     """All time points of `transient`, one by one."""
     for block in transient(scene, linkage, along, model, solver):
         yield from (block.at(k) for k in range(len(block)))
+
+
+def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
+    """Rigid motion at all time points after the first, block after block with the number of its first point.
+
+    A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
+    """
+    grid, law = time_grid(scene), scene.drive.motion
+    turn = turn_steps(scene) or 0.0
+    returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
+    kept: list[RigidMotion] = []
+    for first in range(1, grid.steps + 1, POINTS):
+        steps = np.arange(first, min(first + POINTS, grid.steps + 1))
+        t = grid.step * steps
+        drive = drive_angle(law, t)
+        if kept and first > round(turn):
+            if len(kept) > 1:
+                kept = [joined(kept)]
+            yield first, replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0])
+            continue
+        motion = rigid_motion(linkage, along, t, drive)
+        if returns and first <= turn <= KEPT and grid.steps > turn:
+            kept.append(motion)
+        yield first, motion
 
 
 def block_length(model: Model) -> int:

@@ -11,7 +11,7 @@ from kedfem.scene import Bar, LinkScene, Part, PlateLink, Polyline, Scene
 
 
 def bare_links(scene: Scene) -> dict[str, Link]:
-    """Records of all elastic links, without attached bodies.
+    """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
 
     Raises
     ------
@@ -19,7 +19,7 @@ def bare_links(scene: Scene) -> dict[str, Link]:
         If a link cannot be meshed well enough.
     """
     return {
-        name: _bare_link(scene, name, link) for name, link in scene.links.items() if link.fidelity != "rigid"
+        name: _bare_link(scene, name, link) for name, link in scene.links.items() if link.shape is not None
     }
 
 

@@ -59,6 +59,7 @@ class Link:
     basis : scikit-fem basis of a solid (for this room only), else None.
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
+    rigid : whether the link only moves rigidly; then it has no stress
     """
 
     name: str
@@ -79,6 +80,7 @@ class Link:
     basis: Any = None
     full: "Link | None" = None
     Q: Float[np.ndarray, "_ n"] | None = None
+    rigid: bool = False
 
     @property
     def n(self) -> int:

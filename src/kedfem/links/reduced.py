@@ -14,6 +14,8 @@ from jaxtyping import Float
 
 from kedfem.links.record import Link, read_only
 
+RIGID = 1e3
+
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     """The changed copy of a link that moves in the span of functions Q only.
@@ -40,6 +42,13 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     volume = Q.T @ link.volume
     read_only(Q, one, X, K0, m1, mX)
     return replace(link, X=X, one=one, mass=mass, K0=K0, m1=m1, mX=mX, volume=volume, full=link, Q=Q)
+
+
+def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
+    """Q of a reduced link: weights of the full link @ Q are weights of its functions."""
+    if link.Q is None:
+        raise ValueError(f"link {link.name} is not reduced")
+    return link.Q
 
 
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
@@ -72,3 +81,44 @@ def scalar_block(link: Link, i: int, j: int) -> sp.csr_array:
 def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s s"]:
     G = Q.T @ np.asarray(m @ Q)
     return np.asarray((G + G.T) / 2)
+
+
+def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
+    """1 and the coordinates, of planar links x and y; about the middle, so that they are far from dependent."""
+    X = link.X[:, :2] if link.planar else link.X
+    return np.concatenate([link.one[:, None], X - np.outer(link.one, X[link.one != 0].mean(axis=0))], axis=1)
+
+
+def rigid(link: Link) -> Link:
+    """The changed copy of a link that only moves rigidly: {1, x, y, z} made stiff.
+
+    Its own vibrations are put RIGID times above an axial wave's passing frequency √(E/ρ)/L.
+    """
+    made = reduced(link, rigid_functions(link))
+    density = float(link.m1[:, 0].sum() / link.volume.sum())
+    stiffness = (RIGID**2 * link.E / density) / float(np.ptp(link.X, axis=0).max()) ** 2
+    B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
+    K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
+    return replace(made, K0=K0, rigid=True)
+
+
+def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
+    """States (dn,) of small rigid motion: translations and turns, column by column."""
+    translations = [np.outer(link.one, e) for e in np.eye(link.d)[: 2 if link.planar else 3]]
+    turns = []
+    for i, j in ((0, 1),) if link.planar else ((0, 1), (1, 2), (2, 0)):
+        u = np.zeros((link.n, link.d))
+        u[:, i], u[:, j] = -link.X[:, j], link.X[:, i]
+        if link.kind == "beam":
+            u[:, 2] = link.one
+        turns.append(u)
+    return np.stack([u.ravel() for u in (*translations, *turns)], axis=1)
+
+
+def _weighted(link: Link, A: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:
+    """M^½ A of a reduced link: only a beam's turning has another mass than 1."""
+    out = A.reshape(link.n, link.d, -1).copy()
+    for c, m in enumerate(link.mass):
+        values, vectors = np.linalg.eigh(m)
+        out[:, c] = (vectors * np.sqrt(values)) @ (vectors.T @ out[:, c])
+    return out.reshape(A.shape)
