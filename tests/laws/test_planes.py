@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.literal import rotated_stiffness
-from kedfem.links.plane import plane_basis, plane_stress
+from kedfem.dynamics.loads import applied
+from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
+from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
 from kedfem.links.seats import face_seat, joint_seat, port_weights, surface_weights
@@ -28,6 +30,7 @@ from tests.laws.strategies import (
     vectors,
 )
 from tests.laws.test_hexahedra import ROUNDING
+from tests.laws.test_loads_and_joints import Z, at_one_instant, kinetic_energy, point_acceleration
 
 planar_motions = st.builds(
     lambda R, p, w, v: Motion(R, p * [1, 1, 0], w * [0, 0, 1], v * [1, 1, 0]),
@@ -165,8 +168,6 @@ def test_without_contraction_a_plane_link_is_the_solid_moving_in_its_plane() -> 
     """ν = 0: plane stress is plane strain, and the hexahedra swept from the quadrilaterals hold the same energy."""
     material = Material(density=2700, youngs_modulus=70e9, poisson_ratio=0.0)
     quads, cells = rectangle_quads(0.3, 0.1, 3, 2)
-    from kedfem.links.plane import plane_link
-
     flat = plane_link("flat", QuadMesh(np.pad(quads, ((0, 0), (0, 1))), cells, 0.02), material, np.eye(3))
     solid = solid_link("solid", extruded(quads, cells, 0.02, 1), material, np.eye(3))
 
@@ -199,7 +200,7 @@ def disc(z: float = 0.3) -> Link:
 def test_a_bore_reads_value_and_gradient_of_affine_fields_exactly(seed: int) -> None:
     link, random = disc(), np.random.default_rng(seed)
     a, H = random.uniform(-1, 1, 2), random.uniform(-1, 1, (2, 2))
-    seat = joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
     u = a + link.X[:, :2] @ H.T
     point = random.uniform(-1, 1, 3)  # its z plays no part
     np.testing.assert_allclose(
@@ -213,7 +214,7 @@ def test_a_bore_reads_value_and_gradient_of_affine_fields_exactly(seed: int) -> 
 
 def test_edges_have_the_area_of_length_times_thickness() -> None:
     link = disc()
-    bore = joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+    bore = joint_seat(link, "joints.A", np.zeros(3), Z)
     rim = face_seat(link, "loads.p.at", np.array([0.25, 0, 0]))
     # 2 π r t; quadratic edges of 30° are 8e-5 short
     assert surface_weights(link, bore).sum() == pytest.approx(2 * np.pi * 0.1 * 0.02, rel=1e-4)
@@ -227,3 +228,49 @@ def test_edges_have_the_area_of_length_times_thickness() -> None:
     assert (bar.X[weights != 0, 0] == 0.3).all()
     np.testing.assert_allclose(end.origin, [0.3, 0, 0], atol=1e-15)
     np.testing.assert_allclose(np.abs(end.directions[0]), [0, 1, 0], atol=1e-15)
+
+
+# -- inertia ------------------------------------------------------------------------------------------------
+
+
+@LAW
+@given(quadrilaterals(), planar_motions, vectors, vectors)
+def test_inertia_load_is_literally_minus_M_R0(
+    mesh: QuadMesh, motion: Motion, alpha: np.ndarray, p2: np.ndarray
+) -> None:
+    """m·1 and m·X serve in place of M R0'' at the nodes, [KED, eq. (17)]."""
+    link, alpha, p2 = plane(mesh), alpha * [0, 0, 1], p2 * [1, 1, 0]
+    got = applied(link, (), np.zeros((0, 1)), at_one_instant(motion, alpha, p2), 1, 0)
+    wanted = -link.mass[0] @ point_acceleration(motion, alpha, p2, link.X * [1, 1, 0])[:, :2]
+    np.testing.assert_allclose(got, wanted, atol=1e-12 * max(np.abs(wanted).max(), 1e-300))
+
+
+@LAW
+@given(planar_motions, vectors, seeds)
+def test_kinetic_energy_with_a_body_is_that_of_link_and_rigid_body(
+    motion: Motion, centre: np.ndarray, seed: int
+) -> None:
+    """In the plane: T = T_link + ½ m v² + ½ I_zz ω², the centre anywhere, its z of no account."""
+    link, random = disc(), np.random.default_rng(seed)
+    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
+    mass, spread = random.uniform(0.1, 100), random.uniform(-1, 1, (4, 3))
+    inertia = mass * sum(r @ r * np.eye(3) - np.outer(r, r) for r in spread)
+    loaded = with_body(link, seat, mass, centre, euler_tensor(inertia))
+    velocity = motion.velocity(link.X * [1, 1, 0])[:, :2]
+    v = motion.velocity(centre * [1, 1, 0])
+    wanted = kinetic_energy(link, velocity) + (mass * v @ v + inertia[2, 2] * motion.omega[2] ** 2) / 2
+    assert kinetic_energy(loaded, velocity) == pytest.approx(wanted, rel=1e-11)
+    np.testing.assert_allclose(loaded.m1.sum(axis=0), MATERIAL.density * link.volume.sum() + mass, rtol=1e-11)
+
+
+@pytest.mark.parametrize("where", ["bore", "edge"])
+def test_a_flywheel_adds_its_inertia_about_z(where: str) -> None:
+    """½ J ω² on a bore, whose gradient is known all round, and on a straight edge, where it is known along it."""
+    quads, cells = rectangle_quads(0.3, 0.1, 3, 2)
+    bar = plane(QuadMesh(np.pad(quads, ((0, 0), (0, 1))), cells, 0.02))
+    link = disc() if where == "bore" else bar
+    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
+    loaded = with_body(link, seat, 0.0, np.zeros(3), flywheel_tensor(seat, Z, 0.7))
+    turning = np.stack([-link.X[:, 1], link.X[:, 0]], axis=1) * 3.0
+    added = kinetic_energy(loaded, turning) - kinetic_energy(link, turning)
+    assert added == pytest.approx(0.7 * 3.0**2 / 2, rel=1e-9)
