@@ -33,10 +33,11 @@ PLATE = {
 
 
 def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
-    """[KED]'s four-bar (Nath and Ghosh 1980) of beams, solid bars or plate links, some damping."""
-    shape = PLATE if kind == "plate" else {"kind": "bar", **BAR}
-    fidelity = {"fidelity": "beam"} if kind == "beam" else {}
-    mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": {"elements_across": 1}}[kind]
+    """[KED]'s four-bar (Nath and Ghosh 1980) of beams, solid bars, plate links or plane plate links, some damping."""
+    shape = PLATE if kind in {"plate", "plane"} else {"kind": "bar", **BAR}
+    fidelity = {"fidelity": kind} if kind in {"beam", "plane"} else {}
+    across = {"elements_across": 1}
+    mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": across, "plane": across}[kind]
     ends = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
     pairs = {
         "A": ["ground", "crank"],
@@ -74,7 +75,8 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "steps", "bound"), [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 3e-8)]
+    ("kind", "steps", "bound"),
+    [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 3e-8), ("plane", 120, 3e-8)],
 )
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
@@ -109,7 +111,7 @@ def test_condensed_is_literal_however_long_the_step(kind: str) -> None:
             assert_allclose(s.u, r.u, rtol=0, atol=1e-8 * peak)
 
 
-@pytest.mark.parametrize("kind", ["beam", "plate"])
+@pytest.mark.parametrize("kind", ["beam", "plate", "plane"])
 def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) -> None:
     model, _, snapshots = run(four_bar(kind, rho_inf=0.9, initial="quasi-static"))
     for snapshot in snapshots[:: len(snapshots) // 10]:
@@ -125,7 +127,7 @@ def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) 
             assert_allclose(held, B @ z, rtol=0, atol={"u": 1e-12, "v": 1e-9, "a": 1e-6}[field] * size)
 
 
-@pytest.mark.parametrize("kind", ["beam", "plate"])
+@pytest.mark.parametrize("kind", ["beam", "plate", "plane"])
 def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None:
     raw = four_bar(kind)
     raw["gravity"] = [0, -9.81, 0]

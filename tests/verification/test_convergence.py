@@ -13,6 +13,7 @@ from kedfem.scene import Material
 
 from .linear import free_map, frequencies, frequency_of
 from .meshes import box, mapped_link
+from .planes import energy_error
 from .rotation import bar, steady_deflection, steady_state
 from .vibrations import CUBE, DEEP, STEEL, lame_mode, lame_shape, pinned_beam, timoshenko
 
@@ -83,3 +84,12 @@ def test_beams_converge_to_timoshenko(nodes: int, order: int, cap: float, mode: 
     found, last = slopes(error, [10, 20, 40])
     np.testing.assert_allclose(found, order, atol=0.1)
     assert last < mode**2 * cap
+
+
+def test_a_plane_cantilever_converges_in_energy() -> None:
+    """Order 2 at least in the energy's norm; nodal values of quadratic elements on a regular mesh do better."""
+    e = [energy_error((2 * n, n)) for n in (2, 4, 8, 16)]
+    rates = np.log2(np.divide(e[:-1], e[1:]))
+    assert (rates > 2.3).all()
+    assert (rates < 2.8).all()
+    assert e[-1] < 1e-4

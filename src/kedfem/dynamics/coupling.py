@@ -250,11 +250,10 @@ def port_points(
     at = np.asarray(joint.at)
     if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
         return at[None, :]
+    if links[next(iter(seats))].planar:
+        return _plane_points(scene, name, joint, seats)
     seat = next(iter(seats.values()))
     driven = scene.drive.joint == name
-    if links[next(iter(seats))].planar:
-        across = seat.directions[0]
-        return np.array([at, at + 2 * seat.spread[0] * across][: 2 if driven or joint.kind == "weld" else 1])
     if joint.kind == "revolute":
         axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
@@ -275,6 +274,22 @@ def port_points(
                 "got a flat face across the axis: give the link a bore about the joint's axis"
             )
     return np.array(points)
+
+
+def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
+    """The joint's point and, where turning is held, another: along a slide, else along the narrowest seat's surface."""
+    at = np.asarray(joint.at)
+    if joint.kind == "revolute" and scene.drive.joint != name:
+        return at[None, :]
+    narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
+    along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
+    for link, seat in seats.items():
+        if not holds(seat, along):
+            raise MeshError(
+                f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
+                f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
+            )
+    return np.array([at, at + 2 * narrow.spread[0] * along])
 
 
 def _spread_along(seat: Seat, axis: Float[np.ndarray, "3"]) -> float:

@@ -69,10 +69,12 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
             weights = rows.value
         case BodyLoad():
             weights = link.volume
-        case SurfaceLoad() if link.kind == "solid":
+        case SurfaceLoad() if link.meshed:
             weights = surface_weights(link, face_seat(link, f"{where}.at", np.asarray(load.at)))
         case _:
-            raise SceneError(f"{where}: a surface force needs a solid link, got the beam '{link.name}'")
+            raise SceneError(
+                f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
+            )
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
     return Pattern(forces, load.frame == "link", lambda t: load_factor(load.factor, t))
 

@@ -181,7 +181,7 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
         case PointMass(mass=mass):
             return with_body(link, seat, mass, at, np.zeros((3, 3)))
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
-            if link.kind == "solid" and is_flat(seat):
+            if link.meshed and is_flat(seat):
                 raise MeshError(
                     f"{where}.at: a rigid body with full inertia must sit on a bore, got a flat face of '{link.name}'"
                 )

@@ -4,9 +4,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.links.beam import beam_link, line_axes
+from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, Section
 from kedfem.links.solid import solid_link
-from kedfem.mesh import link_mesh
+from kedfem.mesh import link_mesh, plane_mesh
 from kedfem.scene import Bar, LinkScene, Part, PlateLink, Polyline, Scene
 
 
@@ -38,6 +39,8 @@ def _bare_link(scene: Scene, name: str, link: LinkScene) -> Link:
     material = scene.materials[str(link.material)]
     if link.fidelity == "solid":
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
+    if link.fidelity == "plane":
+        return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
     shape = link.shape
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already

@@ -54,9 +54,10 @@ class Link:
     m1 : (n, d) mass times one, component by component [kg].
     mX : (n, 3) mass times position [kg m].
     volume : (n,) ∫ N_a dV of the link alone, without attached bodies [m³].
-    E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses.
+    E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses; of a plane link those of plane stress.
     section : of a beam, else None.
-    basis : scikit-fem basis of a solid (for this room only), else None.
+    basis : scikit-fem basis of a solid or plane link (for this room only), else None.
+    thickness : of a plane link [m], else one: what integrals over its area or edges are multiplied by.
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
@@ -78,6 +79,7 @@ class Link:
     lame: tuple[float, float]
     section: Section | None = None
     basis: Any = None
+    thickness: float = 1.0
     full: "Link | None" = None
     Q: Float[np.ndarray, "_ n"] | None = None
     rigid: bool = False
@@ -101,6 +103,11 @@ class Link:
     def planar(self) -> bool:
         """Whether the link moves in a plane z = constant only."""
         return self.kind in {"plane", "beam"}
+
+    @property
+    def meshed(self) -> bool:
+        """Whether the link is a mesh with bores and faces, not a line."""
+        return self.kind in {"solid", "plane"}
 
 
 def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray, "*k d"]:

@@ -1,4 +1,4 @@
-"""Cross checks of beams and their plane, of the analysis and its drive, of files; each yields fault lines."""
+"""Cross checks of planar links and their plane, of the analysis and its drive, of files; each yields fault lines."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from typing import Any
 
 from kedfem.errors import SceneError
-from kedfem.scene.checks import fidelity
+from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
-from kedfem.scene.parts import Parts
+from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
@@ -18,15 +18,10 @@ from kedfem.scene.timing import turning_speed
 FLAT = 1e-9  # how far from the plane, relative to the size of the scene
 
 
-def beam_faults(parts: Parts) -> Iterator[str]:
-    """Beams beside solids, and what leaves the plane of a scene of beams."""
-    solids = [link for link in parts.links.values() if fidelity(link) == "solid"]
-    beams = [link for link in parts.links.values() if fidelity(link) == "beam"]
-    if not beams:
-        return
-    if solids:
-        names = f"got {beams[0].name!r} as a beam and {solids[0].name!r} as a solid"
-        yield f"links: must all be solids or all be beams (rigid sliders go with both), {names}"
+def planar_faults(parts: Parts) -> Iterator[str]:
+    """What leaves the plane of a scene with beams or plane links."""
+    here = planar_scene(parts)
+    if not here:
         return
     for joint in parts.joints.values():
         axis = joint.record.axis if joint.record is not None else None
@@ -34,17 +29,38 @@ def beam_faults(parts: Parts) -> Iterator[str]:
             continue
         off = max(abs(axis[0]), abs(axis[1]))
         if joint.record.kind == "revolute" and off > FLAT:
-            yield joint.fault("axis", f"must be along z in a scene of beams, got {vector(axis)}")
+            yield joint.fault("axis", f"must be along z in {here}, got {vector(axis)}")
         if joint.record.kind == "prismatic" and abs(axis[2]) > FLAT:
-            yield joint.fault("axis", f"must lie in the xy plane in a scene of beams, got {vector(axis)}")
+            yield joint.fault("axis", f"must lie in the xy plane in {here}, got {vector(axis)}")
     if parts.gravity[2] != 0.0:
-        yield f"gravity: must lie in the xy plane in a scene of beams [m/s^2], got {vector(parts.gravity)}"
+        yield f"gravity: must lie in the xy plane in {here} [m/s^2], got {vector(parts.gravity)}"
     for load in parts.loads.values():
         if load.record is not None and load.record.vector[2] != 0.0:
             yield load.fault(
-                "vector", f"must lie in the xy plane in a scene of beams, got {vector(load.record.vector)}"
+                "vector", f"must lie in the xy plane in {here}, got {vector(load.record.vector)}"
             )
-    yield from plane_faults(parts)
+    yield from mixed_faults(parts)
+    yield from plane_faults(parts, here)
+
+
+def mixed_faults(parts: Parts) -> Iterator[str]:
+    """Joints other than hinges between links of different kinds."""
+    for joint in parts.joints.values():
+        held = [parts.links[name] for name in link_names(joint) if name in parts.links]
+        kinds = [NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS]
+        if len(set(kinds)) == 2 and joint.word("kind") in {"weld", "prismatic"}:
+            names = " and ".join(f"{link.name!r}, a {kind}" for link, kind in zip(held, kinds, strict=True))
+            wanted = "must be revolute or spherical between links of different fidelity"
+            yield joint.fault("kind", f"{wanted}, got {joint.word('kind')!r} of {names}")
+
+
+def planar_scene(parts: Parts) -> str:
+    """What messages call a scene with links that know no third dimension; nothing if there are none."""
+    kinds = {fidelity(link) for link in parts.links.values()}
+    return " and ".join(
+        f"a scene of {NOUNS[kind]}s" if i == 0 else f"{NOUNS[kind]}s"
+        for i, kind in enumerate(kind for kind in ("plane", "beam") if kind in kinds)
+    )
 
 
 def vector(parts: tuple[float, ...]) -> str:
@@ -52,13 +68,14 @@ def vector(parts: tuple[float, ...]) -> str:
     return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
 
 
-def plane_faults(parts: Parts) -> Iterator[str]:
-    """Points of a scene of beams that are not in the z plane of the first."""
+def plane_faults(parts: Parts, here: str) -> Iterator[str]:
+    """Points of a planar scene that are not in the z plane of the first; those of solids may be."""
+    solids = {link.name for link in parts.links.values() if fidelity(link) == "solid"}
     placed = [
         (entry, key, point)
-        for section in (parts.links, parts.joints, parts.loads, parts.bodies, parts.probes)
+        for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes)
         for entry in section.values()
-        if entry.record is not None
+        if entry.record is not None and link_of(entry) not in solids
         for key, point in points_of(entry.record)
         if all(math.isfinite(part) for part in point)
     ]
@@ -68,8 +85,13 @@ def plane_faults(parts: Parts) -> Iterator[str]:
     size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
     for entry, key, point in placed:
         if abs(point[2] - first[2]) > FLAT * size:
-            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of a scene of beams [m]"
+            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of {here} [m]"
             yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
+
+
+def link_of(entry: Entry) -> str | None:
+    """The link that an entry is, or is on; none for a joint."""
+    return entry.name if entry.where[0] == "links" else entry.word("link")
 
 
 def points_of(record: Any) -> Iterator[tuple[tuple[str, *tuple[str | int, ...]], XYZ]]:
@@ -78,6 +100,8 @@ def points_of(record: Any) -> Iterator[tuple[tuple[str, *tuple[str | int, ...]],
     for key in ("between", "points"):
         for i, point in enumerate(getattr(shape, key, ())):
             yield ("shape", key, i), point
+    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
+        yield ("shape", "outline", i), getattr(item, "to", item)
     for key in ("at", "centre"):
         if hasattr(record, key):
             yield (key,), getattr(record, key)

@@ -35,8 +35,8 @@ as *where: what was wanted, what was got*.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
-* **Beams and solids** cannot share a scene yet; rigid sliders go with both. A scene of beams lies in one
-  plane z = constant, with hinges along z.
+* **Plane links and beams** know no third dimension. A scene with any lies in one plane z = constant, with hinges
+  along z and forces in the plane; solids may share it, joined to the others by hinges.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 
