@@ -9,7 +9,9 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.histories import worst
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Steps, steps_of, transient
@@ -22,7 +24,7 @@ from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
 from kedfem.results.recording import Recorded, recording, rows
-from kedfem.scene import Scene, time_grid, turn_steps
+from kedfem.scene import Scene, rayleigh, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 SMALL_DEFLECTION = (
@@ -55,6 +57,7 @@ class Run:
     peak: Peak | None
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
+    reduction: Reduction | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -72,7 +75,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     """
     clock = Clock(watch)
     folder = ready_folder(scene.results_folder)
-    ready = meshed(scene, clock.stage)
+    ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
@@ -81,8 +84,13 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     )
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
-    warnings = (*deflection_warning(deflection), *warnings)
-    return Run(folder, results, peak, clock.seconds, warnings)
+    warnings = (
+        *marginal_warning(scene),
+        *deflection_warning(deflection),
+        *reduction_warning(reduction),
+        *warnings,
+    )
+    return Run(folder, results, peak, clock.seconds, warnings, reduction)
 
 
 @dataclass
@@ -130,6 +138,27 @@ def deflection_warning(deflection: float) -> tuple[str, ...]:
     return (
         f"links deflect by up to {100 * deflection:.2g} % of their length; equation (20) takes that as small: "
         f"expect the results to be trustworthy below {100 * SMALL_DEFLECTION:.0f} % only",
+    )
+
+
+def marginal_warning(scene: Scene) -> tuple[str, ...]:
+    """A warning where vibration that the step cannot resolve may grow (docs/theory.md)."""
+    if scene.analysis.rho_inf < 1.0 or rayleigh(scene.damping)[1] == 0.0:
+        return ()
+    return (
+        "analysis.rho_inf = 1 with damping in proportion to the stiffness: vibration that the step cannot resolve grows "
+        "slowly in links that turn; take 0.95",
+    )
+
+
+def reduction_warning(reduction: Reduction | None) -> tuple[str, ...]:
+    """A warning where the reduction may have cost more than was allowed."""
+    if reduction is None or worst(reduction.estimate) <= reduction.tolerance:
+        return ()
+    name = max(reduction.estimate, key=lambda x: reduction.estimate[x])
+    return (
+        f"reduced links: the error in {name} is estimated at {100 * reduction.estimate[name]:.2g} % of its peak, "
+        f"above the {100 * reduction.tolerance:.2g} % asked for",
     )
 
 

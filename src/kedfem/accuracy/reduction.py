@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
@@ -22,7 +22,9 @@ from kedfem.dynamics.reduction import bases, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import drive_angle, time_grid, turn_steps
+from kedfem.scene import Scene, drive_angle, time_grid, turn_steps
+
+Stage = Callable[[str], None]
 
 INSTANTS = 16  # where the linkage is looked at before the first run
 MOMENTS = 16  # of a run where its residual is taken
@@ -49,9 +51,25 @@ class Reduction:
     tolerance: float
 
 
+def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, Reduction | None]:
+    """Everything of a scene that does not need a time step; links that ask for it are reduced.
+
+    Raises
+    ------
+    MotionError, MeshError, SceneError
+    """
+    full = meshed(scene, stage)
+    chosen = {name: link.functions for name, link in scene.links.items() if link.reduced}
+    if not chosen:
+        return full, None
+    counts = {name: count for name, count in chosen.items() if count is not None}
+    found = reduced(full, chosen, scene.analysis.reduction, counts, stage)
+    return found.ready, found
+
+
 def reduced(
     full: Prepared, chosen: Collection[str], tolerance: float, counts: dict[str, int] | None = None,
-    stage: Callable[[str], None] = lambda name: None,
+    stage: Stage = lambda name: None,
 ) -> Reduction:  # fmt: skip
     """Reduce some links of a prepared scene, as far as a tolerance allows.
 

@@ -99,9 +99,13 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
         if body.link in links:
             links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])
     carried = tuple(
-        Carried(links.pop(name), linkage.bodies.index(name), scene.drive.joint, ())
+        Carried(rigid(links.pop(name)), linkage.bodies.index(name), scene.drive.joint, ())
         for name in list(links) if moves_with_drive(scene, name)
     )  # fmt: skip
+    if not links:
+        raise SceneError(
+            "links: must hold a link that the drive does not simply carry along, got rigid ones only"
+        )
     carried = tuple(replace(x, loads=patterns(scene, x.link.name, x.link)) for x in carried)
     numbers = {name: k for k, name in enumerate(links)}
     sliders = tuple(

@@ -37,9 +37,9 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
 
 def _bare_link(scene: Scene, name: str, link: LinkScene) -> Link:
     material = scene.materials[str(link.material)]
-    if link.fidelity == "solid":
+    if link.family == "solid":
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
-    if link.fidelity == "plane":
+    if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
     shape = link.shape
     if not isinstance(shape, Bar | Polyline):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,7 +11,8 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.condensed import turned_ports
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.model import Model, Slider
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.model import Carried, Model, Slider
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
@@ -44,7 +46,7 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    return [*probes, *joints, _torque(scene, model), _rigid_torque(model), _energy(model)]
+    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), _energy(model)]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -94,26 +96,90 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
     if slider is not None:
         return _slider_force(scene, model, slider, name)
+    hub = next((x for x in model.carried if x.hub == name), None)
+    if hub is not None:
+        return _hub(scene, model, hub)
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
     k = _number(model, held[0])
-    other = next(link for link in scene.joints[name].links if link != held[0])
-    label = f"of joint {name} on link {held[0]} from {other}"
-    force = Channel(f"joints/{name}/force", XYZ, "N", "world", f"force {label}")
-    moment = Channel(
-        f"joints/{name}/moment", XYZ, "N m", "world", f"moment {label}, about the joint's nominal point"
-    )
+    first, second = scene.joints[name].links
+    opposite = first in {x.link.name for x in model.carried}  # it has no ports of its own
+    on, other = (first, second) if held[0] == first or opposite else (second, first)
+    sign = -1.0 if opposite else 1.0
+    label = f"of joint {name} on link {on} from {other}"
     at = np.asarray(scene.joints[name].at)
-    if not _determinate(model, k, name, at):
-        return []
     wrench = _wrench(model, k, name, at)
-    return [Recorded(force, lambda s: wrench(s)[0]), Recorded(moment, lambda s: wrench(s)[1])]
+    return [
+        Recorded(channel, partial(_part_of, wrench, which, sign))
+        for which, (channel, known) in enumerate(
+            zip(_force_and_moment(name, label), _determinate(model, k, name, at), strict=True)
+        )
+        if known
+    ]
 
 
-def _wrench(
-    model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]
-) -> Callable[[Block], tuple[Rows, Rows]]:
+Wrench = Callable[[Block], tuple[Rows, Rows]]
+
+
+def _part_of(wrench: Wrench, which: int, sign: float, block: Block) -> Rows:
+    """Force (0) or moment (1)."""
+    return sign * wrench(block)[which]
+
+
+def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
+    about = f"moment {label}, about the joint's nominal point"
+    return (
+        Channel(f"joints/{joint}/force", XYZ, "N", "world", f"force {label}"),
+        Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
+    )
+
+
+def _hub(scene: Scene, model: Model, carried: Carried) -> list[Recorded]:
+    """Force and moment that the driven joint exerts on a rigid link that moves with it."""
+    wrench, others = _hub_wrench(scene, model, carried)
+    loose = [_loose(model, *each) for each in others]
+    known = [all(_small(x[which]) for x in loose) for which in (0, 1)]
+    label = f"of joint {carried.hub} on link {carried.link.name} from ground"
+    channels = enumerate(_force_and_moment(carried.hub, label))
+    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if known[k]]
+
+
+Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
+
+
+def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, list[Held]]:
+    """What holds a carried link in balance: P − M R0'', the forces of its other joints, and the hub's; these joints."""
+    link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
+    held: list[Held] = []
+    for name, joint in scene.joints.items():
+        elastic = [x.name for x in model.links if x.name in joint.links]
+        if link.name in joint.links and elastic:
+            held.append((_number(model, elastic[0]), name, np.asarray(joint.at)))
+    others = [(_wrench(model, *each), each[2]) for each in held]
+
+    def wrench(block: Block) -> tuple[Rows, Rows]:
+        F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
+        arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
+        force = -in_space(link, np.tensordot(F, link.one, (1, 0)))
+        moment = -_resultant(link, arms, F)[1]
+        for other, at in others:
+            f, m = other(block)
+            force = force + f
+            moment = moment + m + cross((R @ (at - hub)), f)
+        return force, moment
+
+    return wrench, held
+
+
+def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
+    """P − M R0'' of a carried link."""
+    t = block.motion.t
+    factors = np.array([load.factor(t) for load in carried.loads]).reshape(len(carried.loads), len(t))
+    return applied(carried.link, carried.loads, factors, block.motion, carried.body)
+
+
+def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wrench:
     """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
     attachment, link = model.joints[k], model.links[k]
     rows = _rows_of(attachment, joint)
@@ -131,14 +197,22 @@ def _wrench(
     return wrench
 
 
-def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> bool:
-    """Whether statics tell what the joint exerts on link k, where several joints share its seat."""
+def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
+    """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
+    force, moment = _loose(model, k, joint, at)
+    return _small(force), _small(moment)
+
+
+def _loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
+    """Forces and moments of a joint that statics leave open, as drawn."""
     attachment = model.joints[k]
-    rows = _rows_of(attachment, joint)
     arms, link = _arms(attachment, joint, at), model.links[k]
-    loose = attachment.loose[rows].T
-    force, moment = _resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
-    return bool(max(np.abs(force).max(initial=0.0), np.abs(moment).max(initial=0.0)) < INDETERMINATE)
+    loose = attachment.loose[_rows_of(attachment, joint)].T
+    return _resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
+
+
+def _small(loose: Float[np.ndarray, "..."]) -> bool:
+    return bool(np.abs(loose).max(initial=0.0) < INDETERMINATE)
 
 
 def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
@@ -169,7 +243,7 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     ]  # fmt: skip
     zero = np.zeros(3)
     pairs = [(k, j) for k, x in enumerate(model.joints) for j in pins if j in x.joints]
-    if not all(_determinate(model, k, j, zero) for k, j in pairs):
+    if not all(_determinate(model, k, j, zero)[0] for k, j in pairs):
         return []
     wrenches = [_wrench(model, k, j, zero) for k, j in pairs]
     if name == slider.guide:
@@ -196,16 +270,20 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
-def _torque(scene: Scene, model: Model) -> Recorded:
+def _torque(scene: Scene, model: Model) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
     joint = scene.joints[scene.drive.joint]
-    k = next(_number(model, link) for link in joint.links if link != "ground")
+    name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
-    channel = Channel(
-        "drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {model.links[k].name}"
-    )
-    wrench = _wrench(model, k, scene.drive.joint, at)
-    return Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])
+    channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
+    carried = next((x for x in model.carried if x.link.name == name), None)
+    if carried is None:
+        wrench = _wrench(model, _number(model, name), scene.drive.joint, at)
+    else:
+        wrench, others = _hub_wrench(scene, model, carried)
+        if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
+            return []
+    return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
 
 
 def _rigid_torque(model: Model) -> Recorded:
@@ -216,11 +294,12 @@ def _rigid_torque(model: Model) -> Recorded:
 
     def torque(block: Block) -> Rows:
         motion, work = block.motion, np.zeros(len(block))
-        for link, body, history in zip(model.links, model.bodies, block.links, strict=True):
+        elastic = zip(model.links, model.bodies, (history.F for history in block.links), strict=True)
+        for link, body, F in (*elastic, *((x.link, x.body, _on_carried(x, block)) for x in model.carried)):
             v, w = motion.v_phi[:, body], motion.omega_phi[:, body]
-            N = motion.R[:, body] @ (link.X.T @ in_space(link, history.F))  # Σ (R X) ⊗ F
+            N = motion.R[:, body] @ (link.X.T @ in_space(link, F))  # Σ (R X) ⊗ F
             moment = np.stack([N[:, i, j] - N[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
-            total = np.tensordot(history.F, link.one, (1, 0))
+            total = np.tensordot(F, link.one, (1, 0))
             if link.kind == "beam":
                 moment[:, 2] += total[:, 2]
             work += (in_space(link, total) * v + w * moment).sum(axis=1)
