@@ -12,7 +12,13 @@ from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
-ELEMENTS = {"hexahedron27": "hex27", "hexahedron": "hex8", "line3": "beam3", "line": "beam2"}
+ELEMENTS = {
+    "hexahedron27": "hex27",
+    "hexahedron20": "hex20",
+    "hexahedron": "hex8",
+    "line3": "beam3",
+    "line": "beam2",
+}
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 

@@ -57,7 +57,7 @@ def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -
     elements : restrict to these; right at the nodes whose elements are all among them
     """
     mesh_dofs = link.basis.element_dofs
-    points, extension = _gauss_points(len(mesh_dofs))
+    points, extension = _gauss_points(link.basis.elem)
     quadrature = (points, np.ones(points.shape[1]))
     at_gauss = skfem.Basis(link.basis.mesh, link.basis.elem, elements=elements, quadrature=quadrature)
     dofs = mesh_dofs if elements is None else mesh_dofs[:, elements]  # (m, e)
@@ -121,14 +121,13 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
     return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
 
 
-def _gauss_points(nodes: int) -> tuple[Float[np.ndarray, "3 q"], Float[np.ndarray, "m q"]]:
+def _gauss_points(elem: skfem.Element) -> tuple[Float[np.ndarray, "3 q"], Float[np.ndarray, "m q"]]:
     """Reduced Gauss points in [0, 1]³ and the matrix that extends values there to the element's nodes."""
-    elem = skfem.ElementHex1() if nodes == 8 else skfem.ElementHex2()
-    if nodes == 8:
+    at_nodes = np.asarray(elem.doflocs)  # (m, 3)
+    if len(at_nodes) == 8:
         return np.full((3, 1), 0.5), np.ones((8, 1))
     a = np.array([0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)])
     points = np.stack(np.meshgrid(a, a, a, indexing="ij")).reshape(3, 8)
-    at_nodes = np.asarray(elem.doflocs)  # (27, 3)
     factors = [
         np.where(points[k] == a[0], (a[1] - at_nodes[:, k : k + 1]), (at_nodes[:, k : k + 1] - a[0]))
         / (a[1] - a[0])

@@ -1,4 +1,4 @@
-"""Meshes of links: hexahedra with 8 or 27 nodes; the only room that speaks to gmsh."""
+"""Meshes of links: hexahedra with 8, 20 or 27 nodes; the only room that speaks to gmsh."""
 
 from kedfem.mesh.hexahedra import HexMesh
 from kedfem.mesh.link import link_mesh

@@ -15,6 +15,7 @@ from kedfem.mesh.hexahedra import (
     placed,
     quadratic,
     rectangle_quads,
+    serendipity,
 )
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
@@ -53,7 +54,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
     Returns
     -------
     HexMesh
-        27-node elements, or 8-node ones if `link.element` is hex8, of at least `link.min_quality`.
+        Elements of the nodes that `link.element` says, of at least `link.min_quality`.
 
     Raises
     ------
@@ -75,8 +76,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
         case other:
             kind = "no shape" if other is None else other.kind
             raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part or mesh, got {kind}")
-    mesh = linear(mesh) if link.element == "hex8" else quadratic(mesh)
-    return checked_mesh(name, mesh, link.min_quality)
+    form = {"hex8": linear, "hex20": serendipity, "hex27": quadratic}[str(link.element)]
+    return checked_mesh(name, form(mesh), link.min_quality)
 
 
 def bar_mesh(where: str, shape: Bar, mesh: Meshing) -> HexMesh:

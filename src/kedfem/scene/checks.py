@@ -17,7 +17,7 @@ SHAPES = {
     "solid": ["bar", "plate_link", "extrusion", "part", "mesh"],
     "beam": ["bar", "polyline"],
 }
-ELEMENTS = {"solid": ["hex27", "hex8"], "beam": ["beam3", "beam2"]}
+ELEMENTS = {"solid": ["hex27", "hex20", "hex8"], "beam": ["beam3", "beam2"]}
 
 
 def fidelity(link: Entry) -> str:

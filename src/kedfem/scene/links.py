@@ -53,8 +53,8 @@ class LinkScene(Record):
     """mass of a rigid link"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
-    element: Literal["hex27", "hex8", "beam3", "beam2"] | None = None
-    """hex27 (or hex8) for a solid, beam3 (or beam2) for a beam"""
+    element: Literal["hex27", "hex20", "hex8", "beam3", "beam2"] | None = None
+    """hex27 (or hex20, hex8) for a solid, beam3 (or beam2) for a beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of a solid's elements"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] = 5.0 / 6.0
