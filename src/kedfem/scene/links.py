@@ -54,7 +54,7 @@ class LinkScene(Record):
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Literal["hex27", "hex20", "hex8", "beam3", "beam2"] | None = None
-    """hex27 (or hex20, hex8) for a solid, beam3 (or beam2) for a beam"""
+    """hex20 (or hex27, hex8) for a solid, beam3 (or beam2) for a beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of a solid's elements"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] = 5.0 / 6.0
@@ -62,7 +62,7 @@ class LinkScene(Record):
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
-        element = self.element or {"solid": "hex27", "beam": "beam3", "rigid": None}[self.fidelity]
+        element = self.element or {"solid": "hex20", "beam": "beam3", "rigid": None}[self.fidelity]
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
     def _mesh_defaults(self) -> dict[str, Any]:
