@@ -18,6 +18,7 @@ from kedfem.scene import LinkScene, Scene, time_grid
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
 ELEMENTS = {
     "hexahedron27": "hex27",
+    "hexahedron20": "hex20",
     "hexahedron": "hex8",
     "quad9": "quad9",
     "line3": "beam3",

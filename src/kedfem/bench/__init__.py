@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from kedfem.bench.elements import bench_elements
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
 from kedfem.bench.solvers import bench_solvers
@@ -14,4 +15,5 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "growth": bench_growth,
     "solvers": bench_solvers,
     "start": bench_start,
+    "elements": bench_elements,
 }

@@ -19,6 +19,7 @@ def bar_four_bar(
     links: dict[str, Any] = {
         name: {
             "material": "alloy",
+            "element": "hex27",
             "shape": {"kind": "bar", "between": list(ends), "width": 0.0254, "thickness": 0.0254},
             "mesh": {"elements": list(elements)},
         }
