@@ -5,6 +5,7 @@ from pathlib import Path
 
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
+from kedfem.bench.plane import bench_plane
 from kedfem.bench.solvers import bench_solvers
 from kedfem.bench.start import bench_start
 from kedfem.bench.steps import bench_steps
@@ -13,5 +14,6 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "steps": bench_steps,
     "growth": bench_growth,
     "solvers": bench_solvers,
+    "plane": bench_plane,
     "start": bench_start,
 }
