@@ -1,4 +1,4 @@
-"""Plane links against solids on the same quadrilaterals, in one run: unknowns, times, and what the third dimension adds."""
+"""Plane links against solids on the same quadrilaterals, in one run: unknowns, times, differences."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
