@@ -1,6 +1,7 @@
 """Plane links in every room: meshes of all plates, joints of all kinds, loads, bodies, results, pictures."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from kedfem.links.seats import joint_seat
 from kedfem.mesh import HexMesh, QuadMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.picture import write_picture
+from kedfem.output.rendering import lifted
 from kedfem.output.vtu import AnimationWriter, LinkField
 from kedfem.report import check_tables
 from kedfem.scene import LinkScene, scene_from
@@ -344,3 +346,18 @@ def test_vtk_takes_9_nodes_in_our_order(tmp_path: Path) -> None:
     area = 0.2 * 0.1 + np.pi * 0.05**2 / 2 - np.pi * 0.02**2
     assert surface.triangulate().area == pytest.approx(area, rel=2e-3)  # chords; straight sides: 4 % off
     write_picture(vtu, tmp_path / "picture.png", "one plate")
+
+
+def test_plane_links_in_one_plane_are_drawn_one_above_the_other(tmp_path: Path) -> None:
+    """By a thousandth of the diagonal, and only in the picture; without that their faces flicker where they overlap."""
+    import pyvista
+
+    flat, _ = both("bar")
+    stress = np.zeros((len(flat.points), 6))
+    one = LinkField("one", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0])
+    vtu = AnimationWriter(tmp_path, "run").add(0.0, [one, replace(one, name="two")])
+    grid = pyvista.read(vtu)
+    z = lifted(grid).points[:, 2].reshape(2, -1)
+    assert_allclose(z[0], 0, atol=1e-15)
+    assert_allclose(z[1], 1e-3 * grid.length, rtol=1e-6)
+    assert not grid.points[:, 2].any()
