@@ -278,6 +278,26 @@ def test_gravity_forces_and_pressure_have_their_resultants() -> None:
     assert coupler.m1[:, 0].sum() - bare.m1[:, 0].sum() == pytest.approx(3.0, rel=1e-12)
 
 
+def test_turning_the_whole_scene_turns_the_answer_and_offset_plates_are_only_drawn_there() -> None:
+    raw, turned = four_bar("plane", turns=0.2), four_bar("plane", turns=0.2)
+    angle = 0.7
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned["points"] |= {
+        "D": [0.9144 * c, 0.9144 * s],
+        "B": {"from": "A", "distance": 0.3048, "angle": np.pi / 3 + angle},
+    }
+    turned["links"]["coupler"]["shape"] |= {"offset": 0.0254}
+    for each, gravity in ((raw, [0.0, -9.81, 0.0]), (turned, (R @ [0, -9.81, 0]).tolist())):
+        each["gravity"] = gravity
+    assert (bare_links(scene_from(turned))["coupler"].X[:, 2] == 0.0254).all()
+    a, b = histories(raw), histories(turned)
+    for name in ("joints/A/force", "joints/A/moment", "joints/B/force", "joints/D/force", "drive/torque"):
+        wanted = a[name] @ R.T if a[name].shape[1] == 3 else a[name]
+        assert_allclose(b[name], wanted, rtol=0, atol=1e-6 * np.abs(a[name]).max())
+    assert_allclose(b["energy/strain"], a["energy/strain"], rtol=1e-6, atol=1e-9 * a["energy/strain"].max())
+
+
 # -- results ------------------------------------------------------------------------------------------------
 
 
