@@ -4,7 +4,9 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.analysis import Prepared, Run, frame_steps
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import Reduction
+from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
@@ -64,18 +66,33 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     return [table, spent]
 
 
-def check_tables(ready: Prepared) -> list[Table]:
-    """What would be modelled: links, motion over the range, cost."""
-    return [_links(ready.model), _motion(ready), _cost(ready, estimated_cost(ready.scene, ready.model))]
+def check_tables(ready: Prepared, reduction: Reduction | None) -> list[Table]:
+    """What would be modelled: links, what their reduction costs, motion over the range, cost."""
+    tables = [_links(ready.model), _motion(ready), _cost(ready, estimated_cost(ready.scene, ready.model))]
+    return tables if reduction is None else [tables[0], reduction_table(reduction), *tables[1:]]
+
+
+def reduction_table(reduction: Reduction) -> Table:
+    """Estimated error of reduced links, channel by channel."""
+    table = Table(title="Error of the reduction (estimated)")
+    table.add_column("channel", overflow="fold")
+    table.add_column("of its peak", justify="right")
+    for name, error in reduction.estimate.items():
+        table.add_row(name, f"{100 * error:.2g} %")
+    table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links in full"
+    return table
 
 
 def _links(model: Model) -> Table:
-    table = Table(title="Elastic links")
+    table = Table(title="Links")
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for link in model.links:
-        table.add_row(link.name, ELEMENTS[link.cell_type], str(len(link.cells)), str(link.unknowns),
-                      f"{float(link.m1[:, 0].sum()):.4g} kg", _quality(link))  # fmt: skip
+        table.add_row(
+            link.name, _kind(link), str(len(link.cells)), str(link.unknowns), _mass(link), _quality(link)
+        )
+    for carried in model.carried:
+        table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
     for slider in model.sliders:
         table.add_row(
             slider.name,
@@ -90,8 +107,20 @@ def _links(model: Model) -> Table:
     return table
 
 
+def _kind(link: Link) -> str:
+    """Its elements, and what was made of them."""
+    if link.rigid:
+        return "rigid"
+    return ELEMENTS[link.cell_type] + (f", {link.n} functions" if link.full else "")
+
+
+def _mass(link: Link) -> str:
+    return f"{float(link.one @ link.m1[:, 0]):.4g} kg"
+
+
 def _quality(link: Link) -> str:
     """The worst scaled Jacobian of a meshed link."""
+    link = link.full or link
     if not link.meshed:
         return "-"
     plane = link.kind == "plane"

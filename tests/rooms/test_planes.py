@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.analysis import analyse, prepared
+from kedfem.accuracy.prepared import meshed
+from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
@@ -344,7 +345,7 @@ def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) ->
     assert not mesh.point_data["stress"][:, [2, 4, 5]].any()
     assert mesh.point_data["von_mises"].max() > 0
     assert (tmp_path / "worst.png").stat().st_size > 10_000
-    ready = prepared(scene)
+    ready = meshed(scene)
     kind, elements, unknowns, quality = (list(check_tables(ready)[0].columns[i].cells) for i in (1, 2, 3, 5))
     assert kind == ["quad9"] * 3
     assert elements == [str(len(link.cells)) for link in ready.model.links]

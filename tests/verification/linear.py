@@ -77,5 +77,7 @@ def mean_support(link: Link, *ends: tuple[np.ndarray, list[tuple[int, str]]]) ->
         p += 3
     W, keep = np.concatenate(weights), np.array(components)
     nodes = np.flatnonzero(W.any(axis=0))
-    joint = Attachment(nodes, W[:, nodes], np.zeros((p, 3)), ("support",) * p, keep, np.zeros((len(keep), 0)))
+    joint = Attachment(
+        nodes, W[:, nodes], 3, np.zeros((p, 3)), ("support",) * p, keep, np.zeros((len(keep), 0))
+    )
     return shared_nodes([link], [joint])[0]

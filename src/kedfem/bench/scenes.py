@@ -8,7 +8,7 @@ LENGTHS = {"crank": ("A", "B"), "coupler": ("B", "C"), "rocker": ("C", "D")}
 
 
 def bar_four_bar(
-    elements: tuple[int, int, int], solver: str = "condensed", steps_per_turn: int = 720
+    elements: tuple[int, int, int], solver: str = "condensed", steps_per_turn: int = 720, turns: float = 1.0
 ) -> Scene:
     """[KED]'s four-bar (Nath and Ghosh 1980) with bars of 27-node hexahedra, 600 rpm.
 
@@ -18,11 +18,11 @@ def bar_four_bar(
     """
     bar = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
     raw = _four_bar(bar, {"mesh": {"elements": list(elements)}})
-    raw["analysis"] = {"turns": 1, "steps_per_turn": steps_per_turn, "solver": solver}
+    raw["analysis"] = {"turns": turns, "steps_per_turn": steps_per_turn, "solver": solver}
     return scene_from(raw)
 
 
-def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn: int = 90) -> Scene:
+def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn: int = 360) -> Scene:
     """The same with bores in eyes of 45 mm, quasi-static at 150 rpm; stress at the rocker, displacement of the coupler.
 
     Parameters

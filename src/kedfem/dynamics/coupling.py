@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, joint_seat, port_weights
-from kedfem.motion.linkage import GROUND, joint_axis, unit
+from kedfem.motion.linkage import joint_axis, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
 
@@ -223,8 +223,8 @@ def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarra
 
 
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
-    """Direction in which a rigid slider can move; None if the link is not one."""
-    if scene.links[name].fidelity != "rigid":
+    """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
+    if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
         return None
     joint = next(j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links)
     return joint_axis(joint)
@@ -335,7 +335,7 @@ def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], fir
     """First unknown, (components, unknowns) block and number of new unknowns of one port point."""
     if not others:
         return unknowns, np.eye(len(components)), len(components)
-    if others[0] != GROUND:
+    if others[0] in sliders:
         slider = others[0]
         return first_of[slider], sliders[slider][components, None], 0
     if joint.kind == "prismatic":

@@ -12,7 +12,7 @@ from kedfem.scene import Bar, LinkScene, Part, PlateLink, Polyline, Scene
 
 
 def bare_links(scene: Scene) -> dict[str, Link]:
-    """Records of all elastic links, without attached bodies.
+    """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def bare_links(scene: Scene) -> dict[str, Link]:
         If a link cannot be meshed well enough.
     """
     return {
-        name: _bare_link(scene, name, link) for name, link in scene.links.items() if link.fidelity != "rigid"
+        name: _bare_link(scene, name, link) for name, link in scene.links.items() if link.shape is not None
     }
 
 
@@ -37,9 +37,9 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
 
 def _bare_link(scene: Scene, name: str, link: LinkScene) -> Link:
     material = scene.materials[str(link.material)]
-    if link.fidelity == "solid":
+    if link.family == "solid":
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
-    if link.fidelity == "plane":
+    if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
     shape = link.shape
     if not isinstance(shape, Bar | Polyline):

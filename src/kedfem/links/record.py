@@ -6,13 +6,13 @@ no third dimension.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-Mass = tuple[sp.csr_array, ...]
+Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
+Mass = tuple[Matrix, ...]
 Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
@@ -58,6 +58,9 @@ class Link:
     section : of a beam, else None.
     basis : scikit-fem basis of a solid or plane link (for this room only), else None.
     thickness : of a plane link [m], else one: what integrals over its area or edges are multiplied by.
+    full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
+        dense. Else None.
+    rigid : whether the link only moves rigidly; then it has no stress
     """
 
     name: str
@@ -68,7 +71,7 @@ class Link:
     cell_type: str
     axes: Float[np.ndarray, "3 3"]
     mass: Mass
-    K0: sp.csr_array
+    K0: Matrix
     m1: Float[np.ndarray, "n d"]
     mX: Float[np.ndarray, "n 3"]
     volume: Float[np.ndarray, " n"]
@@ -77,6 +80,9 @@ class Link:
     section: Section | None = None
     basis: Any = None
     thickness: float = 1.0
+    full: "Link | None" = None
+    Q: Float[np.ndarray, "_ n"] | None = None
+    rigid: bool = False
 
     @property
     def n(self) -> int:

@@ -46,7 +46,25 @@ def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRo
     SceneError
         If the point is not in the link.
     """
+    if link.full is not None and link.Q is not None:
+        at = point_rows(link.full, where, point)
+        return PointRows(at.value @ link.Q, _on_functions(at.stress, link.Q, link.d), at.X)
     return _solid_rows(link, where, point) if link.meshed else _beam_rows(link, where, point)
+
+
+def _on_functions(stress: sp.csr_array, Q: Float[np.ndarray, "n s"], d: int) -> sp.csr_array:
+    """Stress rows of a full link seen from the functions of a reduced one: (6, dn) → (6, ds)."""
+    columns = np.unique(stress.indices)
+    dense, node, component = stress[:, columns].toarray(), *np.divmod(columns, d)
+    out = np.zeros((6, Q.shape[1], d))
+    for c in range(d):
+        out[:, :, c] = dense[:, component == c] @ Q[node[component == c]]
+    return sp.csr_array(out.reshape(6, -1))
+
+
+def nodal_state(link: Link, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "_ d"]:
+    """The state of a link at its nodes: of a reduced link that of the link it was made from."""
+    return g if link.Q is None else link.Q @ g
 
 
 def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -> tuple[sp.csr_array, ...]:
@@ -96,7 +114,9 @@ class StressRecovery:
 
 
 def stress_recovery(link: Link) -> StressRecovery:
-    """Prepare nodal stresses of a link."""
+    """Prepare nodal stresses of a link; of a reduced one those of the link that it was made from, in full detail."""
+    if link.full is not None:
+        return stress_recovery(link.full)
     if link.meshed:
         return StressRecovery(link, nodal_gradients(link))
     half = link.section.height / 2 if link.section else 0.0
@@ -108,7 +128,7 @@ def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float
 
     Parameters
     ----------
-    g : (n, d) displacement in the link frame [m; ψ: rad]
+    g : (n, d) nodal displacement in the link frame, of a reduced link `nodal_state` [m; ψ: rad]
     """
     if recovery.link.meshed:
         H = np.stack([G @ g for G in recovery.matrices], axis=2)  # (n, i, j)

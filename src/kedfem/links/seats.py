@@ -1,6 +1,6 @@
 """Where joints sit: the affine field that best fits a bore or a face, with scalar, rotation-invariant weights."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -75,6 +75,9 @@ def joint_seat(
     MeshError
         If the link has no node, bore or face there.
     """
+    if link.full is not None and link.Q is not None:
+        seat = joint_seat(link.full, where, point, axis)
+        return replace(seat, fit=seat.fit @ link.Q)
     if link.kind == "beam":
         return _node_seat(link, where, point)
     facets = _surface_at(link, point, axis)
@@ -91,6 +94,9 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
     MeshError
         If no face does.
     """
+    if link.full is not None and link.Q is not None:
+        seat = face_seat(link.full, where, point)
+        return replace(seat, fit=seat.fit @ link.Q)
     seen = _in_its_plane(link, point)
     facets = flat_face(link, seen)
     if not len(facets):
@@ -109,6 +115,8 @@ def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
     """
     if seat.facets is None:
         return np.zeros(link.n)
+    if link.full is not None and link.Q is not None:
+        return np.asarray(surface_weights(link.full, seat) @ link.Q)
     on = surface(link, seat.facets)
     local = np.einsum("fqm,fq->fm", on.N, on.dA)
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.transient import Snapshot
 from kedfem.links.record import in_space
-from kedfem.links.recovery import StressRecovery, nodal_stress, von_mises
+from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von_mises
 from kedfem.output.vtu import LinkField
 
 
@@ -24,10 +26,18 @@ def link_fields(
     for link, body, recovery, state in zip(
         model.links, model.bodies, recoveries, snapshot.states, strict=True
     ):
-        displacement = in_space(link, state.u)
-        stress = nodal_stress(recovery, state.g)
-        points = motion.p[k, body] + link.X @ motion.R[k, body].T + exaggeration * displacement
+        shown = link.full or link
+        displacement = in_space(shown, nodal_state(link, state.u))
+        stress = nodal_stress(recovery, nodal_state(link, state.g))
+        if link.rigid:
+            stress = np.zeros_like(stress)
+        points = motion.p[k, body] + shown.X @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
             LinkField(link.name, link.cell_type, link.cells, points, displacement, stress, von_mises(stress))
         )
+    for carried in model.carried:
+        link = carried.link.full or carried.link
+        points = motion.p[k, carried.body] + link.X @ motion.R[k, carried.body].T
+        still, none = np.zeros_like(link.X), np.zeros((link.n, 6))
+        fields.append(LinkField(link.name, link.cell_type, link.cells, points, still, none, none[:, 0]))
     return fields

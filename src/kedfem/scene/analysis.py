@@ -32,10 +32,16 @@ class Analysis(Record):
     """time steps in a turn (at the final speed); 720 if neither this nor `step` is given"""
     step: PositiveTime | None = None
     """time step, instead of `steps_per_turn`; shortened so that a whole number reaches the end"""
-    rho_inf: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 1.0
-    """ρ∞ of the generalised-α method: 1 is Newmark's average acceleration; less damps fast vibration"""
+    rho_inf: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.95
+    """ρ∞ of the generalised-α method: what a step leaves of vibration that it cannot resolve; 1 is Newmark's average
+    acceleration, which leaves it all"""
     initial: Literal["rest", "quasi-static"] = "rest"
     """elastic state at the start: none, or that of the slowly turning mechanism"""
+    accuracy: Annotated[float, Quantity("1", above=0.0, below=1.0)] | None = None
+    """relative error to aim at in probes, joint forces and the drive's torque: fidelities (of links with `fidelity =
+    "auto"`), mesh sizes, functions and step are then chosen for it; none of them is if not given"""
+    reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
+    """relative error that reduced links may cause there"""
     solver: Literal["condensed", "literal"] = "condensed"
     """condensed: one factorisation per link; literal: assembles and factors at every step"""
 

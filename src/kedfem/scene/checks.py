@@ -23,8 +23,11 @@ NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}
 
 
 def fidelity(link: Entry) -> str:
-    """The fidelity of a link as given."""
-    return link.word("fidelity") or "solid"
+    """The fidelity of a link as given; of one that leaves it open what it is meshed as."""
+    given = link.word("fidelity") or "solid"
+    if given not in {"reduced", "auto"}:
+        return given
+    return "beam" if link.word("shape", "kind") == "polyline" else "solid"
 
 
 def reference_faults(parts: Parts) -> Iterator[str]:
@@ -59,22 +62,32 @@ def link_faults(parts: Parts) -> Iterator[str]:
             yield line(link.where, "must have another name, got that of the frame")
         if fidelity(link) == "rigid":
             yield from rigid_faults(link, parts)
+            yield from meshing_faults(link)
         elif fidelity(link) in SHAPES:
             yield from elastic_faults(link)
             yield from meshing_faults(link)
 
 
 def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
-    """A rigid link that is not a slider, or has keys of an elastic one."""
-    if not any(is_slide(joint) and link.name in link_names(joint) for joint in parts.joints.values()):
-        wanted = (
-            "must be 'solid', 'plane' or 'beam' unless the link is a slider (a prismatic joint to the ground)"
-        )
-        yield link.fault("fidelity", f"{wanted}, got 'rigid'")
-    for key in ("shape", "material", "element"):
-        if link.has(key):
-            got = link.word(key, "kind") or link.word(key) or "one"
-            yield link.fault(key, f"must not be given for a rigid link, got {got!r}")
+    """A rigid link without a shape that is not a slider, or keys of an elastic one."""
+    slides = any(is_slide(joint) and link.name in link_names(joint) for joint in parts.joints.values())
+    if link.has("shape"):
+        if not link.has("material"):
+            yield link.fault("material", "is required for a rigid link with a shape, got nothing")
+        if link.record is not None and link.record.mass:
+            got = f"got {link.record.mass:.6g} for a link with a shape"
+            yield link.fault("mass", f"must be given for a rigid slider only [kg], {got}")
+    else:
+        if not slides:
+            wanted = "is required for a rigid link that is not a slider (a prismatic joint to the ground)"
+            yield link.fault("shape", f"{wanted}, got nothing")
+        for key in ("material", "element"):
+            if link.has(key):
+                got = link.word(key) or "one"
+                yield link.fault(key, f"must not be given for a rigid link without a shape, got {got!r}")
+    for key in ("reduced", "functions"):
+        if link.has(key) and link.raw[key] is not False:
+            yield link.fault(key, f"must be left out for a rigid link, got {shown(link.raw[key])}")
 
 
 def is_slide(joint: Entry) -> bool:
@@ -95,6 +108,8 @@ def elastic_faults(link: Entry) -> Iterator[str]:
     every_element = {name for names in ELEMENTS.values() for name in names}
     if element in every_element and element not in ELEMENTS[kind]:
         yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
+    if link.has("functions") and not (link.raw.get("reduced") is True or link.word("fidelity") == "reduced"):
+        yield link.fault("functions", f"must stand with reduced = true, got {shown(link.raw['functions'])}")
     if link.record is not None and link.record.mass:
         yield link.fault(
             "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {noun}"

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, StrictInt, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
 from kedfem.scene.base import Record
 from kedfem.scene.points import Axis, Point
-from kedfem.scene.shapes import Bar, Shape
+from kedfem.scene.shapes import Bar, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
 
 GROUND = "ground"
+ELEMENTS: dict[str, Any] = {"solid": "hex27", "plane": "quad9", "beam": "beam3"}
 Count = Annotated[StrictInt, Field(ge=1)]
 
 
@@ -43,14 +44,19 @@ class Meshing(Record):
 class LinkScene(Record):
     """A link: its material, shape, fidelity and mesh."""
 
-    fidelity: Literal["solid", "plane", "beam", "rigid"] = "solid"
-    """hexahedra, quadrilaterals in plane stress, planar beams, or (sliders only) a rigid body"""
+    fidelity: Literal["solid", "plane", "beam", "rigid", "reduced", "auto"] = "solid"
+    """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
+    `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
+    reduced: StrictBool = False
+    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for"""
+    functions: Count | None = None
+    """number of these functions, instead of `analysis.reduction`"""
     material: str | None = None
-    """a name: built in or in `materials`; not for a rigid link"""
+    """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
-    """its shape; not for a rigid link"""
+    """its shape; not for a rigid slider"""
     mass: Mass = 0.0
-    """mass of a rigid link"""
+    """mass of a rigid slider (a rigid link without a shape)"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Literal["hex27", "hex8", "quad9", "beam3", "beam2"] | None = None
@@ -62,19 +68,32 @@ class LinkScene(Record):
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
-        usual = {"solid": "hex27", "plane": "quad9", "beam": "beam3", "rigid": None}
-        element = self.element or usual[self.fidelity]
+        if self.fidelity == "reduced":
+            self.fill(fidelity=self.family, reduced=True)
+        element = self.element or (ELEMENTS[self.family] if self.shape is not None else None)
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
+    @property
+    def family(self) -> Literal["solid", "plane", "beam"]:
+        """What the link is meshed as: of one that does not say, beams for a polyline, else hexahedra."""
+        if self.fidelity in {"rigid", "reduced", "auto"}:
+            return "beam" if isinstance(self.shape, Polyline) else "solid"
+        return self.fidelity  # type: ignore[return-value]
+
     def _mesh_defaults(self) -> dict[str, Any]:
-        if self.fidelity == "beam":
+        if self.shape is None:
+            return {}
+        if self.family == "beam":
             return {"elements": self.mesh.elements or 1}
         if isinstance(self.shape, Bar):
             along = math.dist(*self.shape.between) / (1.5 * self.shape.width)
             along = min(max(math.ceil(along), 4), 40) if math.isfinite(along) else 4
-            usual = (along, 2) if self.fidelity == "plane" else (along, 2, 1)
+            usual = (along, 2) if self.family == "plane" else (along, 2, 1)
+            if self.fidelity == "rigid":
+                usual = (1, 1, 1)
             return {"elements": self.mesh.elements or usual}
-        across = self.mesh.elements_across or (2 if self.mesh.size is None else None)
+        fewest = 1 if self.fidelity == "rigid" else 2
+        across = self.mesh.elements_across or (fewest if self.mesh.size is None else None)
         return {"elements_across": across}
 
 

@@ -1,0 +1,74 @@
+"""Changed copies of a scene: other fidelities, sizes, functions, steps."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from kedfem.scene import Bar, Extrusion, LinkScene, MeshFile, Part, PlateLink, Scene, time_grid
+
+Family = Literal["solid", "plane", "beam", "rigid"]
+
+
+def with_links(scene: Scene, links: Mapping[str, LinkScene]) -> Scene:
+    """The scene with some links replaced."""
+    return scene.model_copy(update={"links": {**scene.links, **links}})
+
+
+def with_analysis(scene: Scene, **keys: Any) -> Scene:
+    """The scene with some keys of its analysis replaced."""
+    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=keys)})
+
+
+def with_steps(scene: Scene, steps: int) -> Scene:
+    """The scene in so many equal steps over the same time."""
+    return with_analysis(scene, step=time_grid(scene).end / steps, steps_per_turn=None)
+
+
+def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:
+    """The link meshed in another way, with the usual element and mesh of that way."""
+    given = link.model_dump(
+        exclude_unset=True, exclude={"element", "mesh", "fidelity", "reduced", "functions"}
+    )
+    return LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
+
+
+def families(link: LinkScene) -> tuple[Family, ...]:
+    """How a link's shape can be meshed, cheapest first; a rigid slider only as what it is."""
+    match link.shape:
+        case None:
+            return ()
+        case Bar():
+            return ("rigid", "beam", "plane", "solid")
+        case PlateLink() | Extrusion() | Part():
+            return ("rigid", "plane", "solid")
+        case MeshFile():
+            return ("rigid", "solid")
+        case _:
+            return ("rigid", "beam")
+
+
+def refined(link: LinkScene, factor: float) -> LinkScene:
+    """The link with elements smaller by a factor, never fewer; a rigid link or a mesh from a file as it is."""
+    mesh = link.mesh
+    if link.fidelity == "rigid" or isinstance(link.shape, MeshFile | None):
+        return link
+    if mesh.elements is not None:
+        several = mesh.elements if isinstance(mesh.elements, tuple) else (mesh.elements,)
+        finer = tuple(_more(count, factor) for count in several)
+        changed: dict[str, Any] = {"elements": finer if isinstance(mesh.elements, tuple) else finer[0]}
+    else:
+        changed = {"layers": _more(mesh.layers, factor)} if link.family == "solid" else {}
+        if mesh.size is not None:
+            changed["size"] = mesh.size / factor
+        else:
+            changed["elements_across"] = _more(mesh.elements_across or 2, factor)
+    return link.model_copy(update={"mesh": mesh.model_copy(update=changed)})
+
+
+def refinable(link: LinkScene) -> bool:
+    """Whether a link's mesh can be made finer."""
+    return refined(link, 2.0) != link
+
+
+def _more(count: int, factor: float) -> int:
+    return max(1, math.ceil(count * factor - 1e-9))
