@@ -13,7 +13,7 @@ from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
-from kedfem.links.seats import face_seat, joint_seat, port_weights, surface_weights
+from kedfem.links.seats import face_seat, is_flat, joint_seat, port_weights, surface_weights
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
 from kedfem.mesh import QuadMesh
 from kedfem.mesh.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
@@ -183,7 +183,7 @@ def test_without_contraction_a_plane_link_is_the_solid_moving_in_its_plane() -> 
 # -- seats --------------------------------------------------------------------------------------------------
 
 
-def disc(z: float = 0.3) -> Link:
+def disc(z: float = 0.9) -> Link:
     """A ring of radii 0.1 and 0.25 about the origin, thickness 0.02, in a plane away from z = 0."""
     radii, around = np.linspace(0.1, 0.25, 3), 12
     angle = np.arange(2 * around) * np.pi / around
@@ -270,6 +270,7 @@ def test_a_flywheel_adds_its_inertia_about_z(where: str) -> None:
     bar = plane(QuadMesh(np.pad(quads, ((0, 0), (0, 1))), cells, 0.02))
     link = disc() if where == "bore" else bar
     seat = joint_seat(link, "joints.A", np.zeros(3), Z)
+    assert is_flat(seat) == (where == "edge")
     loaded = with_body(link, seat, 0.0, np.zeros(3), flywheel_tensor(seat, Z, 0.7))
     turning = np.stack([-link.X[:, 1], link.X[:, 0]], axis=1) * 3.0
     added = kinetic_energy(loaded, turning) - kinetic_energy(link, turning)

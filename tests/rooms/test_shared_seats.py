@@ -78,8 +78,8 @@ def test_three_links_at_one_pin_condensed_is_literal(kind: str, steps: int) -> N
         held = joint.keep[joint.keep % 3 == 0] // 3
         assert np.linalg.matrix_rank(joint.weights) == len(held)  # each held once
     pins, ports = 7, 1 if kind == "beam" else 2
-    # plane pins take 2 unknowns each; of the solids' two ports the one to the ground that is driven takes 3
-    taken = 2 * pins + 1 if kind == "beam" else 3 * ports * pins + 3
+    # plane pins take 2 unknowns each; the driven one to the ground takes a turn, of solids two more ports (face: one)
+    taken = 2 * pins + 1 if kind == "beam" else 3 * ports * pins + (3 if kind == "bar" else 6)
     assert model.coordinates == model.unknowns - taken
 
 

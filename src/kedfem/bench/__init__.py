@@ -6,6 +6,7 @@ from pathlib import Path
 from kedfem.bench.elements import bench_elements
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
+from kedfem.bench.plane import bench_plane
 from kedfem.bench.solvers import bench_solvers
 from kedfem.bench.start import bench_start
 from kedfem.bench.steps import bench_steps
@@ -14,6 +15,7 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "steps": bench_steps,
     "growth": bench_growth,
     "solvers": bench_solvers,
+    "plane": bench_plane,
     "start": bench_start,
     "elements": bench_elements,
 }

@@ -14,6 +14,7 @@ LINK_BYTES, ASSEMBLY_BYTES = (
     5e3,
     1.5e4,
 )  # times N: kept for each link; for one link at a time while it is assembled
+PLANE_FILL = 0.1  # of that a plane mesh has, from 18,000 to 240,000 unknowns
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 
@@ -31,12 +32,13 @@ class Cost:
 def estimated_cost(scene: Scene, model: Model) -> Cost:
     """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
     N = np.array([float(link.unknowns) for link in model.links])
+    fill = N**1.5 * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
     bandwidth, rate = _machine()
-    step = OVERHEAD + float((SOLVE_BYTES * N**1.5 + 8 * ARRAY_PASSES * N).sum()) / bandwidth
+    step = OVERHEAD + float((SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()) / bandwidth
     return Cost(
-        factor=FACTOR_FLOPS * float((N**1.5).sum()) / rate,
+        factor=FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=time_grid(scene).steps * step,
-        memory=float((FACTOR_BYTES * N**1.5 + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
+        memory=float((FACTOR_BYTES * fill + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
         frame_bytes=120.0 * sum(link.n for link in model.links),
     )
 

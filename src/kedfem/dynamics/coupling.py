@@ -240,7 +240,10 @@ def seat_of(scene: Scene, name: str, link: Link) -> Seat:
 def port_points(
     scene: Scene, name: str, joint: Joint, seats: dict[str, Seat], links: dict[str, Link]
 ) -> Float[np.ndarray, "p 3"]:
-    """Points of a joint that its links share: 1 spherical, 2 revolute, 3 where turning is held too; in a plane 1 or 2.
+    """Points of a joint that its links share: 1 spherical, 2 revolute; in a plane 1 for both.
+
+    Where turning is held too, points off these in all directions that the seats know: were a bore held along one
+    direction only, its eye would be soft or stiff as that happens to lie.
 
     Raises
     ------
@@ -261,12 +264,13 @@ def port_points(
         across = _widest_across(seat, axis)
         directions = [axis, across] if driven else [axis]
         points = [centre + half * axis, centre - half * axis]
-        points += [centre + 2 * float(_spread_along(seat, across)) * across] if driven else []
+        points += _points_off(centre, seats, [across, np.cross(axis, across)]) if driven else []
     else:
         e1, e2 = seat.directions[:2]
         directions = [e1, e2]
         points = [seat.origin + seat.spread[0] * e1 * c + seat.spread[1] * e2 * s
                   for c, s in ((1, 0), (-0.5, 0.9), (-0.5, -0.9))]  # fmt: skip
+        points += _points_off(seat.origin, seats, [seat.directions[2]])
     for link, s in seats.items():
         if not all(holds(s, d) for d in directions):
             raise MeshError(
@@ -277,7 +281,7 @@ def port_points(
 
 
 def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
-    """The joint's point and, where turning is held, another: along a slide, else along the narrowest seat's surface."""
+    """The joint's point and, where turning is held, others: along a slide, else along the narrowest seat, and across."""
     at = np.asarray(joint.at)
     if joint.kind == "revolute" and scene.drive.joint != name:
         return at[None, :]
@@ -289,7 +293,16 @@ def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat])
                 f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
                 f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
             )
-    return np.array([at, at + 2 * narrow.spread[0] * along])
+    return np.array([at, *_points_off(at, seats, [along, np.cross([0.0, 0.0, 1.0], along)])])
+
+
+def _points_off(
+    centre: Float[np.ndarray, "3"], seats: dict[str, Seat], directions: list[Float[np.ndarray, "3"]]
+) -> list[Float[np.ndarray, "3"]]:
+    """A point off the centre in each direction that all seats know, as far as the first seat is wide there."""
+    known = [d for d in directions if all(holds(seat, d) for seat in seats.values())]
+    first = next(iter(seats.values()))
+    return [centre + 2 * _spread_along(first, d) * d for d in known]
 
 
 def _spread_along(seat: Seat, axis: Float[np.ndarray, "3"]) -> float:

@@ -32,6 +32,12 @@ SHARP = 35.0
 LINES = {3: 2, 21: 3}
 """VTK's numbers of the line and the quadratic line, and their nodes."""
 
+QUADRILATERAL = 28
+"""VTK's number of the biquadratic quadrilateral, of plane links."""
+
+LIFT = 1e-3
+"""How far plane links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it."""
+
 STATIONS = {2: 2, 3: 17}
 """Points along a beam of so many nodes."""
 
@@ -121,7 +127,7 @@ def window(size: Float[np.ndarray, " 2"]) -> list[int]:
 
 
 def draw_links(plotter: Any, grid: Any) -> None:
-    """Solids with their edges, beams as tubes, on one colour scale."""
+    """Solids and plane links with their edges, beams as tubes, on one colour scale."""
     is_line = np.isin(grid.celltypes, list(LINES))
     stress = grid.point_data["MPa"]
     look = {
@@ -134,7 +140,7 @@ def draw_links(plotter: Any, grid: Any) -> None:
         "diffuse": 0.5,
     }
     if not is_line.all():
-        surface = curved_surface(grid.extract_cells(~is_line))
+        surface = curved_surface(lifted(grid).extract_cells(~is_line))
         links = plotter.add_mesh(surface, split_sharp_edges=True, feature_angle=SHARP, **look)
         edges = surface.extract_feature_edges(SHARP, manifold_edges=False, non_manifold_edges=False)
         if edges.n_cells:
@@ -142,6 +148,15 @@ def draw_links(plotter: Any, grid: Any) -> None:
     if is_line.any():
         links = plotter.add_mesh(tubes(grid.extract_cells(is_line), BEAM_RADIUS * grid.length), **look)
     draw_bar(plotter, links)
+
+
+def lifted(grid: Any) -> Any:
+    """The links with plane ones moved apart along z, so that their faces do not flicker through each other."""
+    out = grid.copy()
+    numbers = grid.cell_data["link"][grid.celltypes == QUADRILATERAL]
+    for cell, link in zip(grid.cells_dict.get(QUADRILATERAL, ()), numbers, strict=True):
+        out.points[cell, 2] = grid.points[cell, 2] + LIFT * grid.length * link
+    return out
 
 
 def curved_surface(solids: Any) -> Any:
