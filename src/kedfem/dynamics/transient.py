@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
     small = all(link.unknowns <= SMALL for link in model.links)
-    solver = DenseSteps if small else CondensedSteps
+    solver = DenseSteps if small and find_spec("numba") else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
 
 
