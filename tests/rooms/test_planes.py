@@ -346,7 +346,7 @@ def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) ->
     assert mesh.point_data["von_mises"].max() > 0
     assert (tmp_path / "worst.png").stat().st_size > 10_000
     ready = meshed(scene)
-    kind, elements, unknowns, quality = (list(check_tables(ready)[0].columns[i].cells) for i in (1, 2, 3, 5))
+    kind, elements, unknowns, quality = (list(check_tables(ready, None)[0].columns[i].cells) for i in (1, 2, 3, 5))
     assert kind == ["quad9"] * 3
     assert elements == [str(len(link.cells)) for link in ready.model.links]
     assert unknowns == [str(2 * link.n) for link in ready.model.links]
