@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.accuracy.histories import worst
+from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.dynamics.history import Block, Snapshot
@@ -50,7 +51,7 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user."""
+    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user, choices made."""
 
     folder: FilePath
     results: Results
@@ -58,6 +59,7 @@ class Run:
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     reduction: Reduction | None = None
+    plan: Plan | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -75,6 +77,8 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     """
     clock = Clock(watch)
     folder = ready_folder(scene.results_folder)
+    plan = None if scene.analysis.accuracy is None else planned(scene, clock.stage)
+    scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
@@ -88,9 +92,10 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         *marginal_warning(scene),
         *deflection_warning(deflection),
         *reduction_warning(reduction),
+        *plan_warning(plan),
         *warnings,
     )
-    return Run(folder, results, peak, clock.seconds, warnings, reduction)
+    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan)
 
 
 @dataclass
@@ -149,6 +154,11 @@ def marginal_warning(scene: Scene) -> tuple[str, ...]:
         "analysis.rho_inf = 1 with damping in proportion to the stiffness: vibration that the step cannot resolve grows "
         "slowly in links that turn; take 0.95",
     )
+
+
+def plan_warning(plan: Plan | None) -> tuple[str, ...]:
+    """A warning where the accuracy asked for is not expected."""
+    return () if plan is None or plan.reached else plan.notes[-1:]
 
 
 def reduction_warning(reduction: Reduction | None) -> tuple[str, ...]:

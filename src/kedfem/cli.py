@@ -67,14 +67,20 @@ def run(scene: ScenePath) -> None:
 @app.command()
 def check(scene: ScenePath) -> None:
     """Show what would be modelled and its cost; solve nothing."""
+    from kedfem.accuracy.plan import planned
     from kedfem.accuracy.reduction import prepared
     from kedfem.report import check_tables
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene)
     with _progress() as watch:
-        ready, reduction = prepared(loaded, lambda stage: watch(stage, 0, 0))
-    for table in check_tables(ready, reduction):
+
+        def stage(name: str) -> None:
+            watch(name, 0, 0)
+
+        plan = None if loaded.analysis.accuracy is None else planned(loaded, stage)
+        ready, reduction = prepared(plan.scene if plan else loaded, stage)
+    for table in check_tables(ready, reduction, plan):
         out.print(table)
 
 
@@ -105,7 +111,7 @@ def new(
 @app.command()
 def bench(
     what: Annotated[
-        str, typer.Argument(metavar="WHAT", help="One of: steps, growth, solvers, plane, start.")
+        str, typer.Argument(metavar="WHAT", help="One of: steps, growth, solvers, elements, plane, start.")
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),
     quick: Annotated[bool, typer.Option("--quick", help="Small sizes only, to try it.")] = False,

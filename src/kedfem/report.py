@@ -4,6 +4,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.analysis import Run, frame_steps
@@ -12,11 +13,12 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.path import Path
-from kedfem.scene import Scene, time_grid
+from kedfem.scene import LinkScene, Scene, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
 ELEMENTS = {
     "hexahedron27": "hex27",
+    "hexahedron20": "hex20",
     "hexahedron": "hex8",
     "quad9": "quad9",
     "line3": "beam3",
@@ -38,6 +40,7 @@ def with_prefix(value: float, unit: str) -> str:
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
+    before = [] if done.plan is None else plan_tables(done.plan)
     table = Table(title=Text(scene.title or "Largest values"))
     for column in ("channel", "component", "largest", "drive angle"):
         left = column in ("channel", "component")
@@ -63,13 +66,38 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     for stage in done.seconds:
         spent.add_column(stage, justify="right")
     spent.add_row(*(f"{s:.2f}" for s in done.seconds.values()))
-    return [table, spent]
+    return [*before, table, spent]
 
 
-def check_tables(ready: Prepared, reduction: Reduction | None) -> list[Table]:
-    """What would be modelled: links, what their reduction costs, motion over the range, cost."""
-    tables = [_links(ready.model), _motion(ready), _cost(ready, estimated_cost(ready.scene, ready.model))]
-    return tables if reduction is None else [tables[0], reduction_table(reduction), *tables[1:]]
+def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
+    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion over the range, cost."""
+    first = [] if plan is None else plan_tables(plan)
+    second = [] if reduction is None else [reduction_table(reduction)]
+    cost = _cost(ready, estimated_cost(ready.scene, ready.model))
+    return [*first, _links(ready.model), *second, _motion(ready), cost]
+
+
+def plan_tables(plan: Plan) -> list[Table]:
+    """Where the error of a run with `analysis.accuracy` comes from, what was chosen, and what was not."""
+    budget = Table(title=f"Accuracy asked for: {100 * plan.asked:.3g} %")
+    for column in ("part of the error", "expected", "allowed"):
+        budget.add_column(column, justify="left" if column.startswith("part") else "right")
+    for share in plan.shares:
+        budget.add_row(share.what, f"{100 * share.error:.2g} %", f"{100 * share.allowed:.2g} %")
+    budget.add_row("together", f"{100 * plan.error:.2g} %", f"{100 * plan.asked:.2g} %")
+    chosen = Table(title="Chosen", show_header=False)
+    chosen.add_row("step", f"{time_grid(plan.scene).step:.4g} s, {time_grid(plan.scene).steps} steps")
+    for name, link in plan.scene.links.items():
+        chosen.add_row(name, _chosen(link))
+    for note in plan.notes:
+        chosen.add_row("note", Text(note))
+    return [budget, chosen]
+
+
+def _chosen(link: LinkScene) -> str:
+    """Fidelity and mesh in words."""
+    mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
+    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "")
 
 
 def reduction_table(reduction: Reduction) -> Table:

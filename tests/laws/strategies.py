@@ -13,7 +13,7 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, Section
 from kedfem.links.solid import solid_link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
-from kedfem.mesh.hexahedra import HEX27, extruded, linear, rectangle_quads
+from kedfem.mesh.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
 from kedfem.scene import Material
 
 # shrinking is left out: a smaller seed is no simpler mesh
@@ -23,6 +23,7 @@ LAW = settings(
 VALID = 0.05  # least scaled Jacobian of a random element: det J > 0 at every node and Gauss point
 # any material serves a law; this one is not close to a special case (ν = 0, ν = 1/2)
 MATERIAL = Material(density=2700.0, youngs_modulus=70e9, poisson_ratio=0.33)
+FORMS = {8: linear, 20: serendipity, 27: quadratic}
 
 Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 
@@ -53,14 +54,14 @@ motions = st.builds(Motion, rotations, vectors, vectors, vectors)
 
 
 @st.composite
-def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = (8, 27)) -> HexMesh:
+def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = tuple(FORMS)) -> HexMesh:
     """One element or a patch of 2 × 2 × 1, all nodes moved at random as far as det J allows."""
     random = np.random.default_rng(draw(seeds))
     along, across = draw(st.sampled_from([(1, 1), (2, 2)]))
     sides = random.uniform(0.3, 1.0, 3)
     mesh = extruded(*rectangle_quads(sides[0], sides[1], along, across), sides[2], 1)
-    mesh = mesh if draw(st.sampled_from(nodes)) == 27 else linear(mesh)
-    spacing = sides / np.array([along, across, 1]) / (2 if mesh.cells.shape[1] == 27 else 1)
+    mesh = FORMS[draw(st.sampled_from(nodes))](mesh)
+    spacing = sides / np.array([along, across, 1]) / (1 if mesh.cells.shape[1] == 8 else 2)
     return distorted(mesh, draw(st.floats(0.0, 0.5)) * spacing * random.uniform(-1, 1, mesh.points.shape))
 
 
@@ -98,23 +99,31 @@ def rotated(mesh: Mesh, motion: Motion) -> Mesh:
     return replace(mesh, points=motion.moved(mesh.points))
 
 
-def ring(moves: np.ndarray | float = 0.0, around: int = 8) -> HexMesh:
-    """Hexahedra about a bore of radius 0.1 along z, outer radius 0.25, thickness 0.2; other nodes may move."""
+def patch(nodes: int, random: np.random.Generator) -> HexMesh:
+    """2 × 2 × 2 elements of a block, all nodes moved at random."""
+    mesh = FORMS[nodes](extruded(*rectangle_quads(1.0, 0.8, 2, 2), 0.6, 2))
+    return distorted(mesh, 0.06 * random.uniform(-1, 1, mesh.points.shape))
+
+
+def ring(nodes: int = 27, around: int = 8) -> HexMesh:
+    """Hexahedra about a bore of radius 0.1 along z, outer radius 0.25, thickness 0.2."""
     radii = np.linspace(0.1, 0.25, 3)
     angle = np.arange(2 * around) * np.pi / around
     plane = np.stack([np.outer(np.cos(angle), radii), np.outer(np.sin(angle), radii)], axis=-1).reshape(-1, 2)
     quad9 = HEX27[[*range(4), *range(8, 12), 24]][:, :2]  # VTK: corners, middles of sides, middle
     middle = 2 * np.arange(around)[:, None] + 1
     cells = (middle + quad9[:, 1]) % (2 * around) * 3 + 1 + quad9[:, 0]
-    mesh = extruded(plane, cells, 0.2, 1)
-    off_bore = np.hypot(*mesh.points[:, :2].T) > 0.11
-    return distorted(mesh, np.where(off_bore[:, None], moves * np.ones_like(mesh.points), 0.0))
+    return FORMS[nodes](extruded(plane, cells, 0.2, 1))
 
 
 @st.composite
 def rings(draw: st.DrawFn) -> HexMesh:
+    """Rings of quadratic elements whose nodes off the bore are moved at random."""
     random = np.random.default_rng(draw(seeds))
-    return ring(draw(st.floats(0.0, 0.03)) * random.uniform(-1, 1, (144, 3)))
+    mesh = ring(draw(st.sampled_from([20, 27])))
+    off_bore = np.hypot(*mesh.points[:, :2].T) > 0.11
+    moves = draw(st.floats(0.0, 0.03)) * random.uniform(-1, 1, mesh.points.shape)
+    return distorted(mesh, np.where(off_bore[:, None], moves, 0.0))
 
 
 @dataclass(frozen=True)

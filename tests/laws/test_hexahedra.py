@@ -10,17 +10,20 @@ from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
+from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
+from kedfem.links.surface import surface
 from kedfem.mesh import HexMesh
-from kedfem.mesh.hexahedra import HEX8, HEX27, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, shape_gradients
 from kedfem.motion.newton import cross_matrix
 from tests.laws.strategies import (
+    FORMS,
     LAW,
     MATERIAL,
     Motion,
     hexahedra,
     motions,
+    patch,
     rotated,
     rotations,
     seeds,
@@ -34,7 +37,7 @@ def jacobians(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """J[k, j] = ∂x_k/∂ξ_j (e, q, 3, 3) at 4 × 4 × 4 Gauss points, from nodal vectors."""
     xi = np.polynomial.legendre.leggauss(4)[0]
     at = np.stack(np.meshgrid(xi, xi, xi, indexing="ij"), axis=-1).reshape(-1, 3)
-    gradients = shape_gradients(HEX27 if cells.shape[1] == 27 else HEX8, at)
+    gradients = shape_gradients({8: HEX8, 20: HEX20, 27: HEX27}[cells.shape[1]], at)
     return np.einsum("eak,qaj->eqkj", points[cells], gradients)
 
 
@@ -223,6 +226,37 @@ def test_strain_energy_and_stresses_do_not_depend_on_the_frame(
     stress = point_rows(here, "here", centre).stress @ g.ravel()
     turned = point_rows(there, "there", motion.moved(centre)).stress @ delta
     np.testing.assert_allclose(turned, stress, atol=1e-9 * np.abs(stress).max())
+
+
+@pytest.mark.parametrize("nodes", FORMS)
+@settings(LAW, max_examples=8)
+@given(seeds)
+def test_a_linear_displacement_is_held_by_the_surface_alone(nodes: int, seed: int) -> None:
+    """The patch test on curved elements: no force at the nodes inside, the one stress at all nodes and points."""
+    random = np.random.default_rng(seed)
+    link = solid(patch(nodes, random))
+    H = random.uniform(-1, 1, (3, 3))
+    g = random.uniform(-1, 1, 3) + link.X @ H.T
+    forces, scale = (link.K0 @ g.ravel()).reshape(-1, 3), np.abs(link.K0).max() * np.abs(g).max()
+    on = surface(link, link.basis.mesh.boundary_facets())
+    inside = np.setdiff1d(np.arange(link.n), on.dofs[np.abs(on.N).max(axis=1) > ROUNDING])
+    assert len(inside) == {8: 1, 20: 7, 27: 27}[nodes]
+    assert np.abs(forces[inside]).max() < ROUNDING * scale
+    stress = stress_of_gradient(H[None], link)
+    tolerance = 1e-11 * np.abs(stress).max()
+    np.testing.assert_allclose(nodal_stress(stress_recovery(link), g) - stress, 0, atol=tolerance)
+    at = link.X[link.basis.element_dofs[:, 3]].mean(axis=0)
+    np.testing.assert_allclose(point_rows(link, "here", at).stress @ g.ravel() - stress[0], 0, atol=tolerance)
+
+
+def test_20_functions_on_27_node_geometry_would_strain_in_a_rigid_turn() -> None:
+    """Why hex20 brings its own geometry: a node moved off the face's middle is no field of the 20 functions."""
+    mesh = patch(27, np.random.default_rng(0))
+    alien = skfem.Basis(solid_basis(mesh).mesh, skfem.ElementHexS2(), intorder=5)
+    K0 = elastic_stiffness(gradient_products(alien, pattern(alien)), MATERIAL.lame())
+    forces = np.abs(K0 @ rigid_modes(alien.doflocs.T)).max(axis=0) / np.abs(K0).max()
+    assert forces[:3].max() < ROUNDING
+    assert forces[3:].min() > 1e-5
 
 
 @LAW

@@ -123,11 +123,12 @@ def test_port_weights_commute_with_rotation(mesh: HexMesh, motion: Motion, seed:
     np.testing.assert_allclose(W_moved @ (g @ motion.R.T), (W @ g) @ motion.R.T, atol=1e-11)
 
 
+@pytest.mark.parametrize("nodes", [20, 27])
 @LAW
 @given(motions)
-def test_surface_weights_of_a_face_sum_to_its_area(motion: Motion) -> None:
+def test_surface_weights_of_a_face_sum_to_its_area(nodes: int, motion: Motion) -> None:
     """The top of a ring between parabolas, each through three points of 45°: triangles and 2/3 chord · height."""
-    link = solid(rotated(ring(), motion))
+    link = solid(rotated(ring(nodes), motion))
     top = motion.moved(np.array([[0.175, 0.0, 0.1]]))[0]
     area = surface_weights(link, face_seat(link, "loads.push", top)).sum()
     half = np.pi / 8

@@ -83,13 +83,13 @@ class TestMeshFile:
 
     @pytest.mark.parametrize(
         ("kind", "nodes", "got"),
-        [("tetra", 4, "1 tetra"), ("hexahedron20", 20, "1 hexahedron20"), ("quad", 4, "no solid elements")],
+        [("tetra", 4, "1 tetra"), ("tetra10", 10, "1 tetra10"), ("quad", 4, "no solid elements")],
     )
     def test_other_elements(self, tmp_path, kind, nodes, got):
         points = (HEX27[:nodes] + 1) / 2
         message = mesh_file(tmp_path, points, [(kind, np.arange(nodes)[None])])
         assert message == (
-            "links.arm.shape.file: must hold hexahedra of one kind (hexahedron or hexahedron27), "
+            "links.arm.shape.file: must hold hexahedra of one kind (hexahedron, hexahedron20, hexahedron27), "
             f"got {got} in {tmp_path / 'arm.vtu'}"
         )
 
@@ -102,8 +102,8 @@ class TestMeshFile:
         assert "got 1 hexahedron, 1 wedge in" in mesh_file(tmp_path, CUBE, cells)
 
     def test_two_kinds_of_hexahedra(self, tmp_path):
-        cells = [("hexahedron", np.arange(8)[None]), ("hexahedron27", np.arange(27)[None])]
-        assert "got 1 hexahedron, 1 hexahedron27 in" in mesh_file(tmp_path, (HEX27 + 1) / 2, cells)
+        cells = [("hexahedron20", np.arange(20)[None]), ("hexahedron27", np.arange(27)[None])]
+        assert "got 1 hexahedron20, 1 hexahedron27 in" in mesh_file(tmp_path, (HEX27 + 1) / 2, cells)
 
     @pytest.mark.parametrize("number", [np.nan, np.inf])
     def test_coordinates_that_are_no_numbers(self, tmp_path, number):

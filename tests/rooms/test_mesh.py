@@ -8,15 +8,24 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-import skfem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
-from skfem.io.meshio import from_meshio
 
+from kedfem.links.solid import solid_basis
 from kedfem.mesh import HexMesh, Quality, checked_mesh, link_mesh, mesh_quality
-from kedfem.mesh.hexahedra import HEX8, HEX27, QUAD9, linear, quadratic, shape_gradients
+from kedfem.mesh.hexahedra import (
+    HEX8,
+    HEX20,
+    HEX27,
+    QUAD9,
+    linear,
+    quadratic,
+    serendipity,
+    shape_functions,
+    shape_gradients,
+)
 from kedfem.mesh.outline import outline_area, profile_outline, smallest_width
 from kedfem.mesh.plane import PlaneQuads, pillowed, quadratic_quads
 from kedfem.mesh.quality import scaled_jacobian
@@ -35,10 +44,7 @@ def meshed(folder: Path = HERE, element: str = "hex27", mesh: dict | None = None
 
 def volume(mesh: HexMesh) -> float:
     """By scikit-fem, which has its own node order and shape functions."""
-    element = skfem.ElementHex2() if mesh.cells.shape[1] == 27 else skfem.ElementHex1()
-    fem = from_meshio(meshio.Mesh(mesh.points, {mesh.cell_type: mesh.cells}))
-    basis = skfem.Basis(fem, element, intorder=5)
-    dx = basis.dx
+    dx = solid_basis(mesh).dx
     assert (dx > 0).all()
     return float(dx.sum())
 
@@ -315,7 +321,21 @@ class TestOutline:
 
 
 class TestElements:
-    @pytest.mark.parametrize("nodes", [QUAD9, HEX8, HEX27])
+    @pytest.mark.parametrize("nodes", [QUAD9, HEX8, HEX20, HEX27])
+    def test_shape_functions_are_one_at_their_node_and_none_at_the_others(self, nodes):
+        assert_array_equal(shape_functions(nodes, 1.0 * nodes), np.eye(len(nodes)))
+
+    @pytest.mark.parametrize("nodes", [QUAD9, HEX8, HEX20, HEX27])
+    def test_shape_gradients_are_the_slopes_of_the_functions(self, nodes):
+        places, step = np.random.default_rng(0).uniform(-1, 1, (7, nodes.shape[1])), 1e-3
+        for j, move in enumerate(step * np.eye(nodes.shape[1])):
+            # exact for the functions' degree of 2 in each direction
+            slope = (shape_functions(nodes, places + move) - shape_functions(nodes, places - move)) / (
+                2 * step
+            )
+            assert_allclose(shape_gradients(nodes, places)[:, :, j], slope, atol=1e-12)
+
+    @pytest.mark.parametrize("nodes", [QUAD9, HEX8, HEX20, HEX27])
     def test_shape_functions_reproduce_linear_fields(self, nodes):
         places = np.random.default_rng(0).uniform(-1, 1, (7, nodes.shape[1]))
         slopes = np.einsum("qkj,ki->qij", shape_gradients(nodes, places), nodes)
@@ -356,6 +376,26 @@ class TestElements:
         assert again.points.shape == mesh.points.shape
         assert_allclose(again.points[again.cells], mesh.points[mesh.cells], atol=1e-15)
 
+    @pytest.mark.parametrize("name", ["linear", "serendipity"])
+    def test_quadratic_keeps_the_form_of_curved_elements(self, name):
+        """The 27 functions hold those of 8 and 20 nodes: the same det J, hence the same volume."""
+        mesh = {"linear": linear, "serendipity": serendipity}[name](plate(*PLATES[1]))
+        random = np.random.default_rng(0)
+        moved = HexMesh(mesh.points + 2e-4 * random.uniform(-1, 1, mesh.points.shape), mesh.cells)
+        full = quadratic(moved)
+        assert_array_equal(full.points[full.cells[:, : mesh.cells.shape[1]]], moved.points[moved.cells])
+        assert len(full.points) == len(quadratic(linear(mesh)).points)
+        assert_allclose(volume(full), volume(moved), rtol=1e-12)
+
+    def test_hex20_has_corners_and_edges_of_hex27(self):
+        shape = plate_shape(*PLATES[1])
+        full, edges = meshed(**shape), meshed(**shape, element="hex20")
+        assert edges.cell_type == "hexahedron20"
+        assert_array_equal(edges.points[edges.cells], full.points[full.cells[:, :20]])
+        assert len(np.unique(edges.cells)) == len(edges.points)
+        # plane and cylindrical faces are as before, the outer form does not change
+        assert_allclose(volume(edges), volume(full), rtol=1e-12)
+
     def test_records_cannot_be_written_to(self):
         mesh = plate(*PLATES[0])
         for array in (mesh.points, mesh.cells):
@@ -387,6 +427,13 @@ class TestQuality:
         points = HEX27 + 0.0
         points[24] = [0, 0, 1.6]  # the middle of the lower face, above the upper one
         assert mesh_quality(HexMesh(points, np.arange(27)[None])).least < 0
+
+    def test_sees_a_20_node_element_that_is_folded_within_a_face(self):
+        points = HEX20 + 0.0
+        points[8:12, 2] = 0.05  # the middle of the lower face, −Σ/4 + Σ/2, is at 1.1, above the upper face
+        own = np.linalg.det(np.swapaxes(shape_gradients(HEX20, 1.0 * HEX20), 1, 2) @ points)
+        assert own.min() > 0.4
+        assert_allclose(mesh_quality(HexMesh(points, np.arange(20)[None])).least, -1, rtol=1e-12)
 
     def test_lets_good_meshes_pass(self):
         mesh = plate(*PLATES[0])
@@ -434,7 +481,7 @@ def four_squares(inside: tuple[float, float]) -> PlaneQuads:
 
 
 class TestMeshFile:
-    @pytest.mark.parametrize("element", ["hex27", "hex8"])
+    @pytest.mark.parametrize("element", ["hex27", "hex20", "hex8"])
     @pytest.mark.parametrize("name", ["arm.vtu", "arm.vtk", "arm.xdmf"])
     def test_comes_back_as_it_was_written(self, tmp_path, name, element):
         mesh = meshed(**plate_shape(*PLATES[1]), element=element)
@@ -462,6 +509,32 @@ class TestMeshFile:
         again = meshed(tmp_path, kind="mesh", file="arm.vtu")
         assert again.cell_type == "hexahedron27"
         assert_allclose(volume(again), math.sqrt(2) * 0.2 * 0.1, rtol=1e-12)
+
+    def test_of_20_nodes_from_gmsh_keeps_its_curved_edges(self, tmp_path):
+        """gmsh orders 20 nodes in its own way; meshio reads them in VTK's."""
+        import gmsh
+
+        with gmsh_model():
+            gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+            gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+            quarter = gmsh.model.occ.addDisk(0, 0, 0, 2, 2)
+            gmsh.model.occ.cut([(2, quarter)], [(2, gmsh.model.occ.addDisk(0, 0, 0, 1, 1))])
+            gmsh.model.occ.cut([(2, quarter)], [(2, gmsh.model.occ.addRectangle(-3, -3, 0, 6, 3))])
+            gmsh.model.occ.cut([(2, quarter)], [(2, gmsh.model.occ.addRectangle(-3, -3, 0, 3, 6))])
+            gmsh.model.occ.extrude([(2, quarter)], 0, 0, 1, numElements=[2], recombine=True)
+            gmsh.model.occ.synchronize()
+            for _, curve in gmsh.model.getEntities(1):
+                gmsh.model.mesh.setTransfiniteCurve(curve, 5)
+            gmsh.model.mesh.setTransfiniteSurface(quarter)
+            gmsh.model.mesh.setRecombine(2, quarter)
+            gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(2)
+            gmsh.write(str(tmp_path / "arm.msh"))
+        mesh = meshed(tmp_path, kind="mesh", file="arm.msh", element="hex20")
+        assert mesh.cells.shape == (32, 20)
+        half = math.pi / 16  # parabolas through three points of each arc: triangles and 2/3 chord · height
+        of_unit_radius = 4 * (math.sin(2 * half) / 2 + 4 / 3 * math.sin(half) * (1 - math.cos(half)))
+        assert_allclose(volume(mesh), of_unit_radius * (4 - 1), rtol=1e-9)
 
 
 class TestSession:

@@ -46,6 +46,12 @@ def brick() -> LinkField:
     return filled("brick", "hexahedron", np.arange(8)[None], HEX27[:8] / 2 + [0.0, 6.0, 0.0])
 
 
+def bent() -> LinkField:
+    """One 20-node cell of the warped one's form: all its terms are serendipity ones."""
+    link = warped()
+    return filled("bent", "hexahedron20", link.cells[:, :20], link.points[:20] + np.array([0.0, 12.0, 0.0]))
+
+
 def arch() -> LinkField:
     x = np.array([0.0, 4.0, 2.0, 8.0, 6.0])
     points = np.c_[x, x * (8 - x) / 8 - 3, 0 * x]
@@ -57,7 +63,7 @@ def rod() -> LinkField:
 
 
 def links() -> list[LinkField]:
-    return [warped(), brick(), arch(), rod()]
+    return [warped(), brick(), bent(), arch(), rod()]
 
 
 def frame_times(pvd: Path) -> list[tuple[float, str]]:
@@ -78,7 +84,7 @@ def test_meshio_reads_what_was_written(tmp_path: Path) -> None:
         np.testing.assert_array_equal(mesh.cell_data["link"][index], index)
         first += len(link.points)
     assert mesh.field_data["TimeValue"] == [0.125]
-    assert mesh.field_data["link arch & co"] == [2]
+    assert mesh.field_data["link arch & co"] == [3]
 
 
 def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
@@ -86,32 +92,34 @@ def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
 
     written = links()
     grid = pyvista.read(AnimationWriter(tmp_path, "run").add(0.125, written))
-    assert grid.celltypes.tolist() == [29, 12, 21, 21, 3]  # VTK: triquadratic and linear hexahedron, lines
+    assert grid.celltypes.tolist() == [29, 12, 25, 21, 21, 3]  # VTK: hexahedra of 27, 8 and 20 nodes, lines
     np.testing.assert_array_equal(
         grid.point_data["stress"], np.concatenate([link.stress for link in written])
     )
-    np.testing.assert_array_equal(grid.cell_data["link"], [0, 1, 2, 2, 3])
+    np.testing.assert_array_equal(grid.cell_data["link"], [0, 1, 2, 3, 3, 4])
     names = [grid.GetPointData().GetArray("stress").GetComponentName(i) for i in range(6)]
     assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]  # ParaView's names of our xx, yy, zz, xy, yz, zx
     assert grid.field_data["TimeValue"] == [0.125]
 
 
-def test_vtk_takes_27_nodes_in_our_order(tmp_path: Path) -> None:
+@pytest.mark.parametrize("link", [warped(), bent()], ids=["27", "20"])
+def test_vtk_takes_quadratic_hexahedra_in_our_order(tmp_path: Path, link: LinkField) -> None:
     """The volume by VTK's own shape functions is the exact one, and so is det J at every Gauss point."""
     import pyvista
 
-    cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [warped()])).GetCell(0)
-    points = np.array([cell.GetPoints().GetPoint(i) for i in range(27)])
+    cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [link])).GetCell(0)
+    count = link.cells.shape[1]
+    points = np.array([cell.GetPoints().GetPoint(i) for i in range(count)])
     nodes, weights = np.polynomial.legendre.leggauss(3)  # exact for det J, of degree 5 in each coordinate
     volume = 0.0
     for i, j, k in np.ndindex(3, 3, 3):
-        gradients = [0.0] * 81
+        gradients = [0.0] * (3 * count)
         cell.InterpolateDerivs((0.5 + nodes[[i, j, k]] / 2).tolist(), gradients)
-        det_J = np.linalg.det(np.reshape(gradients, (3, 27)) @ points)
+        det_J = np.linalg.det(np.reshape(gradients, (3, count)) @ points)
         assert det_J == pytest.approx(24.0, rel=1e-12)  # 2 · 3 · 4, see warped()
         volume += det_J * weights[i] * weights[j] * weights[k] / 8
     assert volume == pytest.approx(24.0, rel=1e-12)
-    np.testing.assert_allclose(np.reshape(cell.GetParametricCoords(), (27, 3)), HEX27 / 2)
+    np.testing.assert_allclose(np.reshape(cell.GetParametricCoords(), (count, 3)), HEX27[:count] / 2)
 
 
 def test_the_list_names_whole_frames_in_order_after_each(tmp_path: Path) -> None:

@@ -192,7 +192,7 @@ def test_defaults_that_depend_on_other_keys(tmp_path):
     assert scene.source == ARM
     solid = Bar(between=((0, 0), (0.3, 0)), width=0.02, thickness=0.01)
     assert LinkScene(material="steel", shape=solid).mesh.elements == (10, 2, 1)  # about 1.5 widths long
-    assert LinkScene(material="steel", shape=solid).element == "hex27"
+    assert LinkScene(material="steel", shape=solid).element == "hex20"
 
 
 def test_an_axis_becomes_a_unit_vector_and_a_factor_a_table():

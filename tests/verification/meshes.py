@@ -8,7 +8,7 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh import HexMesh, QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads
+from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
 from kedfem.scene import Material
 
 Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -23,18 +23,19 @@ def mapped_mesh(
 
     closed : the face r = 1 is the face r = 0 again, as in a ring.
     """
-    order = 2 if nodes == 27 else 1
+    order = 1 if nodes == 8 else 2
     size = order * np.array(counts) + 1
     axes = [np.arange(n) for n in size]
     r, s, t = (i.ravel() / (n - 1) for i, n in zip(np.meshgrid(*axes, indexing="ij"), size, strict=True))
     corners = np.stack(np.meshgrid(*(order * np.arange(c) for c in counts), indexing="ij"), -1).reshape(-1, 3)
-    inside = HEX27 + 1 if nodes == 27 else (HEX8 + 1) // 2
+    inside = HEX27 + 1 if order == 2 else (HEX8 + 1) // 2
     index = corners[:, None, :] + inside
     if closed:
         index[..., 0] %= size[0] - 1
     cells = np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), tuple(size))
     used, renumbered = np.unique(cells, return_inverse=True)
-    return HexMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
+    mesh = HexMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
+    return serendipity(mesh) if nodes == 20 else mesh
 
 
 def box(lengths: tuple[float, float, float], start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mapping:

@@ -120,7 +120,7 @@ def turning_bar_by_steps() -> list[Row]:
     """From the quasi-static start, which is the steady state already, and from rest, over four turns."""
     g, link = tip_history(turning_bar_scene("quasi-static"))
     from_rest, _ = tip_history(turning_bar_scene("rest"))
-    text, tip = f"{model((6, 2, 1), link)}, 360 steps a turn", 0.0151572424
+    text, tip = f"{model((6, 2, 1), link, 'hex20')}, 360 steps a turn", 0.0151572424
     return [
         Row("tip at the quasi-static start [m]", tip, float(g[0, 0]), 1e-6, text),
         Row(

@@ -33,7 +33,7 @@ def turning_bar_error(nodes: int) -> Callable[[int], float]:
     return error
 
 
-@pytest.mark.parametrize(("nodes", "order", "cap"), [(8, 2, 1.1e-3), (27, 4, 1e-7)])
+@pytest.mark.parametrize(("nodes", "order", "cap"), [(8, 2, 1.1e-3), (20, 4, 1e-7), (27, 4, 1e-7)])
 def test_the_turning_bar_converges_to_SSLV105(nodes: int, order: int, cap: float):
     """Tip of the steady state, against u = sin(αx)/(α cos αL) − x."""
     found, last = slopes(turning_bar_error(nodes), [2, 4, 8])
@@ -50,7 +50,8 @@ def cube_error(material: Material, nodes: int) -> Callable[[int], float]:
 
 
 @pytest.mark.parametrize(
-    ("nodes", "order", "counts", "cap"), [(8, 2, [6, 8, 12], 5.9e-3), (27, 4, [3, 4, 6], 1.1e-4)]
+    ("nodes", "order", "counts", "cap"),
+    [(8, 2, [6, 8, 12], 5.9e-3), (20, 4, [3, 4, 6], 1.2e-4), (27, 4, [3, 4, 6], 1.1e-4)],
 )
 def test_the_cube_converges_to_lames_mode(nodes: int, order: int, counts: list[int], cap: float):
     """Unlike beams a case with shear in all directions; ν = 0.3."""
@@ -59,15 +60,16 @@ def test_the_cube_converges_to_lames_mode(nodes: int, order: int, counts: list[i
     assert last < cap
 
 
-def test_the_nearly_incompressible_cube_locks_with_8_nodes_and_hardly_with_27():
+def test_the_nearly_incompressible_cube_locks_with_8_nodes_and_hardly_with_more():
     """ν = 0.499: a mode without change of volume, which full integration cannot quite follow.
 
-    On affordable meshes 27 nodes lose about two orders and 8 nodes all of theirs (Hughes, The Finite Element
+    On affordable meshes 20 and 27 nodes lose about two orders and 8 nodes all of theirs (Hughes, The Finite Element
     Method, 1987, ch. 4): do not use 8-node elements for nearly incompressible material.
     """
-    found, last = slopes(cube_error(CUBE, 27), [3, 4, 6])
-    np.testing.assert_allclose(found, 2.2, atol=0.3)
-    assert last < 2.2e-3
+    for nodes in (20, 27):
+        found, last = slopes(cube_error(CUBE, nodes), [3, 4, 6])
+        np.testing.assert_allclose(found, 2.2, atol=0.3)
+        assert last < 2.3e-3
     assert 0.08 < cube_error(CUBE, 8)(8) < 0.11
 
 

@@ -69,7 +69,7 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
     for name, (channel, wanted) in reference.channels.items():
         size = float(np.linalg.norm(wanted, axis=1).max())
         if asked_for(name) and name in found.channels and size > NOTHING * units[channel.unit]:
-            values = found.channels[name][1][here]
+            values = _columns(found.channels[name], channel)[here]
             there = _at(found.time[here], reference.time, wanted)
             errors[name] = float(np.linalg.norm(values - there, axis=1).max()) / size
     return errors
@@ -78,6 +78,15 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
 def worst(errors: Mapping[str, float]) -> float:
     """The largest of relative errors; 0 where nothing was asked for."""
     return max(errors.values(), default=0.0)
+
+
+def _columns(found: tuple[Channel, Float[np.ndarray, "T c"]], like: Channel) -> Float[np.ndarray, "T d"]:
+    """The columns that another channel has; a planar link's third is zero."""
+    channel, values = found
+    zero = np.zeros(len(values))
+    return np.stack(
+        [values[:, channel.columns.index(c)] if c in channel.columns else zero for c in like.columns], axis=1
+    )
 
 
 def _at(

@@ -30,6 +30,7 @@ INSTANTS = 16  # where the linkage is looked at before the first run
 MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
 ADDED = 8  # functions that a round adds to a link, at most
+MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 FIRST = 0.3  # of the tolerance: what the first functions leave out of the training deflections' energy norm
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
@@ -94,6 +95,20 @@ def reduced(
     Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
     kept = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, kept)), tuple(kept), estimate, tolerance)
+
+
+def first_reduced(full: Prepared, tolerance: float) -> Prepared:
+    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at."""
+    if all(link.unknowns <= SMALL and link.full is None for link in full.model.links):
+        return full
+    found = bases(full.model, instants(full.model, _training(full)), static_parts(full.model))
+    Q = [
+        None
+        if link.unknowns <= MINUTE or link.full is not None
+        else basis.first(basis.count(FIRST * tolerance))
+        for link, basis in zip(full.model.links, found, strict=True)
+    ]
+    return replace(full, model=reduced_model(full.model, Q))
 
 
 def _settled(

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from kedfem.bench.elements import bench_elements
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
 from kedfem.bench.plane import bench_plane
@@ -16,4 +17,5 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "solvers": bench_solvers,
     "plane": bench_plane,
     "start": bench_start,
+    "elements": bench_elements,
 }

@@ -62,7 +62,7 @@ def one_size(size: tuple[int, int, int]) -> dict[str, float]:
     from kedfem.scene import Bar, LinkScene, Material, Meshing
 
     shape = Bar(between=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), width=0.22, thickness=0.02)
-    scene = LinkScene(material="steel", shape=shape, mesh=Meshing(elements=size))
+    scene = LinkScene(material="steel", shape=shape, mesh=Meshing(elements=size), element="hex27")
     material = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
     mesh = link_mesh("block", scene, Path())
     kept: dict[str, Any] = {}

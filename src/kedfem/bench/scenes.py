@@ -17,7 +17,7 @@ def bar_four_bar(
     elements : of each bar: along, across, through the thickness
     """
     bar = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
-    raw = _four_bar(bar, {"mesh": {"elements": list(elements)}})
+    raw = _four_bar(bar, {"element": "hex27", "mesh": {"elements": list(elements)}})
     raw["analysis"] = {"turns": turns, "steps_per_turn": steps_per_turn, "solver": solver}
     return scene_from(raw)
 
@@ -37,7 +37,8 @@ def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn:
         "eye_diameter": 0.045,
         "bore_diameter": 0.02,
     }
-    raw = _four_bar(plate, {"fidelity": fidelity, "mesh": {"elements_across": across}})
+    element = {"solid": "hex27", "plane": "quad9"}[fidelity]
+    raw = _four_bar(plate, {"fidelity": fidelity, "element": element, "mesh": {"elements_across": across}})
     raw["drive"]["motion"]["speed"] = "150 rpm"
     raw["points"] |= {
         "M": {"between": ["C", "D"], "fraction": 0.5, "offset": 0.0127},

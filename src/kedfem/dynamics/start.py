@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse.linalg
 from jaxtyping import Float
 
+from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.condensed import (
     Rotation,
     Substructure,
@@ -17,8 +16,7 @@ from kedfem.dynamics.condensed import (
 )
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
-from kedfem.errors import SolveError
-from kedfem.links.record import Link, Matrix, mass_times
+from kedfem.links.record import Link, mass_times
 
 TURNING_SWEEPS = 20
 CONVERGED = 1e-9  # change of a sweep, of the deflection
@@ -118,30 +116,19 @@ def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, floa
 
 
 def mass_substructure(link: Link, joint: Attachment) -> Substructure:
-    """The link condensed with A = M, by conjugate gradients: a mass matrix needs no factorisation."""
+    """The link condensed with A = M; the three components of a solid share one factor.
+
+    Conjugate gradients would spare it, but a heavy body on a bore costs them their convergence.
+    """
+    of = {id(m): Cholesky(m, f"links.{link.name}: mass") for m in {id(m): m for m in link.mass}.values()}
 
     def solve(b: Nodal) -> Nodal:
-        return np.stack([_mass_solution(m, b[:, k]) for k, m in enumerate(link.mass)], axis=1)
+        return np.stack([np.array(of[id(m)].solve(b[:, k])) for k, m in enumerate(link.mass)], axis=1)
 
     def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
         return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
 
     return substructure(joint, link.n, solve, solve_many)
-
-
-def _mass_solution(m: Matrix, b: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    if not b.any():
-        return np.zeros_like(b)
-    if isinstance(m, np.ndarray):
-        return np.asarray(scipy.linalg.solve(m, b, assume_a="pos"))
-    d = m.diagonal()
-    preconditioner = scipy.sparse.linalg.LinearOperator(m.shape, lambda x: np.asarray(x).ravel() / d)
-    x, failed = scipy.sparse.linalg.cg(m, b, rtol=1e-13, atol=0.0, maxiter=2000, M=preconditioner)
-    if failed:
-        raise SolveError(
-            "mass: conjugate gradients must converge, got no solution after 2000 sweeps (badly shaped elements?)"
-        )
-    return np.asarray(x)
 
 
 def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:

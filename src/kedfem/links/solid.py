@@ -6,19 +6,29 @@
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
-import meshio
 import numpy as np
 import scipy.sparse as sp
 import skfem
 from jaxtyping import Float, Int
-from skfem.io.meshio import HEX_MAPPING, from_meshio
+from skfem.io.meshio import HEX_MAPPING
 
 from kedfem.links.record import Link, Mass, mass_constants, read_only
 from kedfem.mesh import HexMesh
+from kedfem.mesh.hexahedra import CELL_TYPES
 from kedfem.scene import Material
 
-QUADRATURE_ORDER = {8: 3, 27: 5}  # 2³ and 3³ Gauss points: the volume of a distorted element is exact
-CELL_TYPES = {8: "hexahedron", 27: "hexahedron27"}
+QUADRATURE_ORDER = {8: 3, 20: 5, 27: 5}  # 2³ and 3³ Gauss points: the volume of a distorted element is exact
+
+
+@dataclass(repr=False)
+class MeshHexS2(skfem.MeshHex1):  # type: ignore[misc]
+    """20-node hexahedra whose geometry is serendipity too, which scikit-fem has not: on its 27-node geometry the
+    20 functions would not hold x, y, z themselves, and a rigid turn would cause strain."""
+
+    elem: type[skfem.Element] = skfem.ElementHexS2
+
+
+MESHES = {8: skfem.MeshHex1, 20: MeshHexS2, 27: skfem.MeshHex2}
 
 
 def solid_basis(mesh: HexMesh) -> skfem.Basis:
@@ -26,12 +36,12 @@ def solid_basis(mesh: HexMesh) -> skfem.Basis:
 
     Parameters
     ----------
-    mesh : 8- or 27-node hexahedra [m]
+    mesh : 8-, 20- or 27-node hexahedra [m]
     """
     nodes = mesh.cells.shape[1]
-    element = skfem.ElementHex1() if nodes == 8 else skfem.ElementHex2()
-    fem_mesh = from_meshio(meshio.Mesh(mesh.points, {CELL_TYPES[nodes]: mesh.cells}))
-    return skfem.Basis(fem_mesh, element, intorder=QUADRATURE_ORDER[nodes])
+    order = np.argsort(HEX_MAPPING[:nodes])
+    fem_mesh = MESHES[nodes](np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.cells.T[order]))
+    return skfem.Basis(fem_mesh, fem_mesh.elem(), intorder=QUADRATURE_ORDER[nodes])
 
 
 def vtk_cells(basis: skfem.Basis) -> Int[np.ndarray, "e m"]:

@@ -1,4 +1,4 @@
-"""Meshes of links: hexahedra with 8 or 27 nodes, quadrilaterals with 9; the only room that speaks to gmsh."""
+"""Meshes of links: hexahedra with 8, 20 or 27 nodes, quadrilaterals with 9; the only room that speaks to gmsh."""
 
 from kedfem.mesh.flat import QuadMesh
 from kedfem.mesh.hexahedra import HexMesh

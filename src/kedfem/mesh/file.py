@@ -12,9 +12,9 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
-from kedfem.mesh.hexahedra import HexMesh, without_spare_nodes
+from kedfem.mesh.hexahedra import CELL_TYPES, HexMesh, without_spare_nodes
 
-_ACCEPTED = ("hexahedron", "hexahedron27")
+_ACCEPTED = tuple(CELL_TYPES.values())
 
 
 def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
@@ -94,9 +94,7 @@ def _hexahedra(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
     if len(found) == 1 and (kind := next(iter(found))) in _ACCEPTED and found[kind]:
         return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
     got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
-    raise MeshError(
-        f"{where}: must hold hexahedra of one kind ({' or '.join(_ACCEPTED)}), got {got} in {path}"
-    )
+    raise MeshError(f"{where}: must hold hexahedra of one kind ({', '.join(_ACCEPTED)}), got {got} in {path}")
 
 
 def _pieces(mesh: HexMesh) -> int:

@@ -1,4 +1,4 @@
-"""Hexahedral meshes: the record, the tensor-product shape functions, extrusion of plane quadrilaterals."""
+"""Hexahedral meshes: the record, the elements' shape functions, extrusion of plane quadrilaterals."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,11 @@ HEX27: Int[np.ndarray, "27 3"] = np.array(
     + [(*corner, 0) for corner in _SQUARE]
     + [(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1), (0, 0, 0)]
 )
+#: Nodes of the serendipity hex20 and of hex8: the same order without faces and centre, and the corners alone.
+HEX20: Int[np.ndarray, "20 3"] = HEX27[:20]
 HEX8: Int[np.ndarray, "8 3"] = HEX27[:8]
+
+CELL_TYPES = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}  # meshio's names
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +33,8 @@ class HexMesh:
     ----------
     points : (n, 3) [m]
         Nodes in the global reference position.
-    cells : (e, 8) or (e, 27)
-        Node numbers in VTK order (meshio: hexahedron, hexahedron27).
+    cells : (e, 8), (e, 20) or (e, 27)
+        Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27).
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -44,21 +48,34 @@ class HexMesh:
 
     @property
     def cell_type(self) -> str:
-        """The cells' name in meshio: hexahedron or hexahedron27."""
-        return "hexahedron27" if self.cells.shape[1] == len(HEX27) else "hexahedron"
+        """The cells' name in meshio: hexahedron, hexahedron20 or hexahedron27."""
+        return CELL_TYPES[self.cells.shape[1]]
+
+
+def shape_functions(nodes: Int[np.ndarray, "k d"], at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k"]:
+    """N_a of an element: tensor-product Lagrange, or serendipity for HEX20.
+
+    Parameters
+    ----------
+    nodes : (k, d) in {-1, 0, 1}
+        Reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9).
+    at : (q, d) [-]
+        Where the values are wanted, reference coordinates.
+
+    Returns
+    -------
+    (q, k) [-]
+        One value per place and function.
+    """
+    x = np.asarray(at, dtype=float)
+    product = np.prod([line for line, _ in _factors(nodes, x)], axis=0)
+    return np.asarray(product * _brackets(nodes, x)[0])
 
 
 def shape_gradients(
     nodes: Int[np.ndarray, "k d"], at: Float[np.ndarray, "q d"]
 ) -> Float[np.ndarray, "q k d"]:
-    """∂N_a/∂ξ_j of tensor-product Lagrange elements, quadratic where the nodes have a middle, else linear.
-
-    Parameters
-    ----------
-    nodes : (k, d) in {-1, 0, 1}
-        Reference coordinates of the element's nodes (HEX27, HEX8, QUAD9).
-    at : (q, d) [-]
-        Where the gradients are wanted, reference coordinates.
+    """∂N_a/∂ξ_j of the functions of :func:`shape_functions`.
 
     Returns
     -------
@@ -66,16 +83,36 @@ def shape_gradients(
         One gradient per place and shape function.
     """
     x = np.asarray(at, dtype=float)
-    if (nodes == 0).any():
+    bracket, slope = _brackets(nodes, x)
+    factors = _factors(nodes, x)
+    product = np.prod([line for line, _ in factors], axis=0)
+    axes = range(nodes.shape[1])
+    columns = [np.prod([factors[i][int(i == j)] for i in axes], axis=0) for j in axes]
+    return np.asarray(np.stack(columns, axis=-1) * bracket[..., None] + product[..., None] * slope)
+
+
+def _factors(
+    nodes: Int[np.ndarray, "k d"], x: Float[np.ndarray, "q d"]
+) -> list[tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k"]]]:
+    """Of each direction the factor of every N_a, and its derivative."""
+    linear_ends = (1 - x) / 2, (1 + x) / 2
+    if len(nodes) == len(HEX20) or not (nodes == 0).any():
+        line = np.stack([linear_ends[0], 1 - x**2, linear_ends[1]])
+        slope = np.stack([0 * x - 0.5, -2 * x, 0 * x + 0.5])
+    else:
         line = np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2])
         slope = np.stack([x - 0.5, -2 * x, x + 0.5])
-    else:
-        line = np.stack([(1 - x) / 2, 0 * x, (1 + x) / 2])
-        slope = np.stack([0 * x - 0.5, 0 * x, 0 * x + 0.5])
-    axes = range(nodes.shape[1])
-    factors = [[line[nodes[:, i] + 1, :, i].T, slope[nodes[:, i] + 1, :, i].T] for i in axes]
-    columns = [np.prod([factors[i][int(i == j)] for i in axes], axis=0) for j in axes]
-    return np.stack(columns, axis=-1)
+    return [(line[nodes[:, i] + 1, :, i].T, slope[nodes[:, i] + 1, :, i].T) for i in range(nodes.shape[1])]
+
+
+def _brackets(
+    nodes: Int[np.ndarray, "k d"], x: Float[np.ndarray, "q d"]
+) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
+    """What makes a serendipity corner vanish at the middles of its edges, (Σ ξ_j ξ_aj − 2), and its gradient."""
+    corner = (nodes != 0).all(axis=1) & (len(nodes) == len(HEX20))
+    bracket = np.where(corner, x @ nodes.T - 2.0, 1.0)
+    slope = 1.0 * nodes * corner[:, None]
+    return bracket, np.broadcast_to(slope, (len(x), *slope.shape))
 
 
 def rectangle_quads(
@@ -132,16 +169,25 @@ def extruded(
 
 
 def quadratic(mesh: HexMesh) -> HexMesh:
-    """The 27-node hexahedra with the same corners and straight edges; meshes of 27-node ones as they are."""
-    if mesh.cells.shape[1] == len(HEX27):
+    """The 27-node hexahedra of the same form, where the element's own functions put the nodes that it has not."""
+    e, k = mesh.cells.shape
+    if k == len(HEX27):
         return mesh
-    e, spans = len(mesh.cells), HEX27[:, None] * HEX8[None]
-    on = (spans >= 0).all(axis=2)  # which corners span the edge, face or cell that a node is the middle of
-    corners = np.where(on, mesh.cells[:, None, :], -1)
-    keys, cells = np.unique(np.sort(corners, axis=2).reshape(e * len(HEX27), -1), axis=0, return_inverse=True)
-    inside = keys >= 0
-    points = (mesh.points[keys] * inside[:, :, None]).sum(axis=1) / inside.sum(axis=1, keepdims=True)
-    return HexMesh(points, cells.reshape(e, len(HEX27)))
+    added = HEX27[k:]
+    on = (added[:, None] * HEX8 >= 0).all(axis=2)  # the corners of the edge, face or cell that a node is in
+    corners = np.sort(np.where(on, mesh.cells[:, None, : len(HEX8)], -1), axis=2).reshape(-1, len(HEX8))
+    _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    places = (shape_functions(HEX27[:k], 1.0 * added) @ mesh.points[mesh.cells]).reshape(-1, 3)
+    cells = np.column_stack([mesh.cells, len(mesh.points) + number.reshape(e, -1)])
+    return HexMesh(np.concatenate([mesh.points, places[first]]), cells)
+
+
+def serendipity(mesh: HexMesh) -> HexMesh:
+    """The 20-node hexahedra with the same corners and edges, nodes within faces and cells dropped."""
+    if mesh.cells.shape[1] == len(HEX20):
+        return mesh
+    full = quadratic(mesh)
+    return without_spare_nodes(full.points, full.cells[:, : len(HEX20)])
 
 
 def linear(mesh: HexMesh) -> HexMesh:

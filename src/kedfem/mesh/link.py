@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.file import mesh_from_file
 from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.hexahedra import HexMesh, frame_along, linear, quadratic, rectangle_quads
+from kedfem.mesh.hexahedra import HexMesh, frame_along, linear, quadratic, rectangle_quads, serendipity
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
@@ -46,7 +46,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
     Returns
     -------
     HexMesh
-        27-node elements, or 8-node ones if `link.element` is hex8, of at least `link.min_quality`.
+        Elements of the nodes that `link.element` says, of at least `link.min_quality`.
 
     Raises
     ------
@@ -58,8 +58,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
         mesh = mesh_from_file(f"{where}.shape.file", folder / link.shape.file, link.shape.scale)
     else:
         mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
-    mesh = linear(mesh) if link.element == "hex8" else quadratic(mesh)
-    return checked_mesh(name, mesh, link.min_quality)
+    form = {"hex8": linear, "hex20": serendipity, "hex27": quadratic}[str(link.element)]
+    return checked_mesh(name, form(mesh), link.min_quality)
 
 
 def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX27, QUAD9, HexMesh, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, HexMesh, shape_gradients
 
 Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
@@ -47,17 +47,18 @@ def scaled_jacobian(
     ----------
     points : (n, d) [m]
         Nodes, in the plane (d = 2) or in space.
-    cells : (e, 9), (e, 8) or (e, 27)
-        quad9, hex8 or hex27 in VTK order.
+    cells : (e, 9), (e, 8), (e, 20) or (e, 27)
+        quad9, hex8, hex20 or hex27 in VTK order.
 
     Returns
     -------
     (e,) [-]
         Between -1 and 1; 0 where an element has no extent.
     """
-    nodes = {len(kind): kind for kind in (QUAD9, HEX8, HEX27)}[cells.shape[1]]
+    nodes = {len(kind): kind for kind in (QUAD9, HEX8, HEX20, HEX27)}[cells.shape[1]]
+    places = HEX27 if len(nodes) == len(HEX20) else nodes  # its Gauss points are 3³ too
     inner = np.sqrt(3 / 5 if len(nodes) != len(HEX8) else 1 / 3)
-    gradients = shape_gradients(nodes, np.concatenate([nodes, inner * nodes]))
+    gradients = shape_gradients(nodes, np.concatenate([places, inner * places]))
     chunks = np.array_split(cells, max(1, len(cells) // _CHUNK))
     return np.concatenate([_scaled_determinants(points[chunk], gradients).min(axis=1) for chunk in chunks])
 

@@ -25,7 +25,7 @@ class LinkField:
     name
         The link's name.
     cell_type
-        meshio's name: ``hexahedron27``, ``hexahedron``, ``line``, ``line3``.
+        meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``.
     cells : (e, k) [-]
         Node numbers in VTK's order.
     points : (n, 3) [m]

@@ -123,7 +123,10 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
 
 
 def drive_and_analysis_faults(parts: Parts) -> Iterator[str]:
-    """An analysis that does not suit the law of motion."""
+    """An analysis that does not suit the law of motion, or leaves links open without saying for which accuracy."""
+    for link in parts.links.values():
+        if link.word("fidelity") == "auto" and not parts.analysis.has("accuracy"):
+            yield link.fault("fidelity", "needs analysis.accuracy, e.g. 0.01, got none for 'auto'")
     analysis, motion = parts.analysis, parts.drive.record.motion
     if turning_speed(motion) == 0.0:
         still = isinstance(motion, (ConstantSpeed, Ramp))
@@ -134,7 +137,7 @@ def drive_and_analysis_faults(parts: Parts) -> Iterator[str]:
                 yield analysis.fault(
                     key, f"needs a drive that goes on turning (else {instead} [s]), got {got}"
                 )
-        if not analysis.has("step") and not analysis.has("steps_per_turn"):
+        if not any(analysis.has(key) for key in ("step", "steps_per_turn", "accuracy")):
             yield analysis.fault(
                 "step", f"is required with a drive that does not go on turning [s], got {got}"
             )

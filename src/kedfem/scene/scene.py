@@ -109,7 +109,19 @@ class Scene(Record):
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
+        if scene.analysis.accuracy is not None:
+            scene = scene.fill(links=open_links(scene.links))
         return scene
+
+
+def open_links(links: Mapping[str, LinkScene]) -> dict[str, LinkScene]:
+    """The links of a scene that asks for an accuracy: those with a shape that do not state their fidelity are `auto`."""
+    return {
+        name: link.model_copy(update={"fidelity": "auto"})
+        if "fidelity" not in link.model_fields_set and link.shape is not None and not link.reduced
+        else link
+        for name, link in links.items()
+    }
 
 
 def prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, Any]:

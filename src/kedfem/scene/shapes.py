@@ -120,7 +120,7 @@ class Polyline(Record):
 
 
 class MeshFile(Record):
-    """A mesh of hexahedra (8 or 27 nodes) in a file that meshio reads, in the scene's coordinates; solid."""
+    """A mesh of hexahedra (8, 20 or 27 nodes) in a file that meshio reads, in the scene's coordinates; solid."""
 
     kind: Literal["mesh"] = "mesh"
     file: FileName

@@ -71,6 +71,8 @@ def time_grid(scene: Scene) -> TimeGrid:
     if analysis.step is not None:
         steps = max(1, math.ceil(end / analysis.step - 1e-9))
         return TimeGrid(end / steps, steps)
+    if not turning_speed(motion):
+        return TimeGrid(end / STEPS_PER_TURN, STEPS_PER_TURN)
     step = 2.0 * math.pi / (turning_speed(motion) * (analysis.steps_per_turn or STEPS_PER_TURN))
     return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
 

@@ -1,0 +1,257 @@
+"""The cheapest model of a scene that is near enough: `analysis.accuracy`.
+
+Everything is found by short trial runs of the scene itself, with reduced links: the step by halving it, the mesh by
+making it finer, simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import first_reduced
+from kedfem.accuracy.variants import (
+    families,
+    of_family,
+    refinable,
+    refined,
+    with_analysis,
+    with_links,
+    with_steps,
+)
+from kedfem.errors import KedfemError
+from kedfem.scene import LinkScene, Scene, time_grid
+
+STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
+TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
+FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried
+MESH_ORDER = (
+    2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
+)
+STEP_ORDER = 2.0
+MOST_STEPS = 200_000  # of the analysis
+TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
+TRIES = 6  # steps tried
+
+Stage = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One part of the error: what of, how much (relative, worst channel), how much was allowed."""
+
+    what: str
+    error: float
+    allowed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What was chosen for a scene with `analysis.accuracy`, and why.
+
+    scene : the scene with everything chosen
+    asked : the accuracy
+    shares : parts of the error; the reduction's is what it may cause
+    notes : what was tried, left out, and what limits the accuracy
+    """
+
+    scene: Scene
+    asked: float
+    shares: tuple[Share, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def error(self) -> float:
+        """Estimated error of the run, all shares together."""
+        return sum(share.error for share in self.shares)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the estimate is within what was asked for."""
+        return self.error <= self.asked
+
+
+@dataclass
+class _Search:
+    """What trial runs found so far."""
+
+    asked: float
+    stage: Stage
+    notes: list[str] = field(default_factory=list)
+    runs: dict[str, Histories] = field(default_factory=dict)
+
+    def run(self, scene: Scene) -> Histories:
+        """A trial run, reduced."""
+        key = scene.model_dump_json()
+        if key not in self.runs:
+            full = meshed(_shortened(scene))
+            self.runs[key] = histories(first_reduced(full, TRIAL * self.asked))
+        return self.runs[key]
+
+    def difference(self, scene: Scene, better: Scene) -> float:
+        """Worst relative difference between two scenes."""
+        return worst(relative_errors(self.run(scene), self.run(better)))
+
+
+def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
+    """Choose fidelities, mesh sizes, functions and step of a scene with `analysis.accuracy`.
+
+    Raises
+    ------
+    MotionError, MeshError, SceneError, SolveError
+        If the scene cannot be run even as it stands.
+    """
+    asked = scene.analysis.accuracy
+    if asked is None:
+        raise ValueError("the scene asks for no accuracy")
+    search = _Search(asked, stage)
+    stage("plan: step")
+    left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
+    scene, step = _with_step(search, _opened(scene, left_open))
+    stage("plan: mesh")
+    scene, mesh = _with_mesh(search, scene)
+    stage("plan: simpler links")
+    scene, model = _with_simpler_links(search, scene, left_open)
+    scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy=None)
+    reduced = any(link.reduced for link in scene.links.values())
+    shares = (
+        Share("time step", step, STEP * asked), Share("mesh", mesh, MESH * asked),
+        Share("simpler links", model, MODEL * asked),
+        Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
+    )  # fmt: skip
+    plan = Plan(scene, asked, shares, ())
+    return replace(plan, notes=(*search.notes, *_limits(plan)))
+
+
+def _limits(plan: Plan) -> Iterator[str]:
+    if not plan.reached:
+        limit = max(plan.shares, key=lambda share: share.error / share.allowed)
+        yield (
+            f"an accuracy of {plan.asked:.3g} could not be reached: {limit.what} limits it, about "
+            f"{plan.error:.2g} is expected"
+        )
+
+
+def _opened(scene: Scene, left_open: list[str]) -> Scene:
+    """Links that leave their fidelity open as the best that their shape allows, reduced."""
+    links = {
+        name: _remeshed(
+            scene.links[name], of_family(scene.links[name], families(scene.links[name])[-1], True)
+        )
+        for name in left_open
+    }
+    return with_links(scene, links)
+
+
+def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
+    """Another fidelity of a link with the mesh that the link states, if it does."""
+    keep: dict[str, Any] = {
+        key: getattr(link, key) for key in ("mesh", "element") if key in link.model_fields_set
+    }
+    return other.model_copy(update=keep)
+
+
+def _shortened(scene: Scene) -> Scene:
+    """The beginning of an analysis that is too long for trials."""
+    grid = time_grid(scene)
+    if grid.steps <= TRIAL_STEPS:
+        return scene
+    return with_analysis(
+        scene, end_time=TRIAL_STEPS * grid.step, turns=None, step=grid.step, steps_per_turn=None
+    )
+
+
+def _with_step(search: _Search, scene: Scene) -> tuple[Scene, float]:
+    """The scene with the largest step whose error is within its share, and that error."""
+    allowed = STEP * search.asked
+    given = {"step", "steps_per_turn"} & scene.analysis.model_fields_set
+    steps, before = time_grid(scene).steps, math.inf
+    for _ in range(TRIES):
+        now, half = with_steps(scene, steps), with_steps(scene, 2 * steps)
+        error = search.difference(now, half) / (1 - 2**-STEP_ORDER)
+        if given:
+            if error > allowed:
+                search.notes.append(f"the scene states its step; its error is about {error:.2g}")
+            return scene, error
+        wanted = (error / (0.8 * allowed)) ** (1 / STEP_ORDER)
+        if error <= allowed and wanted > 0.5:
+            return now, error
+        if error > 0.7 * before or steps * min(wanted, 8.0) > MOST_STEPS:
+            search.notes.append(_unresolved(steps, error))
+            return now, error
+        before = error if wanted > 1 else math.inf
+        steps = max(20, math.ceil(steps * min(max(wanted, 0.25), 8.0)))
+    return with_steps(scene, steps), error
+
+
+def _unresolved(steps: int, error: float) -> str:
+    return (
+        f"the error of the time step stays at {error:.2g} with {steps} steps: the motion excites vibration beyond them "
+        "(a start from rest at full speed, a load put on at once?); a smoother start or damping would help"
+    )
+
+
+def _with_mesh(search: _Search, scene: Scene) -> tuple[Scene, float]:
+    """The scene with the coarsest mesh whose error is within its share, and that error."""
+    open_links = [
+        name for name, link in scene.links.items() if "mesh" not in link.model_fields_set and refinable(link)
+    ]
+    if not open_links:
+        search.notes.append("the scene states all meshes; their error was not looked at")
+        return scene, 0.0
+    meshes = [_finer(scene, open_links, factor) for factor in FINER]
+    error = math.inf
+    for k, (now, finer) in enumerate(pairwise(meshes)):
+        try:
+            change = search.difference(now, finer)
+        except KedfemError as fault:
+            search.notes.append(f"a finer mesh could not be tried: {str(fault).splitlines()[0]}")
+            return now, error
+        beyond = change / ((FINER[k + 1] / FINER[k]) ** MESH_ORDER - 1)
+        error = change + beyond
+        if error <= MESH * search.asked:
+            return now, error
+        if beyond <= MESH * search.asked:
+            return finer, beyond
+        error = beyond
+    search.notes.append(f"the finest mesh tried still leaves an error of {error:.2g}")
+    return meshes[-1], error
+
+
+def _finer(scene: Scene, names: list[str], factor: float) -> Scene:
+    return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
+
+
+def _with_simpler_links(search: _Search, scene: Scene, left_open: list[str]) -> tuple[Scene, float]:
+    """The scene with links made rigid, beams or plane as far as the error stays within its share, and that error."""
+    reference, error = scene, 0.0
+    for name in left_open:
+        for simpler in _simpler(scene.links[name], search.asked):
+            trial = with_links(scene, {name: simpler})
+            try:
+                change = search.difference(trial, reference)
+            except KedfemError as fault:
+                search.notes.append(f"{name}: not {simpler.fidelity}, {str(fault).splitlines()[0]}")
+                continue
+            verdict = "taken" if change <= MODEL * search.asked else "left out"
+            search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
+            if change <= MODEL * search.asked:
+                scene, error = trial, change
+                break
+    return scene, error
+
+
+def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
+    """Simpler fidelities of a link, simplest first."""
+    for family in families(link)[:-1]:
+        other = of_family(link, family, reduced=True)
+        if family == "beam":
+            other = refined(other, math.ceil(4 / math.sqrt(asked)))
+        yield other if family in {"rigid", "beam"} else refined(other, 2.0)
+
+
+def _noun(link: LinkScene) -> str:
+    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.fidelity, "a solid")
