@@ -101,7 +101,7 @@ class _Bench:
     most: float
     repeats: int
     watch: Watch
-    since: float = field(default_factory=perf_counter)
+    since: float = field(default_factory=lambda: perf_counter())  # noqa: PLW0108
     rows: dict[Variant, Measured] = field(default_factory=dict)
     runs: dict[Variant, Histories] = field(default_factory=dict)
     estimates: dict[Variant, float] = field(default_factory=dict)
