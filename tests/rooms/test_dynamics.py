@@ -62,7 +62,7 @@ def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "600 rpm"}},
         "bodies": {"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
         "damping": {"alpha": 0.5, "beta": 1e-5},
-        "analysis": {"turns": 1, "steps_per_turn": 120, **analysis},
+        "analysis": {"turns": 1, "steps_per_turn": 120, "rho_inf": 1.0, **analysis},
     }
 
 

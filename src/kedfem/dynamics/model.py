@@ -1,6 +1,6 @@
 """The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from kedfem.links.build import bare_links
 from kedfem.links.record import Link
 from kedfem.links.reduced import on_functions, reduced, rigid
 from kedfem.links.seats import holds, is_flat, joint_seat, port_weights
+from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
 
@@ -145,6 +146,23 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
     return replace(
         model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders)
     )
+
+
+def stored_model(model: Model) -> Model | None:
+    """A copy of a model that can be pickled, of links that are small; None if one is not."""
+    if not all(can_be_stored(link) for link in model.links):
+        return None
+    return _with_links(model, stored)
+
+
+def restored_model(model: Model) -> Model:
+    """The model that `stored_model` was given; full links come without their matrices."""
+    return _with_links(model, restored)
+
+
+def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
+    carried = tuple(replace(x, link=changed(x.link)) for x in model.carried)
+    return replace(model, links=tuple(map(changed, model.links)), carried=carried)
 
 
 def _joint_on(joint: Attachment, link: Link) -> Attachment:
