@@ -242,7 +242,7 @@ def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: Animation
 def _deflection(model: Model, snapshot: Snapshot) -> float:
     """Largest component of the displacement of any link, of the link's size [-]."""
     return max(
-        float(np.abs(in_space(link, state.u)).max() / np.ptp(link.X, axis=0).max())
+        float(np.abs(in_space(link, state.u)[link.one != 0]).max() / link.size)
         for link, state in zip(model.links, snapshot.states, strict=True)
     )
 

@@ -68,7 +68,7 @@ def _links(model: Model) -> Table:
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for link in model.links:
         quality = mesh_quality(HexMesh(link.X, link.cells)).least if link.kind == "solid" else None
-        table.add_row(link.name, ELEMENTS[link.cell_type], str(len(link.cells)), str(3 * link.n),
+        table.add_row(link.name, ELEMENTS[link.cell_type], str(len(link.cells)), str(link.unknowns),
                       f"{float(link.m1[:, 0].sum()):.4g} kg", "-" if quality is None else f"{quality:.2f}")  # fmt: skip
     for slider in model.sliders:
         table.add_row(

@@ -47,7 +47,7 @@ class Substructure:
 
 def substructure(
     attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
-    anchors: Int[np.ndarray, " e"] | None = None, kappa: float = 1.0,
+    anchors: Int[np.ndarray, " e"] | None = None, kappa: Float[np.ndarray, " e"] | None = None,
 ) -> Substructure:  # fmt: skip
     """Condense a link onto its ports and anchors.
 
@@ -63,7 +63,9 @@ def substructure(
     C = np.concatenate([port_columns(attachment, n), E], axis=1)
     Y = solve_many(C)
     F = C.T @ Y
-    F[np.arange(len(F) - len(held), len(F)), np.arange(len(F) - len(held), len(F))] -= 1 / kappa
+    if kappa is not None:
+        at = np.arange(len(F) - len(held), len(F))
+        F[at, at] -= 1 / kappa
     return Substructure(solve, attachment, Y, np.linalg.inv(F), held)
 
 
@@ -247,9 +249,15 @@ def mass_matrix(link: Link) -> sp.csr_array:
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
-    """Components that hold a link against rigid motion: a middle node's of a beam, those of d nodes far apart else."""
+    """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
     if link.kind == "beam":
         return np.arange(3) + 3 * (link.n // 2)
+    if (
+        link.kind == "spatial_beam"
+    ):  # its nodes may be in line: the turn about it is held by the slopes of one
+        values = np.flatnonzero(link.one)
+        node = values[len(values) // 2]
+        return np.asarray(np.arange(9) + 3 * node)
     nodes = np.flatnonzero(link.one)
     X = link.X[nodes]
     first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
@@ -263,8 +271,13 @@ def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
 def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
     """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
     anchors = anchors_of(link)
-    kappa = ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean())
-    springs = sp.coo_array((np.full(len(anchors), kappa), (anchors, anchors)), shape=link.K0.shape)
+    stiffness = link.K0.diagonal()[anchors]
+    if (
+        link.kind != "spatial_beam"
+    ):  # displacements only, or nearly so; values and slopes differ by lengths squared
+        stiffness = np.full(len(anchors), stiffness.mean())
+    kappa = ANCHORAGE * c_K * stiffness
+    springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     return substructure(
         joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa

@@ -24,10 +24,14 @@ def link_fields(
     for link, body, recovery, state in zip(
         model.links, model.bodies, recoveries, snapshot.states, strict=True
     ):
-        displacement = in_space(link, state.u)
+        displacement = recovery.at_points(in_space(link, state.u))
         stress = nodal_stress(recovery, state.g)
-        points = motion.p[k, body] + link.X @ motion.R[k, body].T + exaggeration * displacement
+        points = (
+            motion.p[k, body] + recovery.at_points(link.X) @ motion.R[k, body].T + exaggeration * displacement
+        )
         fields.append(
-            LinkField(link.name, link.cell_type, link.cells, points, displacement, stress, von_mises(stress))
+            LinkField(
+                link.name, recovery.cell_type, recovery.cells, points, displacement, stress, von_mises(stress)
+            )
         )
     return fields

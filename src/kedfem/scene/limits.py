@@ -1,86 +1,16 @@
-"""Cross checks of beams and their plane, of the analysis and its drive, of files; each yields fault lines."""
+"""Cross checks of the analysis and its drive, and of files; each yields fault lines."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from kedfem.errors import SceneError
-from kedfem.scene.checks import fidelity
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Parts
-from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
-
-FLAT = 1e-9  # how far from the plane, relative to the size of the scene
-
-
-def beam_faults(parts: Parts) -> Iterator[str]:
-    """Beams beside solids, and what leaves the plane of a scene of beams."""
-    solids = [link for link in parts.links.values() if fidelity(link) == "solid"]
-    beams = [link for link in parts.links.values() if fidelity(link) == "beam"]
-    if not beams:
-        return
-    if solids:
-        names = f"got {beams[0].name!r} as a beam and {solids[0].name!r} as a solid"
-        yield f"links: must all be solids or all be beams (rigid sliders go with both), {names}"
-        return
-    for joint in parts.joints.values():
-        axis = joint.record.axis if joint.record is not None else None
-        if axis is None:
-            continue
-        off = max(abs(axis[0]), abs(axis[1]))
-        if joint.record.kind == "revolute" and off > FLAT:
-            yield joint.fault("axis", f"must be along z in a scene of beams, got {vector(axis)}")
-        if joint.record.kind == "prismatic" and abs(axis[2]) > FLAT:
-            yield joint.fault("axis", f"must lie in the xy plane in a scene of beams, got {vector(axis)}")
-    if parts.gravity[2] != 0.0:
-        yield f"gravity: must lie in the xy plane in a scene of beams [m/s^2], got {vector(parts.gravity)}"
-    for load in parts.loads.values():
-        if load.record is not None and load.record.vector[2] != 0.0:
-            yield load.fault(
-                "vector", f"must lie in the xy plane in a scene of beams, got {vector(load.record.vector)}"
-            )
-    yield from plane_faults(parts)
-
-
-def vector(parts: tuple[float, ...]) -> str:
-    """A vector as text."""
-    return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
-
-
-def plane_faults(parts: Parts) -> Iterator[str]:
-    """Points of a scene of beams that are not in the z plane of the first."""
-    placed = [
-        (entry, key, point)
-        for section in (parts.links, parts.joints, parts.loads, parts.bodies, parts.probes)
-        for entry in section.values()
-        if entry.record is not None
-        for key, point in points_of(entry.record)
-        if all(math.isfinite(part) for part in point)
-    ]
-    if not placed:
-        return
-    first = placed[0][2]
-    size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
-    for entry, key, point in placed:
-        if abs(point[2] - first[2]) > FLAT * size:
-            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of a scene of beams [m]"
-            yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
-
-
-def points_of(record: Any) -> Iterator[tuple[tuple[str, *tuple[str | int, ...]], XYZ]]:
-    """The points of a link, joint, load, body or probe, with their keys."""
-    shape = getattr(record, "shape", None)
-    for key in ("between", "points"):
-        for i, point in enumerate(getattr(shape, key, ())):
-            yield ("shape", key, i), point
-    for key in ("at", "centre"):
-        if hasattr(record, key):
-            yield (key,), getattr(record, key)
 
 
 def analysis_faults(parts: Parts) -> Iterator[str]:

@@ -14,7 +14,19 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from kedfem.scene import analysis, damping, drives, links, loads, materials, outlines, points, scene, shapes
+from kedfem.scene import (
+    analysis,
+    damping,
+    drives,
+    links,
+    loads,
+    materials,
+    outlines,
+    points,
+    scene,
+    sections,
+    shapes,
+)
 from kedfem.scene.hints import field_hint, keys, kind_of, models, options
 from kedfem.scene.units import Quantity
 
@@ -35,8 +47,9 @@ as *where: what was wanted, what was got*.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
-* **Beams and solids** cannot share a scene yet; rigid sliders go with both. A scene of beams lies in one
-  plane z = constant, with hinges along z.
+* **Beams** are planar where they can be: if all points on the scene's beams are in one plane z = constant, all hinges
+  are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams. Else they are beams
+  in space; `beam = "planar"` or `"spatial"` settles it. Beams, solids and rigid sliders go together.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 
@@ -55,6 +68,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("[links.NAME]", "", [links.LinkScene]),
     ("[links.NAME.mesh]", "", [links.Meshing]),
     ("[links.NAME.shape]", "", models(shapes.Shape)),
+    ("section of a polyline", "", models(sections.SectionShape)),
     ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
     ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
     ("[joints.NAME]", "", [links.Joint]),
@@ -168,7 +182,9 @@ def limits(quantity: Quantity) -> str:
 
 def unit_sign(unit: str) -> str:
     """A unit as it is printed."""
-    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("*", "·")
+    return (
+        "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
+    )
 
 
 def default(field: FieldInfo) -> str:

@@ -23,12 +23,13 @@ from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_motion_table
-from kedfem.scene.limits import analysis_faults, beam_faults, file_faults
+from kedfem.scene.limits import analysis_faults, file_faults
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
+from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
 
 GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
