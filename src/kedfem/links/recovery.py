@@ -127,7 +127,7 @@ def stress_recovery(link: Link) -> StressRecovery:
     return StressRecovery(link, fibres, link.cells, link.cell_type)
 
 
-def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 6"]:
+def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "p 6"]:
     """Stresses at the nodes in link axes [Pa]; of a planar beam σ_xx of the outer fibre where it is larger in size.
 
     Of a spatial beam at the points of its sections, in the axes (tangent, n1, n2) of the section.

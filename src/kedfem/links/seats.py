@@ -7,7 +7,6 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.section import Section
 from kedfem.links.surface import PLANE_TOLERANCE, cylinder, flat_face, smooth_face, sphere, surface
 
 
@@ -128,25 +127,18 @@ def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
 def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
     """The section at a node of a spatial beam: between its hubs it does not know how a field changes along the axis.
 
-    As wide as the section; of a hub, a cube of the section's area.
+    Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
+    could be told of the section's turn from their difference.
     """
     node = _node_at(link, where, point)
     following = np.flatnonzero(link.one[node + 1 :])
     slopes = np.arange(node + 1, node + 1 + following[0] if len(following) else link.n)
-    directions = link.X[slopes]
     fit = np.zeros((4, link.n))
     fit[0, node] = 1.0
-    fit[1:, slopes] = directions.T
-    extents = np.zeros(3) if link.section is None else _extents(link.section)
-    if len(slopes) == 2:  # y and z only
-        extents[0] = 0.0
-        directions = np.stack([np.cross(*directions), *directions])
-    order = np.argsort(-extents, kind="stable")
-    return Seat(fit, link.X[node], directions[order], extents[order] / np.sqrt(12))
-
-
-def _extents(section: Section) -> Float[np.ndarray, "3"]:
-    return np.array([np.sqrt(section.area), section.height, section.thickness])
+    fit[1:, slopes] = link.X[slopes].T
+    y, z = link.X[slopes[-2:]]
+    known = np.array([1.0, 1.0, len(slopes) - 2.0])
+    return Seat(fit, link.X[node], np.stack([y, z, np.cross(y, z)]), known * link.size / np.sqrt(12))
 
 
 def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
