@@ -17,17 +17,18 @@ from kedfem.scene import Material
 
 LOBATTO = {2: np.array([1.0, 1.0]), 3: np.array([1.0, 1.0, 4.0]) / 3}  # weights at the nodes, ends first
 HUB_STIFFNESS = 100.0  # of E A L: leaves a part of EI/(100 E A L²) of a beam's deflection to the corner
-HUB_INERTIA = 0.01  # of a cube's: a hub needs some along the axis, where the section has none
+HUB_INERTIA = 1e-4  # of a cube's, along the axis: a hub needs some there, where the section has none
 
 
 def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "6 m 3 3"], float]:
     """Strains (ε, γ1, γ2, κ1, κ2, τ) from an element's (u, p, q), and det J.
 
-    With tangent t, directions n1, n2 and ' the derivative by arc length:
+    With tangent t, directions n1, n2, ' the derivative by arc length, a = n1·p, b = ½ (n1·q + n2·p), c = n2·q:
     ε = t·u', γ1 = n1·u' + t·p, γ2 = n2·u' + t·q,
-    κ1 = t·p' + n1'·u' − (n1'·t) ε − (n1'·n2) γ2, κ2 = t·q' + n2'·u' − (n2'·t) ε − (n2'·n1) γ1,
-    τ = ½ (n2·p' + n1'·q − n1·q' − n2'·p).
-    For a rigid section that turns by θ they are −θ'·n2, θ'·n1 and θ'·t.
+    κ1 = t·p' + n1'·u' − (n1'·t) (ε + a) − (n1'·n2) γ2 − (n2'·t) b,
+    κ2 = t·q' + n2'·u' − (n2'·t) (ε + c) − (n2'·n1) γ1 − (n1'·t) b,
+    τ = ½ (n2·p' + n1'·q − n1·q' − n2'·p) − (n1'·n2) (a + c).
+    If sections turn by θ(s), and whatever their own strains a, b, c: κ1 = −θ'·n2, κ2 = θ'·n1, τ = θ'·t.
 
     Parameters
     ----------
@@ -48,20 +49,30 @@ def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.nda
     rows[1, :, 0], rows[1, :, 1] = np.outer(D, n1), np.outer(N, t)
     rows[2, :, 0], rows[2, :, 2] = np.outer(D, n2), np.outer(N, t)
     rows[3, :, 0], rows[3, :, 1] = np.outer(D, n1_s), np.outer(D, t)
-    rows[3] -= (n1_s @ t) * rows[0] + (n1_s @ n2) * rows[2]
+    a, b, c = _within(N, n1, n2)
+    rows[3] -= (n1_s @ t) * (rows[0] + a) + (n1_s @ n2) * rows[2] + (n2_s @ t) * b
     rows[4, :, 0], rows[4, :, 2] = np.outer(D, n2_s), np.outer(D, t)
-    rows[4] -= (n2_s @ t) * rows[0] + (n2_s @ n1) * rows[1]
+    rows[4] -= (n2_s @ t) * (rows[0] + c) + (n2_s @ n1) * rows[1] + (n1_s @ t) * b
     rows[5, :, 1] = (np.outer(D, n2) - np.outer(N, n2_s)) / 2
     rows[5, :, 2] = (np.outer(N, n1_s) - np.outer(D, n1)) / 2
+    rows[5] -= (n1_s @ n2) * (a + c)
     return rows, det_J
 
 
-def section_strains(x: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3 3"]:
-    """Strains within the section at a node, n1·p, n2·q and n1·q + n2·p: rows by strain, function and component."""
-    rows = np.zeros((3, 3, 3))
-    rows[0, 1], rows[1, 2] = x[1], x[2]
-    rows[2, 1], rows[2, 2] = x[2], x[1]
+def _within(
+    N: Float[np.ndarray, " m"], n1: Float[np.ndarray, "3"], n2: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3 m 3 3"]:
+    """Strains within the section, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, node, function and component."""
+    rows = np.zeros((3, len(N), 3, 3))
+    rows[0, :, 1] = np.outer(N, n1)
+    rows[1, :, 1], rows[1, :, 2] = np.outer(N, n2) / 2, np.outer(N, n1) / 2
+    rows[2, :, 2] = np.outer(N, n2)
     return rows
+
+
+def section_strains(x: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3 3"]:
+    """Strains within the section at a node, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, function and component."""
+    return np.asarray(_within(np.ones(1), x[1], x[2])[:, 0])
 
 
 def rigidities(section: Section, material: Material) -> Float[np.ndarray, "6"]:
@@ -127,7 +138,7 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
     cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
     hubs = hub_functions(one)
     m = sp.csr_array(
-        triples.T @ m @ triples + _diagonal(hubs.ravel(), HUB_INERTIA * material.density * cube, n)
+        triples.T @ m @ triples + _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
     )
     K0 = sp.csr_array(
         vectors.T @ K @ vectors + hub_stiffness(X, hubs, HUB_STIFFNESS * rigidity[0] * length_of(axis))
