@@ -9,13 +9,13 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.transient import Snapshot, Steps, drive_range, steps_of, transient
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.record import in_space
 from kedfem.links.recovery import StressRecovery, stress_recovery
-from kedfem.motion.linkage import Linkage, linkage
-from kedfem.motion.path import Path, path
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
@@ -33,16 +33,6 @@ ROWS = 256  # steps kept before they go to the results file
 T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
 """Told of progress: (stage, done, total)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A scene with everything that does not need a time step."""
-
-    scene: Scene
-    linkage: Linkage
-    path: Path
-    model: Model
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +72,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     """
     clock = Clock(watch)
     folder = ready_folder(scene.results_folder)
-    ready = prepared(scene, clock.stage)
+    ready = meshed(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
@@ -93,20 +83,6 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (*deflection_warning(deflection), *warnings)
     return Run(folder, results, peak, clock.seconds, warnings)
-
-
-def prepared(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
-    """Rigid path and elastic model of a scene; nothing is solved.
-
-    Raises
-    ------
-    MotionError, MeshError, SceneError
-    """
-    stage("motion")
-    joined = linkage(scene)
-    along = path(joined, *drive_range(scene))
-    stage("mesh and matrices")
-    return Prepared(scene, joined, along, elastic_model(scene, joined))
 
 
 @dataclass
@@ -178,12 +154,13 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
         if not wanted:
             remove_animation(folder, STEM)
         try:
-            for snapshot in transient(scene, ready.linkage, ready.path, model, solver):
-                table.add(snapshot, rows(recorded, snapshot))
-                deflection = max(deflection, _deflection(model, snapshot))
-                if snapshot.step in wanted:
-                    peak = _framed(ready, recoveries, frames, snapshot, peak)
-                watch("steps", snapshot.step, steps)
+            for block in transient(scene, ready.linkage, ready.path, model, solver):
+                table.add(block, rows(recorded, block))
+                deflection = max(deflection, _deflection(model, block))
+                for k in range(len(block)):
+                    if block.step + k in wanted:
+                        peak = _framed(ready, recoveries, frames, block.at(k), peak)
+                watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
     return peak, deflection
@@ -196,22 +173,24 @@ class _Table:
     writer: ResultsWriter
     channels: list[Channel]
     folder: FilePath
-    when: list[tuple[float, float]] = field(default_factory=list)
-    values: list[dict[str, Float[np.ndarray, " c"]]] = field(default_factory=list)
+    waiting: int = 0
+    when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list)
+    values: list[dict[str, Float[np.ndarray, "T c"]]] = field(default_factory=list)
 
-    def add(self, snapshot: Snapshot, row: dict[str, Float[np.ndarray, " c"]]) -> None:
-        """One more row."""
-        self.when.append((snapshot.t, snapshot.phi))
-        self.values.append(row)
-        if len(self.when) >= ROWS:
+    def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
+        """More rows."""
+        self.when.append(np.stack([block.motion.t, block.motion.phi]))
+        self.values.append(values)
+        self.waiting += len(block)
+        if self.waiting >= ROWS:
             self.flush()
 
     def flush(self) -> None:
         """Bring the rows to the disk."""
         if self.when:
-            time, angle = np.array(self.when).T
-            block = {c.name: np.array([row[c.name] for row in self.values]) for c in self.channels}
-            self.when, self.values = [], []
+            time, angle = np.concatenate(self.when, axis=1)
+            block = {c.name: np.concatenate([each[c.name] for each in self.values]) for c in self.channels}
+            self.when, self.values, self.waiting = [], [], 0
             first = self.writer.rows == 0
             self.writer.append(time, angle, block)
             if first:
@@ -239,12 +218,15 @@ def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: Animation
     return Peak(stress, highest.name, snapshot.t, snapshot.phi, file)
 
 
-def _deflection(model: Model, snapshot: Snapshot) -> float:
-    """Largest component of the displacement of any link, of the link's size [-]."""
-    return max(
-        float(np.abs(in_space(link, state.u)[link.one != 0]).max() / link.size)
-        for link, state in zip(model.links, snapshot.states, strict=True)
-    )
+def _deflection(model: Model, block: Block) -> float:
+    """Largest component of the displacement of any link, of the link's size [-]; of a reduced one at a few moments."""
+    worst = 0.0
+    for link, history in zip(model.links, block.links, strict=True):
+        shown = link.full or link
+        u = history.u if link.Q is None else link.Q @ history.u[:: max(1, len(block) // 4)]
+        moved = in_space(shown, u)[..., shown.one != 0, :]
+        worst = max(worst, float(np.abs(moved).max()) / link.size)
+    return worst
 
 
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:

@@ -67,13 +67,13 @@ def run(scene: ScenePath) -> None:
 @app.command()
 def check(scene: ScenePath) -> None:
     """Show what would be modelled and its cost; solve nothing."""
-    from kedfem.analysis import prepared
+    from kedfem.accuracy.prepared import meshed
     from kedfem.report import check_tables
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene)
     with _progress() as watch:
-        ready = prepared(loaded, lambda stage: watch(stage, 0, 0))
+        ready = meshed(loaded, lambda stage: watch(stage, 0, 0))
     for table in check_tables(ready):
         out.print(table)
 

@@ -4,15 +4,23 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.analysis import Prepared, Run, frame_steps
+from kedfem.accuracy.prepared import Prepared
+from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.links.record import Link
+from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
-ELEMENTS = {"hexahedron27": "hex27", "hexahedron": "hex8", "line3": "beam3", "line": "beam2"}
+ELEMENTS = {
+    "hexahedron27": "hex27",
+    "hexahedron": "hex8",
+    "quad9": "quad9",
+    "line3": "beam3",
+    "line": "beam2",
+}
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -67,9 +75,8 @@ def _links(model: Model) -> Table:
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for link in model.links:
-        quality = mesh_quality(HexMesh(link.X, link.cells)).least if link.kind == "solid" else None
         table.add_row(link.name, ELEMENTS[link.cell_type], str(len(link.cells)), str(link.unknowns),
-                      f"{float(link.m1[:, 0].sum()):.4g} kg", "-" if quality is None else f"{quality:.2f}")  # fmt: skip
+                      f"{float(link.m1[:, 0].sum()):.4g} kg", _quality(link))  # fmt: skip
     for slider in model.sliders:
         table.add_row(
             slider.name,
@@ -82,6 +89,15 @@ def _links(model: Model) -> Table:
     joined = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined"
     table.caption = f"{joined}; mass: with what is attached; quality: worst scaled Jacobian"
     return table
+
+
+def _quality(link: Link) -> str:
+    """The worst scaled Jacobian of a meshed link."""
+    if not link.meshed:
+        return "-"
+    plane = link.kind == "plane"
+    mesh = QuadMesh(link.X, link.cells, link.thickness) if plane else HexMesh(link.X, link.cells)
+    return f"{mesh_quality(mesh).least:.2f}"
 
 
 def _motion(ready: Prepared) -> Table:

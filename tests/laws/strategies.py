@@ -1,6 +1,7 @@
-"""Random rotations, random valid hexahedra and random beams: what the laws are tried on."""
+"""Random rotations, random valid hexahedra, quadrilaterals and beams: what the laws are tried on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from hypothesis import Phase, settings
@@ -8,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kedfem.links.beam import beam_link
+from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle
 from kedfem.links.solid import solid_link
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.mesh.hexahedra import HEX27, extruded, linear, rectangle_quads
 from kedfem.scene import Material
 
@@ -22,6 +24,8 @@ LAW = settings(
 VALID = 0.05  # least scaled Jacobian of a random element: det J > 0 at every node and Gauss point
 # any material serves a law; this one is not close to a special case (ν = 0, ν = 1/2)
 MATERIAL = Material(density=2700.0, youngs_modulus=70e9, poisson_ratio=0.33)
+
+Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 
 seeds = st.integers(0, 2**32 - 1)
 _angles = st.floats(-3.1, 3.1, allow_nan=False)  # up to half a turn about any axis
@@ -61,10 +65,27 @@ def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = (8, 27)) -> HexMesh:
     return distorted(mesh, draw(st.floats(0.0, 0.5)) * spacing * random.uniform(-1, 1, mesh.points.shape))
 
 
-def distorted(mesh: HexMesh, moves: np.ndarray) -> HexMesh:
+@st.composite
+def quadrilaterals(draw: st.DrawFn) -> QuadMesh:
+    """One quad9 or a patch of 2 × 2, all nodes moved at random as far as det J allows, in a plane z = constant."""
+    random = np.random.default_rng(draw(seeds))
+    along, across = draw(st.sampled_from([(1, 1), (2, 2)]))
+    sides = random.uniform(0.3, 1.0, 2)
+    plane, cells = rectangle_quads(sides[0], sides[1], along, across)
+    points = np.column_stack([plane, np.full(len(plane), random.uniform(-1, 1))])
+    spacing = np.array([*(sides / np.array([along, across]) / 2), 0.0])
+    mesh = QuadMesh(points, cells, random.uniform(0.01, 0.1))
+    return distorted(mesh, draw(st.floats(0.0, 0.5)) * spacing * random.uniform(-1, 1, points.shape))
+
+
+def plane(mesh: QuadMesh, axes: np.ndarray | None = None) -> Link:
+    return plane_link("any", mesh, MATERIAL, np.eye(3) if axes is None else axes)
+
+
+def distorted(mesh: Mesh, moves: np.ndarray) -> Mesh:
     """The mesh with its nodes moved, less far until it is valid."""
     for part in 0.5 ** np.arange(20):
-        changed = HexMesh(mesh.points + part * moves, mesh.cells)
+        changed = replace(mesh, points=mesh.points + part * moves)
         if mesh_quality(changed).least >= VALID:
             return changed
     raise ValueError("the mesh is not valid as it is")
@@ -74,8 +95,8 @@ def solid(mesh: HexMesh, axes: np.ndarray | None = None) -> Link:
     return solid_link("any", mesh, MATERIAL, np.eye(3) if axes is None else axes)
 
 
-def rotated(mesh: HexMesh, motion: Motion) -> HexMesh:
-    return HexMesh(motion.moved(mesh.points), mesh.cells)
+def rotated(mesh: Mesh, motion: Motion) -> Mesh:
+    return replace(mesh, points=motion.moved(mesh.points))
 
 
 def ring(moves: np.ndarray | float = 0.0, around: int = 8) -> HexMesh:

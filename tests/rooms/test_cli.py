@@ -298,7 +298,7 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kedfem.analysis.prepared", interrupted)
+    monkeypatch.setattr("kedfem.analysis.meshed", interrupted)
     said = run_kedfem("run", arm)
     assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, "interrupted; nothing was written")
     assert file.read_bytes() == before

@@ -12,9 +12,12 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics import condensed
 from kedfem.dynamics.condensed import CondensedSteps, port_values, port_vectors
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.transient import Snapshot, Steps, drive_range, steps_of, transient
+from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
+from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import scene_from
@@ -30,10 +33,11 @@ PLATE = {
 
 
 def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
-    """[KED]'s four-bar (Nath and Ghosh 1980) of beams, solid bars or plate links, some damping."""
-    shape = PLATE if kind == "plate" else {"kind": "bar", **BAR}
-    fidelity = {"fidelity": "beam"} if kind == "beam" else {}
-    mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": {"elements_across": 1}}[kind]
+    """[KED]'s four-bar (Nath and Ghosh 1980) of beams, solid bars, plate links or plane plate links, some damping."""
+    shape = PLATE if kind in {"plate", "plane"} else {"kind": "bar", **BAR}
+    fidelity = {"fidelity": kind} if kind in {"beam", "plane"} else {}
+    across = {"elements_across": 1}
+    mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": across, "plane": across}[kind]
     ends = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
     pairs = {
         "A": ["ground", "crank"],
@@ -67,17 +71,18 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
     solver = steps_of(scene, model)
-    return model, solver, list(transient(scene, joined, along, model, solver))
+    return model, solver, list(snapshots(scene, joined, along, model, solver))
 
 
 @pytest.mark.parametrize(
-    ("kind", "steps", "bound"), [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 3e-8)]
+    ("kind", "steps", "bound"),
+    [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 3e-8), ("plane", 120, 3e-8)],
 )
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps))
     _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps, solver="literal"))
-    assert isinstance(solver, CondensedSteps)
+    assert isinstance(solver, CondensedSteps if kind == "plate" else DenseSteps)
     assert isinstance(literal, LiteralSteps)
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
     assert literal.factorisations == steps
@@ -106,7 +111,7 @@ def test_condensed_is_literal_however_long_the_step(kind: str) -> None:
             assert_allclose(s.u, r.u, rtol=0, atol=1e-8 * peak)
 
 
-@pytest.mark.parametrize("kind", ["beam", "plate"])
+@pytest.mark.parametrize("kind", ["beam", "plate", "plane"])
 def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) -> None:
     model, _, snapshots = run(four_bar(kind, rho_inf=0.9, initial="quasi-static"))
     for snapshot in snapshots[:: len(snapshots) // 10]:
@@ -122,7 +127,7 @@ def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) 
             assert_allclose(held, B @ z, rtol=0, atol={"u": 1e-12, "v": 1e-9, "a": 1e-6}[field] * size)
 
 
-@pytest.mark.parametrize("kind", ["beam", "plate"])
+@pytest.mark.parametrize("kind", ["beam", "plate", "plane"])
 def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None:
     raw = four_bar(kind)
     raw["gravity"] = [0, -9.81, 0]
@@ -134,7 +139,7 @@ def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None
             force = s.R @ (
                 port_vectors(joint, s.port_forces) * ([1, 1, 0] if link.kind == "beam" else 1)
             ).sum(axis=0)
-            left = (s.Ma - s.F).sum(axis=0)
+            left = (mass_times(link.mass, s.a) - s.F).sum(axis=0)
             if link.kind == "beam":
                 left = left * [1, 1, 0]
             assert_allclose(force, left, rtol=0, atol=1e-8 * np.abs(s.F).sum())
@@ -152,7 +157,6 @@ def test_damping_takes_nothing_from_a_bent_link_that_turns() -> None:
         _, _, snapshots = run(raw)
         state = snapshots[-1].states[0]
         tips.append(state.g[-1])
-        assert np.abs(state.f - state.Kg).max() < 1e-3 * np.abs(state.Kg).max()
     assert_allclose(tips[1], tips[0], rtol=0, atol=1e-4 * np.abs(tips[0]).max())
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError
 from kedfem.links.build import bare_links
-from kedfem.links.seats import face_seat, joint_seat
+from kedfem.links.seats import face_seat, joint_seat, surface_weights
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
 
@@ -86,3 +86,24 @@ def test_a_body_is_carried_by_its_own_links_hinge() -> None:
     scene = scene_from(raw)
     model = elastic_model(scene, linkage(scene))
     assert {link.name for link in model.links} == {"crank", "rod"}
+
+
+@pytest.mark.parametrize("fidelity", ["solid", "plane"])
+def test_a_node_of_a_domed_face_stands_for_the_whole_face(fidelity: str) -> None:
+    """Where facets of a curved face meet, each lies in its own corners' plane; none of them is a flat face."""
+    dome = {"via": [0.105, 0.03], "to": [0.1, 0.06]}
+    shape = {"kind": "extrusion", "thickness": 0.02, "outline": [[0, 0], [0.1, 0], dome, [0, 0.06]]}
+    raw = {
+        "links": {
+            "part": {"fidelity": fidelity, "material": "steel", "shape": shape, "mesh": {"size": 0.01}}
+        },
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0.03]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
+        "analysis": {"turns": 1},
+    }
+    link = bare_links(scene_from(raw))["part"]
+    top = np.array([0.105, 0.03, 0.0])
+    assert np.linalg.norm(link.X - top, axis=1).min() < 1e-9
+    area = surface_weights(link, face_seat(link, "loads.push.at", top)).sum()
+    # an arc of chord 0.06 and height 0.005: r = 0.0925, half angle arcsin(0.03 / r)
+    assert_allclose(area, 2 * 0.0925 * np.arcsin(0.03 / 0.0925) * 0.02, rtol=1e-6)

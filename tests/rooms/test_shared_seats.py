@@ -1,5 +1,6 @@
 """Several joints on one seat of a link: three links at one pin, welds at driven nodes, a pin and a guide in one."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics.condensed import port_vectors
+from kedfem.dynamics.history import Block, LinkHistory, Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.transient import Snapshot, Steps
+from kedfem.dynamics.transient import Steps
+from kedfem.links.record import mass_times
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
 
@@ -45,7 +48,15 @@ def ternary(kind: str, **analysis: Any) -> dict[str, Any]:
 
 
 def channels(raw: dict[str, Any], model: Model, snapshot: Snapshot) -> dict[str, np.ndarray]:
-    return rows(recording(scene_from(raw), model), snapshot)
+    found = rows(recording(scene_from(raw), model), as_block(snapshot))
+    return {name: values[0] for name, values in found.items()}
+
+
+def as_block(snapshot: Snapshot) -> Block:
+    """A block of one time point."""
+    names = [field.name for field in fields(LinkHistory)]
+    links = [LinkHistory(*(np.asarray(getattr(s, x))[None] for x in names)) for s in snapshot.states]
+    return Block(snapshot.step, snapshot.motion.part(snapshot.k, snapshot.k + 1), links)
 
 
 def assert_same(fast: Run, slow: Run, tolerance: float = 1e-8) -> None:
@@ -87,7 +98,9 @@ def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
             # Newton's second law of the whole link: Σ joints + Σ (P − M R0'') = Σ M δ''
             force = sum(sign * row[f"joints/{j}/force"] for j, sign in acting[link.name].items())
             size = np.abs(s.F).sum()
-            assert_allclose(force, (s.Ma - s.F).sum(axis=0) * plane, rtol=0, atol=1e-8 * size)
+            assert_allclose(
+                force, (mass_times(link.mass, s.a) - s.F).sum(axis=0) * plane, rtol=0, atol=1e-8 * size
+            )
             total = s.R @ (port_vectors(joint, s.port_forces) * plane).sum(axis=0)
             assert_allclose(total, force, rtol=0, atol=1e-8 * size)
         for hinge in ("C", "pin"):
@@ -179,7 +192,9 @@ def test_a_beam_piston_with_pin_and_guide_at_one_node_is_a_rigid_slider() -> Non
     elastic["analysis"]["solver"] = "literal"
     again = histories(elastic)
     for name in a:
-        assert_allclose(again[name], a[name], rtol=0, atol=1e-6 * np.abs(a[name]).max())
+        assert_allclose(
+            again[name], a[name], rtol=0, atol=1e-6 * np.abs(a[name]).max() + 1e-11
+        )  # [N m]: a free pin's moment is rounding
 
 
 def test_what_statics_do_not_tell_is_left_out() -> None:

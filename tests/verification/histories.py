@@ -26,7 +26,7 @@ def grounded(link: Link, dofs: np.ndarray) -> Attachment:
     nodes = np.unique(dofs // 3)
     keep = 3 * np.searchsorted(nodes, dofs // 3) + dofs % 3
     return Attachment(
-        nodes, np.eye(len(nodes)), link.X[nodes], ("ground",) * len(nodes), keep, np.zeros((len(keep), 0))
+        nodes, np.eye(len(nodes)), 3, link.X[nodes], ("ground",) * len(nodes), keep, np.zeros((len(keep), 0))
     )
 
 
@@ -56,7 +56,7 @@ def history(run: Run, steps: int) -> Iterator[LinkState]:
     yield states[0]
     for k in range(1, steps + 1):
         t = k * run.scheme.h
-        states = solver.advance(states, [Nominal(run.R(t), run.forces(t))])
+        states = solver.step(states, [Nominal(run.R(t), run.forces(t))])
         yield states[0]
 
 

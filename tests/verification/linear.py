@@ -11,28 +11,28 @@ from kedfem.links.record import Link
 from kedfem.links.seats import face_seat, port_weights
 
 
-def held(*sets: tuple[np.ndarray, str]) -> np.ndarray:
-    """Unknowns of the nodes in a mask: held((x == 0, "xyz"), (z == 0, "z"))."""
-    dofs = [3 * np.flatnonzero(nodes) + "xyz".index(c) for nodes, components in sets for c in components]
+def held(*sets: tuple[np.ndarray, str], d: int = 3) -> np.ndarray:
+    """Unknowns of the nodes in a mask: held((x == 0, "xyz"), (z == 0, "z")); d: of the link."""
+    dofs = [d * np.flatnonzero(nodes) + "xyz".index(c) for nodes, components in sets for c in components]
     return np.unique(np.concatenate(dofs)) if dofs else np.zeros(0, int)
 
 
 def free_map(link: Link, fixed: np.ndarray) -> sp.csr_array:
-    """(3n, free) map from the unknowns that are left to all of them."""
-    free = np.setdiff1d(np.arange(3 * link.n), fixed)
-    return sp.csr_array((np.ones(len(free)), (free, np.arange(len(free)))), shape=(3 * link.n, len(free)))
+    """(dn, free) map from the unknowns that are left to all of them."""
+    free = np.setdiff1d(np.arange(link.unknowns), fixed)
+    return sp.csr_array((np.ones(len(free)), (free, np.arange(len(free)))), shape=(link.unknowns, len(free)))
 
 
 def vector_mass(link: Link) -> sp.csr_array:
-    """M = m ⊗ 1, (3n, 3n), dof 3·node + component."""
-    units = [sp.csr_array(([1.0], ([k], [k])), shape=(3, 3)) for k in range(3)]
+    """M = m ⊗ 1, (dn, dn), dof d·node + component."""
+    units = [sp.csr_array(([1.0], ([k], [k])), shape=(link.d, link.d)) for k in range(link.d)]
     return sp.csr_array(sum(sp.kron(m, e, format="csr") for m, e in zip(link.mass, units, strict=True)))
 
 
 def deflection(link: Link, T: sp.csr_array, force: np.ndarray) -> np.ndarray:
-    """(n, 3) solution of K0 u = force in the space that T spans."""
+    """(n, d) solution of K0 u = force in the space that T spans."""
     reduced = Cholesky(sp.csr_array(T.T @ link.K0 @ T), "K0")
-    return (T @ reduced.solve(T.T @ force.ravel())).reshape(-1, 3)
+    return (T @ reduced.solve(T.T @ force.ravel())).reshape(-1, link.d)
 
 
 def modes(link: Link, T: sp.csr_array, count: int, near: float) -> tuple[np.ndarray, np.ndarray]:
@@ -77,5 +77,7 @@ def mean_support(link: Link, *ends: tuple[np.ndarray, list[tuple[int, str]]]) ->
         p += 3
     W, keep = np.concatenate(weights), np.array(components)
     nodes = np.flatnonzero(W.any(axis=0))
-    joint = Attachment(nodes, W[:, nodes], np.zeros((p, 3)), ("support",) * p, keep, np.zeros((len(keep), 0)))
+    joint = Attachment(
+        nodes, W[:, nodes], 3, np.zeros((p, 3)), ("support",) * p, keep, np.zeros((len(keep), 0))
+    )
     return shared_nodes([link], [joint])[0]

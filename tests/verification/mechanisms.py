@@ -38,10 +38,10 @@ def histories(scene: Scene, *names: str) -> tuple[int, list[np.ndarray]]:
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
-    rows = {each.channel.name: each.row for each in recording(scene, model)}
-    snapshots = transient(scene, joined, along, model, steps_of(scene, model))
-    values = [[rows[name](snapshot) for name in names] for snapshot in snapshots]
-    return model.coordinates, [np.array(column) for column in zip(*values, strict=True)]
+    rows = {each.channel.name: each.rows for each in recording(scene, model)}
+    blocks = transient(scene, joined, along, model, steps_of(scene, model))
+    values = [[rows[name](block) for name in names] for block in blocks]
+    return model.coordinates, [np.concatenate(column) for column in zip(*values, strict=True)]
 
 
 @cache

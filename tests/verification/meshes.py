@@ -4,13 +4,16 @@ from collections.abc import Callable
 
 import numpy as np
 
+from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
-from kedfem.mesh import HexMesh
-from kedfem.mesh.hexahedra import HEX8, HEX27
+from kedfem.mesh import HexMesh, QuadMesh
+from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads
 from kedfem.scene import Material
 
 Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+PlaneMapping = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def mapped_mesh(
@@ -50,6 +53,17 @@ def mapped_link(
     return solid_link("test", mapped_mesh(counts, mapping, nodes, closed), material, np.eye(3))
 
 
+def mapped_plane(
+    counts: tuple[int, int], mapping: PlaneMapping, thickness: float, material: Material
+) -> Link:
+    """counts quad9 elements along the unit square's coordinates (r, s), each node at mapping(r, s)."""
+    points, cells = rectangle_quads(1.0, 1.0, *counts)
+    x, y = mapping(points[:, 0], points[:, 1] + 0.5)
+    return plane_link(
+        "test", QuadMesh(np.stack([x, y, 0 * x], axis=1), cells, thickness), material, np.eye(3)
+    )
+
+
 def model(counts: tuple[int, ...], link: Link, kind: str = "hex27") -> str:
     """Mesh and unknowns in words."""
-    return f"{kind} {'×'.join(map(str, counts))}, {3 * link.n:,} unknowns"
+    return f"{kind} {'×'.join(map(str, counts))}, {link.unknowns:,} unknowns"

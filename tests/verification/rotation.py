@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.transient import drive_range, steps_of, transient
+from kedfem.dynamics.transient import drive_range, snapshots, steps_of
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import face_seat
@@ -111,7 +111,7 @@ def tip_history(scene: Scene) -> tuple[np.ndarray, Link]:
     elastic = elastic_model(scene, rigid)
     link = elastic.links[0]
     mean = face_seat(link, "tip", np.array([LENGTH, 0, 0])).fit[0]
-    shots = transient(scene, rigid, along, elastic, steps_of(scene, elastic))
+    shots = snapshots(scene, rigid, along, elastic, steps_of(scene, elastic))
     return np.array([mean @ shot.states[0].g for shot in shots]), link
 
 

@@ -13,6 +13,7 @@ from kedfem.scene import Material
 
 from .linear import free_map, frequencies, frequency_of
 from .meshes import box, mapped_link
+from .planes import energy_error
 from .rotation import bar, steady_deflection, steady_state
 from .spatial_beams import (
     FLAT,
@@ -127,3 +128,12 @@ def test_slender_curved_beams_do_not_lock(axis: str):
     """170 sections in radius: as exact with the same elements as 17 sections in radius."""
     for n, cap in ((4, 2e-3), (8, 1e-4), (16, 1e-5)):
         assert abs(curved_error(5.0, axis)(n)) < cap
+
+
+def test_a_plane_cantilever_converges_in_energy() -> None:
+    """Order 2 at least in the energy's norm; nodal values of quadratic elements on a regular mesh do better."""
+    e = [energy_error((2 * n, n)) for n in (2, 4, 8, 16)]
+    rates = np.log2(np.divide(e[:-1], e[1:]))
+    assert (rates > 2.3).all()
+    assert (rates < 2.8).all()
+    assert e[-1] < 1e-4

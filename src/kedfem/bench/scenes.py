@@ -8,7 +8,7 @@ LENGTHS = {"crank": ("A", "B"), "coupler": ("B", "C"), "rocker": ("C", "D")}
 
 
 def bar_four_bar(
-    elements: tuple[int, int, int], solver: str = "condensed", steps_per_turn: int = 720
+    elements: tuple[int, int, int], solver: str = "condensed", steps_per_turn: int = 720, turns: float = 1.0
 ) -> Scene:
     """[KED]'s four-bar (Nath and Ghosh 1980) with bars of 27-node hexahedra, 600 rpm.
 
@@ -46,6 +46,6 @@ def bar_four_bar(
             },
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "600 rpm"}},
             "bodies": {"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
-            "analysis": {"turns": 1, "steps_per_turn": steps_per_turn, "solver": solver},
+            "analysis": {"turns": turns, "steps_per_turn": steps_per_turn, "solver": solver},
         }
     )

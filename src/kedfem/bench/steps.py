@@ -1,6 +1,6 @@
 """The condensed step against the literal one, in one run: time per step, share of the triangular solves, agreement."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -12,15 +12,19 @@ import numpy as np
 from kedfem.bench.machine import Watch, markdown, write_loglog, write_page
 from kedfem.bench.scenes import bar_four_bar
 from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.state import LinkState
-from kedfem.dynamics.transient import Steps, drive_range, steps_of, transient
+from kedfem.dynamics.state import LinkState, Nominal
+from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
-from kedfem.scene import Scene
 
 SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100
+STEPS_PER_TURN = 720
+
+Step = Callable[[Sequence[LinkState], Sequence[Nominal]], list[LinkState]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,7 @@ class _Measured:
     factorisations: int
     step: float
     share: float
-    states: list[list[LinkState]]
+    states: list[list[LinkMoment]]
 
 
 def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
@@ -40,8 +44,8 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     rows, unknowns, condensed_times, literal_times = [], [], [], []
     for number, size in enumerate(sizes):
         watch("steps", number, len(sizes))
-        fast = _stepped(bar_four_bar(size), CONDENSED_STEPS)
-        slow = _stepped(bar_four_bar(size, "literal"), LITERAL_STEPS)
+        fast = _stepped(size, "condensed", CONDENSED_STEPS)
+        slow = _stepped(size, "literal", LITERAL_STEPS)
         unknowns.append(fast.unknowns)
         condensed_times.append(fast.step)
         literal_times.append(slow.step)
@@ -62,45 +66,51 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     return text
 
 
-def _stepped(scene: Scene, steps: int) -> "_Measured":
+def _stepped(size: tuple[int, int, int], solver: str, steps: int) -> "_Measured":
     """Take some steps of a scene and measure them."""
+    scene = bar_four_bar(size, solver, turns=steps / STEPS_PER_TURN)
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
-    solver = steps_of(scene, model)
-    run = transient(scene, joined, along, model, solver)
-    next(run)
-    watch = _Stopwatch(solver)
-    times: list[float] = []
-    states: list[list[LinkState]] = []
-    since = perf_counter()
-    for snapshot in islice(run, steps):
-        times.append(perf_counter() - since)
-        if len(states) < LITERAL_STEPS:
-            states.append(snapshot.states)
-        since = perf_counter()
-    return _Measured(model.unknowns, solver.factorisations, median(times), watch.seconds / sum(times), states)
+    taken = steps_of(scene, model)
+    watch = _Stopwatch(taken)
+    run = snapshots(scene, joined, along, model, taken)
+    states = [snapshot.states for snapshot in islice(run, 1, None)][:LITERAL_STEPS]
+    share = watch.solves / sum(watch.steps)
+    return _Measured(model.unknowns, taken.factorisations, median(watch.steps), share, states)
 
 
 class _Stopwatch:
-    """Adds up the seconds of the triangular solves within the steps."""
+    """Notes the seconds of each step, and adds up those of the triangular solves within."""
 
     def __init__(self, solver: Steps) -> None:
-        self.seconds = 0.0
+        self.solves = 0.0
+        self.steps: list[float] = []
         if isinstance(solver, CondensedSteps):
-            solver.parts = [replace(part, solve=self._timed(part.solve)) for part in solver.parts]
+            solver.parts = [replace(part, solve=self._timed_solve(part.solve)) for part in solver.parts]
+        if not isinstance(solver, DenseSteps):
+            solver.step = self._timed_step(solver.step)  # type: ignore[method-assign, assignment]
 
-    def _timed(self, solve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    def _timed_solve(self, solve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         def timed(r: np.ndarray) -> np.ndarray:
             since = perf_counter()
             out = solve(r)
-            self.seconds += perf_counter() - since
+            self.solves += perf_counter() - since
+            return out
+
+        return timed
+
+    def _timed_step(self, step: Step) -> Step:
+        def timed(states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+            since = perf_counter()
+            out = step(states, at)
+            self.steps.append(perf_counter() - since)
             return out
 
         return timed
 
 
-def _difference(fast: list[list[LinkState]], slow: list[list[LinkState]]) -> float:
+def _difference(fast: list[list[LinkMoment]], slow: list[list[LinkMoment]]) -> float:
     """Largest difference of displacements after the same steps, of the largest displacement."""
     a, b = fast[len(slow) - 1], slow[-1]
     peak = max(float(np.abs(s.u).max()) for s in b)

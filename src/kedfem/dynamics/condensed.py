@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
 from kedfem.errors import SolveError
@@ -89,6 +90,16 @@ def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q
     return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
 
 
+def turned_ports(
+    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T q"]:
+    """R λ over time: port forces of the link frame in world components."""
+    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
+    vectors.reshape(len(force), -1)[:, attachment.keep] = force
+    turned = vectors @ R.transpose(0, 2, 1)
+    return np.asarray(turned.reshape(len(force), -1)[:, attachment.keep])
+
+
 def coupled(
     parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf]
 ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
@@ -154,7 +165,17 @@ class CondensedSteps:
         ]
         self.factorisations = len(self.parts)
 
-    def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+    def begin(self, states: Sequence[LinkState]) -> list[LinkState]:
+        """The state of the first time point."""
+        return list(states)
+
+    def advance(
+        self, state: list[LinkState], forcing: Sequence[Forcing]
+    ) -> tuple[list[LinkHistory], list[LinkState]]:
+        """All time points of a block; see `DenseSteps.advance`."""
+        return stepwise(self.step, state, forcing)
+
+    def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)].
 
         Parameters
@@ -253,11 +274,14 @@ def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
     if link.kind == "beam":
         return np.arange(3) + 3 * (link.n // 2)
     if (
-        link.kind == "spatial_beam"
-    ):  # its nodes may be in line: the turn about it is held by the slopes of one
+        link.full is not None
+    ):  # as functions are mass-orthonormal, those with most of 1 and x move the link most
+        share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()
+        return (link.d * np.argsort(share)[::-1][: link.d + 1, None] + np.arange(link.d)).ravel()
+    if link.kind == "spatial_beam":
+        # its nodes may be in line: the turn about it is held by the slopes of one
         values = np.flatnonzero(link.one)
-        node = values[len(values) // 2]
-        return np.asarray(np.arange(9) + 3 * node)
+        return np.asarray(np.arange(9) + 3 * values[len(values) // 2])
     nodes = np.flatnonzero(link.one)
     X = link.X[nodes]
     first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
@@ -271,14 +295,36 @@ def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
 def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
     """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
     anchors = anchors_of(link)
+    if link.full is not None:
+        return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
     stiffness = link.K0.diagonal()[anchors]
-    if (
-        link.kind != "spatial_beam"
-    ):  # displacements only, or nearly so; values and slopes differ by lengths squared
+    if link.kind != "spatial_beam":  # whose values and slopes differ by lengths squared
         stiffness = np.full(len(anchors), stiffness.mean())
     kappa = ANCHORAGE * c_K * stiffness
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     return substructure(
         joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
+    )
+
+
+def _dense_factored(
+    link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
+) -> Substructure:
+    """`factored` of a reduced link, whose matrices are dense."""
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal().mean()))
+    dense = A.toarray()
+    dense[anchors, anchors] += kappa
+    try:
+        factor = scipy.linalg.cho_factor(dense, check_finite=False)
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"links.{link.name}: effective matrix must be positive definite, got {error}"
+        ) from error
+
+    def solve_many(B: np.ndarray) -> np.ndarray:
+        return np.asarray(scipy.linalg.cho_solve(factor, B, check_finite=False))
+
+    return substructure(
+        joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
     )

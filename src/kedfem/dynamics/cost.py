@@ -30,14 +30,14 @@ class Cost:
 
 def estimated_cost(scene: Scene, model: Model) -> Cost:
     """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
-    N = np.array([3.0 * link.n for link in model.links])
+    N = np.array([float(link.unknowns) for link in model.links])
     bandwidth, rate = _machine()
     step = OVERHEAD + float((SOLVE_BYTES * N**1.5 + 8 * ARRAY_PASSES * N).sum()) / bandwidth
     return Cost(
         factor=FACTOR_FLOPS * float((N**1.5).sum()) / rate,
         steps=time_grid(scene).steps * step,
         memory=float((FACTOR_BYTES * N**1.5 + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
-        frame_bytes=float(40 * N.sum()),
+        frame_bytes=120.0 * sum(link.n for link in model.links),
     )
 
 

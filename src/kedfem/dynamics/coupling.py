@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
-from kedfem.motion.linkage import GROUND, joint_axis, unit
+from kedfem.motion.linkage import joint_axis, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
 
@@ -223,8 +223,8 @@ def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarra
 
 
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
-    """Direction in which a rigid slider can move; None if the link is not one."""
-    if scene.links[name].fidelity != "rigid":
+    """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
+    if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
         return None
     joint = next(j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links)
     return joint_axis(joint)
@@ -250,11 +250,10 @@ def port_points(
     at = np.asarray(joint.at)
     if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
         return at[None, :]
+    if links[next(iter(seats))].planar:
+        return _plane_points(scene, name, joint, seats)
     seat = next(iter(seats.values()))
     driven = scene.drive.joint == name
-    if links[next(iter(seats))].planar:
-        across = seat.directions[0]
-        return np.array([at, at + 2 * seat.spread[0] * across][: 2 if driven or joint.kind == "weld" else 1])
     if joint.kind == "revolute":
         axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
@@ -288,6 +287,22 @@ def _unheld(link: Link) -> str:
     )
 
 
+def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
+    """The joint's point and, where turning is held, another: along a slide, else along the narrowest seat's surface."""
+    at = np.asarray(joint.at)
+    if joint.kind == "revolute" and scene.drive.joint != name:
+        return at[None, :]
+    narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
+    along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
+    for link, seat in seats.items():
+        if not holds(seat, along):
+            raise MeshError(
+                f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
+                f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
+            )
+    return np.array([at, at + 2 * narrow.spread[0] * along])
+
+
 def _spread_along(seat: Seat, axis: Float[np.ndarray, "3"]) -> float:
     return float(np.linalg.norm((seat.directions @ axis) * seat.spread))
 
@@ -318,7 +333,7 @@ def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], fir
     """First unknown, (components, unknowns) block and number of new unknowns of one port point."""
     if not others:
         return unknowns, np.eye(len(components)), len(components)
-    if others[0] != GROUND:
+    if others[0] in sliders:
         slider = others[0]
         return first_of[slider], sliders[slider][components, None], 0
     if joint.kind == "prismatic":

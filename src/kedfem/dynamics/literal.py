@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.condensed import Rotation, end_forces, mass_matrix, port_columns, port_vectors
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link
@@ -77,8 +78,18 @@ class LiteralSteps:
         self.M = [mass_matrix(link) for link in links]
         self.factorisations = 0
 
-    def advance(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-        """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.advance`."""
+    def begin(self, states: Sequence[LinkState]) -> list[LinkState]:
+        """The state of the first time point."""
+        return list(states)
+
+    def advance(
+        self, state: list[LinkState], forcing: Sequence[Forcing]
+    ) -> tuple[list[LinkHistory], list[LinkState]]:
+        """All time points of a block; see `DenseSteps.advance`."""
+        return stepwise(self.step, state, forcing)
+
+    def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+        """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.step`."""
         K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
         A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]

@@ -69,39 +69,41 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
             weights = rows.value
         case BodyLoad():
             weights = link.volume
-        case SurfaceLoad() if link.kind == "solid":
+        case SurfaceLoad() if link.meshed:
             weights = surface_weights(link, face_seat(link, f"{where}.at", np.asarray(load.at)))
         case _:
-            raise SceneError(f"{where}: a surface force needs a solid link, got the beam '{link.name}'")
+            raise SceneError(
+                f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
+            )
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
     return Pattern(forces, load.frame == "link", lambda t: load_factor(load.factor, t))
 
 
-def nominal_acceleration(link: Link, motion: RigidMotion, body: int, k: int) -> Float[np.ndarray, " d"]:
-    """p'' of a link at time point k; of a planar beam (x'', y'', θ'')."""
-    p2 = motion.p2[k, body]
-    return np.array([p2[0], p2[1], motion.alpha[k, body, 2]]) if link.kind == "beam" else p2[: link.d]
+def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
+    """p'' of a link over time; of a planar beam (x'', y'', θ'')."""
+    if link.kind == "beam":
+        return np.concatenate([motion.p2[:, body, :2], motion.alpha[:, body, 2:]], axis=1)
+    return motion.p2[:, body, : link.d]
 
 
 def applied(
     link: Link,
     loads: tuple[Pattern, ...],
-    factors: Float[np.ndarray, "l t"],
+    factors: Float[np.ndarray, "l T"],
     motion: RigidMotion,
     body: int,
-    k: int,
-) -> Float[np.ndarray, "n d"]:
-    """P − M R0'' at time point k, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
+) -> Float[np.ndarray, "T n d"]:
+    """P − M R0'' over time, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
 
     Parameters
     ----------
     factors : of each load at each time point
     body : the link's number in the motion
     """
-    F = link.mX @ -motion.R2[k, body, : link.d].T
-    F -= link.m1 * nominal_acceleration(link, motion, body, k)
+    F = link.mX @ -motion.R2[:, body, : link.d].transpose(0, 2, 1)
+    F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
+    R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
     for load, factor in zip(loads, factors, strict=True):
-        if factor[k]:
-            R = motion.R[k, body, : link.d, : link.d]
-            F += factor[k] * (load.forces @ R.T if load.follows else load.forces)
+        if factor.any():
+            F += factor[:, None, None] * (load.forces @ R if load.follows else load.forces)
     return np.asarray(F)

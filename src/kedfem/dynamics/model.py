@@ -1,6 +1,7 @@
 """The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links
 from kedfem.links.record import Link
+from kedfem.links.reduced import on_functions, reduced, rigid
 from kedfem.links.seats import holds, is_flat, joint_seat, port_weights
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
@@ -38,11 +40,28 @@ class Slider:
 
 
 @dataclass(frozen=True, slots=True)
+class Carried:
+    """A rigid link that the drive turns on the ground: its motion is the nominal one, it has no unknowns.
+
+    link : its record, with attached bodies
+    body : its number in the linkage
+    hub : the driven joint
+    loads : per load
+    """
+
+    link: Link
+    body: int
+    hub: str
+    loads: tuple[Pattern, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Model:
     """Everything that the time integration needs, constant.
 
     bodies : number of each link in the linkage
     joints, loads : per link
+    carried : rigid links that move with the drive
     """
 
     links: tuple[Link, ...]
@@ -51,6 +70,7 @@ class Model:
     loads: tuple[tuple[Pattern, ...], ...]
     sliders: tuple[Slider, ...]
     damping: Rayleigh
+    carried: tuple[Carried, ...] = ()
 
     @property
     def unknowns(self) -> int:
@@ -65,7 +85,7 @@ class Model:
 
 
 def elastic_model(scene: Scene, linkage: Linkage) -> Model:
-    """Mesh and assemble all elastic links and tie them together.
+    """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
 
     Raises
     ------
@@ -78,6 +98,11 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
     for key, body in scene.bodies.items():
         if body.link in links:
             links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])
+    carried = tuple(
+        Carried(links.pop(name), linkage.bodies.index(name), scene.drive.joint, ())
+        for name in list(links) if moves_with_drive(scene, name)
+    )  # fmt: skip
+    carried = tuple(replace(x, loads=patterns(scene, x.link.name, x.link)) for x in carried)
     numbers = {name: k for k, name in enumerate(links)}
     sliders = tuple(
         _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None
@@ -85,6 +110,8 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
     for slider in sliders:
         name = list(links)[slider.carrier]
         links[name] = with_point_mass(links[name], slider.weights, slider.mass)
+    links = {name: rigid(x) if scene.links[name].fidelity == "rigid" else x for name, x in links.items()}
+    sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     joined = attachments(scene, links)
     loads = {name: patterns(scene, name, link) for name, link in links.items()}
     for slider in sliders:
@@ -92,8 +119,45 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
     return Model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(name) for name in links),
         joints=tuple(joined[name] for name in links), loads=tuple(loads[name] for name in links),
-        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)),
+        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
     )  # fmt: skip
+
+
+def moves_with_drive(scene: Scene, name: str) -> bool:
+    """Whether a link is rigid and turns on the ground with the drive."""
+    return scene.links[name].fidelity == "rigid" and name in scene.joints[scene.drive.joint].links
+
+
+def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
+    """The changed copy of a model whose links move in the span of given functions; None leaves a link as it is."""
+    links, joints, loads = list(model.links), list(model.joints), list(model.loads)
+    sliders = list(model.sliders)
+    for k, Q in enumerate(functions):
+        if Q is not None:
+            links[k] = link = reduced(model.links[k], Q)
+            joints[k] = _joint_on(model.joints[k], link)
+            loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
+            sliders = [_slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
+    return replace(
+        model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders)
+    )
+
+
+def _joint_on(joint: Attachment, link: Link) -> Attachment:
+    """A joint of the full link on the functions of the reduced one."""
+    return replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on_functions(link)[joint.nodes])
+
+
+def _load_on(load: Pattern, link: Link) -> Pattern:
+    return replace(load, forces=on_functions(link).T @ load.forces)
+
+
+def _slider_on(slider: Slider, link: Link) -> Slider:
+    if link.Q is None:
+        return slider
+    return replace(
+        slider, weights=slider.weights @ link.Q, loads=tuple(_load_on(load, link) for load in slider.loads)
+    )
 
 
 def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
@@ -118,7 +182,7 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
             if is_flat(seat):
                 wanted, got = (
                     ("an end or a corner", "another node")
-                    if link.triples is not None
+                    if link.kind == "spatial_beam"
                     else ("a bore", "a flat face")
                 )
                 raise MeshError(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
+import scipy.linalg
 import scipy.sparse.linalg
 from jaxtyping import Float
 
@@ -18,7 +18,7 @@ from kedfem.dynamics.condensed import (
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
 from kedfem.errors import SolveError
-from kedfem.links.record import Link, mass_times
+from kedfem.links.record import Link, Matrix, mass_times
 
 TURNING_SWEEPS = 20
 CONVERGED = 1e-9  # change of a sweep, of the deflection
@@ -129,9 +129,11 @@ def mass_substructure(link: Link, joint: Attachment) -> Substructure:
     return substructure(joint, link.n, solve, solve_many)
 
 
-def _mass_solution(m: sp.csr_array, b: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _mass_solution(m: Matrix, b: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     if not b.any():
         return np.zeros_like(b)
+    if isinstance(m, np.ndarray):
+        return np.asarray(scipy.linalg.solve(m, b, assume_a="pos"))
     d = m.diagonal()
     preconditioner = scipy.sparse.linalg.LinearOperator(m.shape, lambda x: np.asarray(x).ravel() / d)
     x, failed = scipy.sparse.linalg.cg(m, b, rtol=1e-13, atol=0.0, maxiter=2000, M=preconditioner)

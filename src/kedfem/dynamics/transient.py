@@ -1,12 +1,15 @@
 """The elastic motion step by step: M δ'' + C δ' + K δ = P − M R0'', [KED, eq. (20)]."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.dense import SMALL, DenseSteps
+from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
@@ -14,36 +17,19 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.errors import SolveError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import MotionLaw, Scene, drive_angle, time_grid
+from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
+from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, time_grid, turn_steps
 
-BLOCK = 256  # time points of rigid motion found together
-
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """Everything at one time point: number of the step, rigid motion (entry k of a block), elastic states."""
-
-    step: int
-    motion: RigidMotion
-    k: int
-    states: list[LinkState]
-
-    @property
-    def t(self) -> float:
-        """Time [s]."""
-        return float(self.motion.t[self.k])
-
-    @property
-    def phi(self) -> float:
-        """Drive angle [rad]."""
-        return float(self.motion.phi[self.k])
+POINTS = 256  # time points of rigid motion found together
+BLOCK_BYTES = 64_000_000
+KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
-Steps = CondensedSteps | LiteralSteps
+Steps = CondensedSteps | LiteralSteps | DenseSteps
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:
@@ -55,32 +41,73 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         If an effective matrix is not positive definite.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    solver = CondensedSteps if scene.analysis.solver == "condensed" else LiteralSteps
+    if scene.analysis.solver == "literal":
+        return LiteralSteps(model.links, model.joints, scheme, model.damping)
+    solver = DenseSteps if all(map(_is_small, model.links)) else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
 
 
-def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
-    """All time points of the analysis, [KED, eq. (20)], one after the other; nothing is kept.
+def _is_small(link: Link) -> bool:
+    """Whether dense matrices serve a link; the stiff hubs of a spatial beam would cost them digits."""
+    return link.unknowns <= SMALL and (link.kind != "spatial_beam" or link.full is not None)
+
+
+def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Block]:
+    """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
 
     Raises
     ------
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    grid = time_grid(scene)
     law = scene.drive.motion
-    states: list[LinkState] = []
-    for first in range(0, grid.steps + 1, BLOCK):
-        t = grid.step * np.arange(first, min(first + BLOCK, grid.steps + 1))
-        motion = rigid_motion(linkage, along, t, drive_angle(law, t))
-        factors = load_factors(model, t)
-        for k in range(len(t)):
-            if states:
-                states = solver.advance(states, nominal(model, factors, motion, k))
-                _check_finite(states, first + k, motion, k)
-            else:
-                states = first_states(scene, linkage, along, law, model)
-            yield Snapshot(first + k, motion, k, states)
+    states = first_states(scene, linkage, along, law, model)
+    start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
+    yield Block(0, start, [history([state]) for state in states])
+    state: Any = solver.begin(states)
+    length = block_length(model)
+    for first, motion in motions(scene, linkage, along):
+        for k in range(0, len(motion.t), length):
+            part = motion.part(k, k + length)
+            forcing = forcings(model, load_factors(model, part.t), part)
+            links, state = solver.advance(state, forcing)
+            block = Block(first + k, part, links)
+            yield from _finite(block)
+
+
+def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
+    """All time points of `transient`, one by one."""
+    for block in transient(scene, linkage, along, model, solver):
+        yield from (block.at(k) for k in range(len(block)))
+
+
+def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
+    """Rigid motion at all time points after the first, block after block with the number of its first point.
+
+    A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
+    """
+    grid, law = time_grid(scene), scene.drive.motion
+    turn = turn_steps(scene) or 0.0
+    returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
+    kept: list[RigidMotion] = []
+    for first in range(1, grid.steps + 1, POINTS):
+        steps = np.arange(first, min(first + POINTS, grid.steps + 1))
+        t = grid.step * steps
+        drive = drive_angle(law, t)
+        if kept and first > round(turn):
+            if len(kept) > 1:
+                kept = [joined(kept)]
+            yield first, replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0])
+            continue
+        motion = rigid_motion(linkage, along, t, drive)
+        if returns and first <= turn <= KEPT and grid.steps > turn:
+            kept.append(motion)
+        yield first, motion
+
+
+def block_length(model: Model) -> int:
+    """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
+    return max(1, min(POINTS, BLOCK_BYTES // (6 * 8 * model.unknowns)))
 
 
 def load_factors(model: Model, t: Float[np.ndarray, " T"]) -> list[Float[np.ndarray, "_ T"]]:
@@ -88,12 +115,10 @@ def load_factors(model: Model, t: Float[np.ndarray, " T"]) -> list[Float[np.ndar
     return [np.array([load.factor(t) for load in loads]).reshape(len(loads), len(t)) for loads in model.loads]
 
 
-def nominal(
-    model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion, k: int
-) -> list[Nominal]:
-    """Orientation and P − M R0'' of all links at time point k."""
+def forcings(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion) -> list[Forcing]:
+    """Orientation and P − M R0'' of all links over time."""
     return [
-        Nominal(motion.R[k, body, : link.d, : link.d], applied(link, loads, factor, motion, body, k))
+        Forcing(motion.R[:, body, : link.d, : link.d], applied(link, loads, factor, motion, body))
         for link, loads, factor, body in zip(model.links, model.loads, factors, model.bodies, strict=True)
     ]
 
@@ -107,26 +132,29 @@ def first_states(
     h = min(grid.step, grid.end / 2)
     t = h * np.arange(1 if at_rest else 3)
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
-    factors = load_factors(model, t)
-    instants = [instant(model, factors, motion, k) for k in range(len(t))]
+    moments = instants(model, motion)
     if at_rest:
         start = [Deflected(*(np.zeros((link.n, link.d)) for _ in range(3))) for link in model.links]
-        return initial_states(model.links, model.joints, instants[0].at, model.damping, start)
-    u = quasi_static(model.links, model.joints, instants)
-    g = [
-        [x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, instants, strict=True)
-    ]
+        return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+    u = quasi_static(model.links, model.joints, moments)
+    g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
-    return initial_states(model.links, model.joints, instants[0].at, model.damping, start)
+    return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
 
 
-def instant(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion, k: int) -> Instant:
-    """Orientation, load and spin of all links at time point k."""
-    W = cross_matrix(motion.omega[k])
-    spin = cross_matrix(motion.alpha[k]) + W @ W
-    turning = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
-    return Instant(nominal(model, factors, motion, k), turning)
+def instants(model: Model, motion: RigidMotion) -> list[Instant]:
+    """Orientation, load and spin of all links at each time point."""
+    forcing = forcings(model, load_factors(model, motion.t), motion)
+    W = cross_matrix(motion.omega)
+    spin = cross_matrix(motion.alpha) + W @ W
+    return [
+        Instant(
+            [Nominal(each.R[k], each.F[k]) for each in forcing],
+            [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
+        )
+        for k in range(len(motion.t))
+    ]
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:
@@ -137,9 +165,14 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 
-def _check_finite(states: list[LinkState], step: int, motion: RigidMotion, k: int) -> None:
-    if not all(np.isfinite(s.g[0]).all() and np.isfinite(s.g[-1]).all() for s in states):
+def _finite(block: Block) -> Iterator[Block]:
+    """The block, up to where a displacement is not finite any more."""
+    fine = np.all([np.isfinite(link.g[:, 0]).all(axis=1) for link in block.links], axis=0)
+    k = len(block) if fine.all() else int(fine.argmin())
+    if k:
+        yield block.part(0, k)
+    if k < len(block):
         raise SolveError(
-            f"analysis: the elastic motion must stay finite, got none at step {step}, t = {motion.t[k]:.6g} s, "
-            f"drive angle {np.degrees(motion.phi[k]):.6g} deg"
+            f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
+            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg"
         )

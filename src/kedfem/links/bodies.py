@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.links.record import Link, Mass, mass_constants, read_only
-from kedfem.links.seats import Seat, is_flat
+from kedfem.links.seats import Seat, face_normal, is_flat
 
 
 def euler_tensor(inertia: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
@@ -24,11 +24,11 @@ def flywheel_tensor(seat: Seat, axis: Float[np.ndarray, "3"], inertia: float) ->
     """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
 
     On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so
-    there the same J stands across the axis within the face: J t tᵀ.
+    there the same J stands across the axis within the face: J t tᵀ. In a plane both have xx + yy = J.
     """
     if not is_flat(seat):
         return np.asarray(inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
-    t = np.cross(seat.directions[2], axis)
+    t = np.cross(face_normal(seat), axis)
     return np.asarray(inertia * np.outer(t, t))
 
 

@@ -5,16 +5,27 @@ from jaxtyping import Float
 
 from kedfem.links.beam import beam_link, line_axes
 from kedfem.links.beam_axis import smooth_axis, straight_axis
+from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.section import scene_section
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
-from kedfem.mesh import link_mesh
-from kedfem.scene import Bar, LinkScene, Part, PlateLink, Polyline, RectangleSection, Scene, spatial_beams
+from kedfem.mesh import link_mesh, plane_mesh
+from kedfem.scene import (
+    Bar,
+    LinkScene,
+    Material,
+    Part,
+    PlateLink,
+    Polyline,
+    RectangleSection,
+    Scene,
+    spatial_beams,
+)
 
 
 def bare_links(scene: Scene) -> dict[str, Link]:
-    """Records of all elastic links, without attached bodies.
+    """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
 
     Raises
     ------
@@ -23,9 +34,9 @@ def bare_links(scene: Scene) -> dict[str, Link]:
     """
     spatial = spatial_beams(scene)
     return {
-        name: _beam(scene, name, name in spatial) if link.fidelity == "beam" else _solid(scene, name)
+        name: _bare_link(scene, name, link, name in spatial)
         for name, link in scene.links.items()
-        if link.fidelity != "rigid"
+        if link.shape is not None
     }
 
 
@@ -40,15 +51,17 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
             return np.eye(3)
 
 
-def _solid(scene: Scene, name: str) -> Link:
-    link = scene.links[name]
-    mesh = link_mesh(name, link, scene.folder)
-    return solid_link(name, mesh, scene.materials[str(link.material)], link_axes(link))
+def _bare_link(scene: Scene, name: str, link: LinkScene, spatial: bool) -> Link:
+    material = scene.materials[str(link.material)]
+    if link.fidelity == "solid":
+        return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
+    if link.fidelity == "plane":
+        return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
+    return _beam(name, link, material, spatial)
 
 
-def _beam(scene: Scene, name: str, spatial: bool) -> Link:
-    link = scene.links[name]
-    material, shape = scene.materials[str(link.material)], link.shape
+def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link:
+    shape = link.shape
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
     of_section = shape.of_section if isinstance(shape, Polyline) else _of_bar(shape)

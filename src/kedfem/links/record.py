@@ -6,15 +6,15 @@ no third dimension.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.links.section import Section
 
-Mass = tuple[sp.csr_array, ...]
+Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
+Mass = tuple[Matrix, ...]
 Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
@@ -34,10 +34,14 @@ class Link:
     m1 : (n, d) mass times one, component by component [kg].
     mX : (n, 3) mass times position [kg m].
     volume : (n,) ∫ N_a dV of the link alone, without attached bodies [m³].
-    E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses.
+    E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses; of a plane link those of plane stress.
     section : of a beam, else None.
-    basis : scikit-fem basis of a solid (for this room only), else None.
+    basis : scikit-fem basis of a solid or plane link (for this room only), else None.
     triples : of a spatial beam, (3s, n): (u, p, q) at each station of its axis from the state; else None.
+    thickness : of a plane link [m], else one: what integrals over its area or edges are multiplied by.
+    full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
+        dense. Else None.
+    rigid : whether the link only moves rigidly; then it has no stress
     """
 
     name: str
@@ -48,7 +52,7 @@ class Link:
     cell_type: str
     axes: Float[np.ndarray, "3 3"]
     mass: Mass
-    K0: sp.csr_array
+    K0: Matrix
     m1: Float[np.ndarray, "n d"]
     mX: Float[np.ndarray, "n 3"]
     volume: Float[np.ndarray, " n"]
@@ -56,7 +60,11 @@ class Link:
     lame: tuple[float, float]
     section: Section | None = None
     basis: Any = None
-    triples: sp.csr_array | None = None
+    triples: Matrix | None = None
+    thickness: float = 1.0
+    full: "Link | None" = None
+    Q: Float[np.ndarray, "_ n"] | None = None
+    rigid: bool = False
 
     @property
     def n(self) -> int:
@@ -80,13 +88,18 @@ class Link:
 
     @property
     def size(self) -> float:
-        """Largest extent along a reference axis [m]."""
-        return float(np.ptp(self.nodes, axis=0).max())
+        """Largest extent along a reference axis [m]; of a reduced link that of the link it was made from."""
+        return float(np.ptp((self.full or self).nodes, axis=0).max())
 
     @property
     def planar(self) -> bool:
         """Whether the link moves in a plane z = constant only."""
         return self.kind in {"plane", "beam"}
+
+    @property
+    def meshed(self) -> bool:
+        """Whether the link is a mesh with bores and faces, not a line."""
+        return self.kind in {"solid", "plane"}
 
 
 def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray, "*k d"]:

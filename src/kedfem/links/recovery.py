@@ -1,6 +1,6 @@
 """What a link's state means at a point and at its nodes: displacement weights and stresses in link axes.
 
-Stress = elasticity : sym(gradient), and the gradient is again scalar: three (n, n) matrices serve all of it.
+Stress = elasticity : sym(gradient), and the gradient is again scalar: d (n, n) matrices serve all of it.
 Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.
 """
 
@@ -28,10 +28,10 @@ POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link'
 
 @dataclass(frozen=True, slots=True)
 class PointRows:
-    """What a point of a link reads from the link's state g (n, 3), link frame.
+    """What a point of a link reads from the link's state g (n, d), link frame.
 
     value : (n,) displacement = value @ g
-    stress : (6, 3n) stress components in link axes [Pa/m] = stress @ g.ravel()
+    stress : (6, dn) stress components in link axes [Pa/m] = stress @ g.ravel()
     X : (3,) the point itself, moved into the link if it was slightly outside [m]
     """
 
@@ -53,24 +53,42 @@ def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRo
     SceneError
         If the point is not in the link.
     """
+    if link.full is not None and link.Q is not None:
+        at = point_rows(link.full, where, point)
+        return PointRows(at.value @ link.Q, _on_functions(at.stress, link.Q, link.d), at.X)
     match link.kind:
-        case "solid":
-            return _solid_rows(link, where, point)
         case "spatial_beam":
             return _section_rows(link, where, point)
-        case _:
+        case "beam":
             return _beam_rows(link, where, point)
+        case _:
+            return _solid_rows(link, where, point)
+
+
+def _on_functions(stress: sp.csr_array, Q: Float[np.ndarray, "n s"], d: int) -> sp.csr_array:
+    """Stress rows of a full link seen from the functions of a reduced one: (6, dn) → (6, ds)."""
+    columns = np.unique(stress.indices)
+    dense, node, component = stress[:, columns].toarray(), *np.divmod(columns, d)
+    out = np.zeros((6, Q.shape[1], d))
+    for c in range(d):
+        out[:, :, c] = dense[:, component == c] @ Q[node[component == c]]
+    return sp.csr_array(out.reshape(6, -1))
+
+
+def nodal_state(link: Link, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "_ d"]:
+    """The state of a link at its nodes: of a reduced link that of the link it was made from."""
+    return g if link.Q is None else link.Q @ g
 
 
 def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -> tuple[sp.csr_array, ...]:
-    """Scalar matrices G_k: nodal ∂_k of a field in a solid, averaged over the elements that meet at a node [1/m].
+    """Scalar matrices G_k: nodal ∂_k of a field in a meshed link, averaged over the elements that meet at a node [1/m].
 
     Parameters
     ----------
     elements : restrict to these; right at the nodes whose elements are all among them
     """
     mesh_dofs = link.basis.element_dofs
-    points, extension = _gauss_points(len(mesh_dofs))
+    points, extension = _gauss_points(link)
     quadrature = (points, np.ones(points.shape[1]))
     at_gauss = skfem.Basis(link.basis.mesh, link.basis.elem, elements=elements, quadrature=quadrature)
     dofs = mesh_dofs if elements is None else mesh_dofs[:, elements]  # (m, e)
@@ -78,7 +96,7 @@ def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -
     rows = np.repeat(dofs.T[:, :, None], len(dofs), axis=2)
     columns = np.repeat(dofs.T[:, None, :], len(dofs), axis=1)
     out = []
-    for k in range(3):
+    for k in range(link.d):
         grad = np.stack([np.asarray(shape[0].grad)[k] for shape in at_gauss.basis])  # (b, e, q)
         local = np.einsum("aq,beq->eab", extension, grad, optimize=True) / count[rows]
         out.append(
@@ -87,11 +105,16 @@ def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -
     return tuple(out)
 
 
-def stress_of_gradient(H: Float[np.ndarray, "p 3 3"], link: Link) -> Float[np.ndarray, "p 6"]:
-    """Stresses in link axes from displacement gradients H_ij = ∂_j u_i in reference axes: λ tr(ε) 1 + 2 μ ε [Pa]."""
-    lam, mu = link.lame
-    H = np.einsum("ia,pij,jb->pab", link.axes, H, link.axes)
-    stress = mu * (H + H.transpose(0, 2, 1)) + lam * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+def stress_of_gradient(H: Float[np.ndarray, "p d d"], link: Link) -> Float[np.ndarray, "p 6"]:
+    """Stresses in link axes from displacement gradients H_ij = ∂_j u_i in reference axes: λ tr(ε) 1 + 2 μ ε [Pa].
+
+    In plane stress λ is λ*, and the components zz, yz, zx are zero.
+    """
+    (lam, mu), d = link.lame, link.d
+    H = np.einsum("ia,pij,jb->pab", link.axes[:d, :d], H, link.axes[:d, :d])
+    stress = np.zeros((len(H), 3, 3))
+    stress[:, :d, :d] = mu * (H + H.transpose(0, 2, 1))
+    stress[:, :d, :d] += lam * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(d)
     return np.stack([stress[:, i, j] for i, j in COMPONENTS], axis=1)
 
 
@@ -99,7 +122,7 @@ def stress_of_gradient(H: Float[np.ndarray, "p 3 3"], link: Link) -> Float[np.nd
 class StressRecovery:
     """Stresses all over a link, at its nodes or, of a spatial beam, at points of its sections.
 
-    link, matrices : the link; gradients of a solid or stress rows of a beam
+    link, matrices : the link; gradients of a meshed link or stress rows of a beam
     cells, cell_type : elements between the points, VTK order
     values : (p, n) displacement of the points from the state; None if they are the nodes
     """
@@ -116,8 +139,10 @@ class StressRecovery:
 
 
 def stress_recovery(link: Link) -> StressRecovery:
-    """Prepare nodal stresses of a link."""
-    if link.kind == "solid":
+    """Prepare nodal stresses of a link; of a reduced one those of the link that it was made from, in full detail."""
+    if link.full is not None:
+        return stress_recovery(link.full)
+    if link.meshed:
         return StressRecovery(link, nodal_gradients(link), link.cells, link.cell_type)
     if link.kind == "spatial_beam":
         values, stresses, cells = drawn(link)
@@ -127,16 +152,16 @@ def stress_recovery(link: Link) -> StressRecovery:
     return StressRecovery(link, fibres, link.cells, link.cell_type)
 
 
-def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "p 6"]:
+def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p 6"]:
     """Stresses at the nodes in link axes [Pa]; of a planar beam σ_xx of the outer fibre where it is larger in size.
 
     Of a spatial beam at the points of its sections, in the axes (tangent, n1, n2) of the section.
 
     Parameters
     ----------
-    g : (n, 3) displacement in the link frame [m; ψ: rad]
+    g : (n, d) nodal displacement in the link frame, of a reduced link `nodal_state` [m; ψ: rad]
     """
-    if recovery.link.kind == "solid":
+    if recovery.link.meshed:
         H = np.stack([G @ g for G in recovery.matrices], axis=2)  # (n, i, j)
         return stress_of_gradient(H, recovery.link)
     if recovery.link.kind == "spatial_beam":
@@ -156,20 +181,19 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
     return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
 
 
-def _gauss_points(nodes: int) -> tuple[Float[np.ndarray, "3 q"], Float[np.ndarray, "m q"]]:
-    """Reduced Gauss points in [0, 1]³ and the matrix that extends values there to the element's nodes."""
-    elem = skfem.ElementHex1() if nodes == 8 else skfem.ElementHex2()
-    if nodes == 8:
-        return np.full((3, 1), 0.5), np.ones((8, 1))
+def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarray, "m q"]]:
+    """Reduced Gauss points in [0, 1]ᵈ and the matrix that extends values there to the element's nodes."""
+    d, at_nodes = link.d, np.asarray(link.basis.elem.doflocs)  # (m, d)
+    if len(at_nodes) == 2**d:
+        return np.full((d, 1), 0.5), np.ones((len(at_nodes), 1))
     a = np.array([0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)])
-    points = np.stack(np.meshgrid(a, a, a, indexing="ij")).reshape(3, 8)
-    at_nodes = np.asarray(elem.doflocs)  # (27, 3)
+    points = np.stack(np.meshgrid(*[a] * d, indexing="ij")).reshape(d, -1)
     factors = [
         np.where(points[k] == a[0], (a[1] - at_nodes[:, k : k + 1]), (at_nodes[:, k : k + 1] - a[0]))
         / (a[1] - a[0])
-        for k in range(3)
+        for k in range(d)
     ]
-    return points, factors[0] * factors[1] * factors[2]
+    return points, np.prod(factors, axis=0)
 
 
 def _solid_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
@@ -185,32 +209,33 @@ def _solid_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointR
 
 
 def _stress_rows(link: Link, gradient: list[sp.csr_array]) -> sp.csr_array:
-    """(6, 3n) rows from the three gradient rows (1, n) at a point."""
+    """(6, dn) rows from the d gradient rows (1, n) at a point."""
     columns = np.unique(np.concatenate([G.indices for G in gradient]))
-    dense = np.stack([G[:, columns].toarray()[0] for G in gradient])  # (j, c)
-    H = np.zeros((3 * len(columns), 3, 3))
-    for i in range(3):
-        H[i::3, i, :] = dense.T
+    dense, d = np.stack([G[:, columns].toarray()[0] for G in gradient]), link.d  # (j, c)
+    H = np.zeros((d * len(columns), d, d))
+    for i in range(d):
+        H[i::d, i, :] = dense.T
     stress = stress_of_gradient(H, link).T
-    dofs = (3 * columns[:, None] + np.arange(3)).ravel()
-    out = sp.lil_array((6, 3 * link.n))
+    dofs = (d * columns[:, None] + np.arange(d)).ravel()
+    out = sp.lil_array((6, link.unknowns))
     out[:, dofs] = stress
     return sp.csr_array(out)
 
 
-def _shapes(link: Link, local: Float[np.ndarray, "3"]) -> tuple[np.ndarray, np.ndarray]:
-    """N (m,) and dN (m, 3) of a solid element at local coordinates in [0, 1]³."""
+def _shapes(link: Link, local: Float[np.ndarray, " d"]) -> tuple[np.ndarray, np.ndarray]:
+    """N (m,) and dN (m, d) of an element at local coordinates in [0, 1]ᵈ."""
     pairs = [link.basis.elem.lbasis(local[:, None], i) for i in range(len(link.basis.element_dofs))]
     return np.array([float(np.ravel(N)[0]) for N, _ in pairs]), np.array([np.ravel(dN) for _, dN in pairs])
 
 
-def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[int, Float[np.ndarray, "3"]]:
-    """The element that contains a point (or is nearest to it) and the local coordinates there."""
-    corners = link.X[link.basis.element_dofs]  # (m, e, 3)
+def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[int, Float[np.ndarray, " d"]]:
+    """The element that contains a point (or is nearest to it, in a plane link's plane) and the local coordinates."""
+    whole, point = point, point[: link.d]
+    corners = link.X[link.basis.element_dofs, : link.d]  # (m, e, d)
     low, high = corners.min(axis=0), corners.max(axis=0)
     outside = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=1)
     size = np.ptp(link.X, axis=0).max()
-    best, gap, at = -1, np.inf, np.full(3, 0.5)
+    best, gap, at = -1, np.inf, np.full(link.d, 0.5)
     for element in np.argsort(outside, kind="stable")[:64]:
         if outside[element] > gap:
             break
@@ -219,14 +244,14 @@ def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[
         if distance < gap - 1e-12 * size:
             best, gap, at = int(element), distance, local
     if gap > POINT_TOLERANCE * size:
-        raise SceneError(_outside(link, where, point, gap))
+        raise SceneError(_outside(link, where, whole, gap))
     return best, at
 
 
-def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, " d"]) -> Float[np.ndarray, " d"]:
     """Newton for the isoparametric map, kept within the element."""
-    x = link.X[link.basis.element_dofs[:, element]]
-    local = np.full(3, 0.5)
+    x = link.X[link.basis.element_dofs[:, element], : link.d]
+    local = np.full(link.d, 0.5)
     for _ in range(30):
         N, dN = _shapes(link, local)
         change = np.linalg.lstsq(x.T @ dN, point - N @ x, rcond=None)[0]

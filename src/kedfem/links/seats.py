@@ -1,6 +1,6 @@
 """Where joints sit: the affine field that best fits a bore or a face, with scalar, rotation-invariant weights."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,8 +20,9 @@ class Seat:
     fit : (4, n) [-; 1/m]
     origin : (3,) area centroid, or the node of a beam [m]
     directions : (3, 3) rows, principal directions, widest spread first
-    spread : (3,) standard deviations along them [m]
-    facets : boundary facets of a solid (for surface loads)
+    spread : (3,) standard deviations along them [m]; along z of a plane link 0, directions[2] being z
+    facets : boundary facets of a solid or plane link (for surface loads)
+    dimensions : of the link that it is on: 2 for a plane link
     """
 
     fit: Float[np.ndarray, "4 n"]
@@ -29,6 +30,7 @@ class Seat:
     directions: Float[np.ndarray, "3 3"]
     spread: Float[np.ndarray, "3"]
     facets: Int[np.ndarray, " f"] | None = None
+    dimensions: int = 3
 
 
 def port_weights(seat: Seat, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p n"]:
@@ -48,14 +50,19 @@ def holds(seat: Seat, direction: Float[np.ndarray, "3"]) -> bool:
 
 
 def is_flat(seat: Seat) -> bool:
-    """Whether the seat is a plane face, or a section of a spatial beam between its ends; a planar beam's node is not."""
-    return bool(seat.spread[0] > 0 and seat.spread[2] == 0)
+    """Whether the seat is a plane face, of a plane link a straight edge, of a spatial beam a section between its hubs."""
+    return bool(seat.spread[0] > 0 and seat.spread[seat.dimensions - 1] == 0)
+
+
+def face_normal(seat: Seat) -> Float[np.ndarray, "3"]:
+    """Direction across a flat seat, along which its affine fit knows nothing."""
+    return np.asarray(seat.directions[seat.dimensions - 1])
 
 
 def joint_seat(
     link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
 ) -> Seat:
-    """The seat that a link offers to a joint: a beam's node; a solid's bore about the axis, else the face there.
+    """The seat that a link offers to a joint: a beam's node; else a bore about the axis, else the face there.
 
     Parameters
     ----------
@@ -68,6 +75,9 @@ def joint_seat(
     MeshError
         If the link has no node, bore or face there.
     """
+    if link.full is not None and link.Q is not None:
+        seat = joint_seat(link.full, where, point, axis)
+        return replace(seat, fit=seat.fit @ link.Q)
     if link.kind == "beam":
         return _node_seat(link, where, point)
     if link.kind == "spatial_beam":
@@ -79,16 +89,20 @@ def joint_seat(
 
 
 def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
-    """The flat or cylindrical face of a solid that passes through a point, e.g. to carry a surface force.
+    """The flat or cylindrical face of a link that passes through a point, e.g. to carry a surface force.
 
     Raises
     ------
     MeshError
         If no face does.
     """
-    facets = flat_face(link, point)
+    if link.full is not None and link.Q is not None:
+        seat = face_seat(link.full, where, point)
+        return replace(seat, fit=seat.fit @ link.Q)
+    seen = _in_its_plane(link, point)
+    facets = flat_face(link, seen)
     if not len(facets):
-        facets = smooth_face(link, point)
+        facets = smooth_face(link, seen)
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
     return _facet_seat(link, facets)
@@ -103,6 +117,8 @@ def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
     """
     if seat.facets is None:
         return np.zeros(link.n)
+    if link.full is not None and link.Q is not None:
+        return np.asarray(surface_weights(link.full, seat) @ link.Q)
     on = surface(link, seat.facets)
     local = np.einsum("fqm,fq->fm", on.N, on.dA)
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
@@ -147,11 +163,7 @@ def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
     area = dA.sum()
     origin = np.einsum("kfq,fq->k", x, dA) / area
     r = x - origin[:, None, None]
-    covariance = np.einsum("ifq,jfq,fq->ij", r, r, dA) / area
-    variance, vectors = np.linalg.eigh(covariance)
-    order = np.argsort(variance)[::-1]
-    spread, directions = np.sqrt(np.abs(variance[order])), vectors[:, order].T
-    spread[spread < PLANE_TOLERANCE * spread[0]] = 0.0
+    spread, directions = _principal(np.einsum("ifq,jfq,fq->ij", r, r, dA) / area, link.d)
     phi = np.concatenate([np.ones((1, *dA.shape)), np.einsum("ij,jfq->ifq", directions, r)])
     moments = np.zeros((4, link.n))
     local = np.einsum("cfq,fqm,fq->cfm", phi, on.N, dA, optimize=True)
@@ -161,22 +173,40 @@ def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
     scale = np.where(known, area * np.concatenate([[1.0], np.maximum(spread, 1e-300) ** 2]), np.inf)
     local_fit = moments / scale[:, None]
     fit = np.concatenate([local_fit[:1], directions.T @ local_fit[1:]])
-    return Seat(fit, origin, directions, spread, facets)
+    return Seat(fit, origin, directions, spread, facets, link.d)
+
+
+def _principal(
+    covariance: Float[np.ndarray, "3 3"], d: int
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+    """Standard deviations, widest first, and their directions as rows; in a plane the third is z."""
+    variance, vectors = np.linalg.eigh(covariance[:d, :d])
+    spread, directions = np.zeros(3), np.eye(3)
+    spread[:d], directions[:d, :d] = np.sqrt(np.abs(variance[::-1])), vectors[:, ::-1].T
+    spread[spread < PLANE_TOLERANCE * spread[0]] = 0.0
+    return spread, directions
+
+
+def _in_its_plane(link: Link, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """The point as a plane link sees it, which knows no z."""
+    return np.array([*point[:2], link.X[0, 2]]) if link.kind == "plane" else point
 
 
 def _surface_at(
     link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
 ) -> Int[np.ndarray, " f"]:
     """A ball seat if no axis is given, else a bore about the axis (or one of the link's), else a flat face."""
-    if axis is None and len(ball := sphere(link, point)):
+    if axis is None and link.d == 3 and len(ball := sphere(link, point)):
         return ball
-    for candidate in link.axes.T if axis is None else (axis,):
-        if len(bore := cylinder(link, point, candidate)):
+    seen, candidates = _in_its_plane(link, point), link.axes.T if axis is None else (axis,)
+    for candidate in np.eye(3)[2:] if link.kind == "plane" else candidates:
+        if len(bore := cylinder(link, seen, candidate)):
             return bore
-    return flat_face(link, point)
+    return flat_face(link, seen)
 
 
 def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:
+    point = _in_its_plane(link, point)
     nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
     gap = np.linalg.norm(nearest - point)
     what = "a node of" if link.kind in {"beam", "spatial_beam"} else "a bore or a flat face of"

@@ -83,37 +83,37 @@ def scalar_mass(basis: skfem.Basis, on: Pattern, density: float) -> sp.csr_array
 
 
 def gradient_products(basis: skfem.Basis, on: Pattern) -> dict[tuple[int, int], sp.csr_array]:
-    """The scalar matrices D_ij = ∫ ∂_i N_a ∂_j N_b, i ≤ j, all on one sparsity pattern [m]."""
+    """The scalar matrices D_ij = ∫ ∂_i N_a ∂_j N_b, i ≤ j, all on one sparsity pattern [m; in a plane: -]."""
     return {
         (i, j): on.assembled(skfem.BilinearForm(lambda u, v, _, i=i, j=j: v.grad[i] * u.grad[j]), basis)
-        for i, j in combinations_with_replacement(range(3), 2)
+        for i, j in combinations_with_replacement(range(basis.mesh.dim()), 2)
     }
 
 
 def elastic_stiffness(D: dict[tuple[int, int], sp.csr_array], lame: tuple[float, float]) -> sp.csr_array:
-    """K0 from six scalar matrices: block(i, j) = λ D_ij + μ D_ji + μ δ_ij Σ_k D_kk, [KED, eqs. (13)(14)].
+    """K0 from scalar matrices: block(i, j) = λ D_ij + μ D_ji + μ δ_ij Σ_k D_kk, [KED, eqs. (13)(14)].
 
     Parameters
     ----------
-    D : scalar matrices of `gradient_products` [m]
-    lame : Lamé's (λ, μ) [Pa]
+    D : scalar matrices of `gradient_products`: six in space, three in a plane [m; in a plane: -]
+    lame : Lamé's (λ, μ) [Pa; in a plane times the thickness: N/m]
 
     Returns
     -------
-    (3n, 3n) in the link frame, dof 3·node + component [N/m]
+    (dn, dn) in the link frame, dof d·node + component [N/m]
     """
     lam, mu = lame
     like = D[0, 0]
     transposed = transposition(like)
-    data = {(i, j): D[i, j].data if i <= j else D[j, i].data[transposed] for i in range(3) for j in range(3)}
-    laplace = mu * (data[0, 0] + data[1, 1] + data[2, 2])
-    blocks = np.empty((like.nnz, 3, 3))
-    for i in range(3):
-        for j in range(3):
+    n, d = like.shape[0], 1 + max(j for _, j in D)
+    data = {(i, j): D[i, j].data if i <= j else D[j, i].data[transposed] for i in range(d) for j in range(d)}
+    laplace = mu * sum(data[k, k] for k in range(d))
+    blocks = np.empty((like.nnz, d, d))
+    for i in range(d):
+        for j in range(d):
             blocks[:, i, j] = lam * data[i, j] + mu * data[j, i]
         blocks[:, i, i] += laplace
-    n = like.shape[0]
-    return sp.csr_array(sp.bsr_array((blocks, like.indices, like.indptr), shape=(3 * n, 3 * n)).tocsr())
+    return sp.csr_array(sp.bsr_array((blocks, like.indices, like.indptr), shape=(d * n, d * n)).tocsr())
 
 
 def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:

@@ -16,8 +16,8 @@ from kedfem.links.section import Section
 from kedfem.scene import Material
 
 LOBATTO = {2: np.array([1.0, 1.0]), 3: np.array([1.0, 1.0, 4.0]) / 3}  # weights at the nodes, ends first
-HUB_STIFFNESS = 100.0  # of E A L: leaves a part of EI/(100 E A L²) of a beam's deflection to the corner
-HUB_INERTIA = 1e-4  # of a cube's, along the axis: a hub needs some there, where the section has none
+HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
+HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
 
 
 def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "6 m 3 3"], float]:

@@ -1,4 +1,7 @@
-"""The boundary of a solid link: integrals over its facets, and bores, balls and faces found by their geometry."""
+"""The boundary of a solid or plane link: integrals over its facets, bores, balls and faces found by their geometry.
+
+The facets of a plane link are edges, as wide as the link is thick.
+"""
 
 from dataclasses import dataclass
 
@@ -18,7 +21,7 @@ SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved fac
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Quadrature on facets of a solid, in the elements' own functions: x (f, q, 3) [m], dA (f, q) [m²],
+    """Quadrature on facets of a link, in the elements' own functions: x (f, q, 3) [m], dA (f, q) [m²],
     N (f, q, m) and the functions' numbers dofs (f, m)."""
 
     x: Float[np.ndarray, "f q 3"]
@@ -28,18 +31,24 @@ class Surface:
 
 
 def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
-    """Gauss points on facets: the area element of [KED, eqs. (15)(16)], √(a_r a_s − a_rs²) = |x_r × x_s|."""
+    """Gauss points on facets: the area element of [KED, eqs. (15)(16)], √(a_r a_s − a_rs²) = |x_r × x_s|.
+
+    Of a plane link it is |x_r| times the thickness.
+    """
     mesh, elem = link.basis.mesh, link.basis.elem
     elements = mesh.f2t[0, facets]
-    local = np.argmax(mesh.t[:8, elements][:, None] == mesh.facets[:, facets][None], axis=0)  # (4, f)
-    corners = np.asarray(elem.doflocs)[local]  # (4, f, 3)
+    local = np.argmax(
+        mesh.t[: 2**link.d, elements][:, None] == mesh.facets[:, facets][None], axis=0
+    )  # (c, f)
+    corners = np.asarray(elem.doflocs)[local]  # (c, f, d)
     fixed = np.ptp(corners, axis=0).argmin(axis=1)
     face = 2 * fixed + corners[0, np.arange(len(facets)), fixed].astype(int)
     dofs = link.basis.element_dofs[:, elements].T
+    gauss = 4 ** (link.d - 1)
     x, dA, N = (
-        np.empty((len(facets), 16, 3)),
-        np.empty((len(facets), 16)),
-        np.empty((len(facets), 16, dofs.shape[1])),
+        np.empty((len(facets), gauss, 3)),
+        np.empty((len(facets), gauss)),
+        np.empty((len(facets), gauss, dofs.shape[1])),
     )
     for which in np.unique(face):
         here = face == which
@@ -47,34 +56,38 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
         nodes = link.X[dofs[here]]
         tangents = np.einsum("qmk,fmj->kfqj", gradient, nodes)
         N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
-        dA[here] = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=2) * weights
+        element = tangents[0] if link.d == 2 else np.cross(tangents[0], tangents[1])
+        dA[here] = link.thickness * np.linalg.norm(element, axis=2) * weights
     return Surface(x, dA, N, dofs)
 
 
 def _face_functions(elem: skfem.Element, fixed: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N (q, m), its derivatives along the face (q, m, 2) and weights (q,) on one face of [0, 1]³."""
+    """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on one face of [0, 1]ᵈ."""
     r, w = np.polynomial.legendre.leggauss(4)
     r, w = (r + 1) / 2, w / 2
-    across = [k for k in range(3) if k != fixed]
-    points = np.full((3, 16), float(side))
-    points[across] = np.stack(np.meshgrid(r, r, indexing="ij")).reshape(2, 16)
+    d = elem.dim
+    across, q = [k for k in range(d) if k != fixed], 4 ** (d - 1)
+    points = np.full((d, q), float(side))
+    points[across] = np.stack(np.meshgrid(*[r] * (d - 1), indexing="ij")).reshape(d - 1, q)
     pairs = [elem.lbasis(points, i) for i in range(len(elem.doflocs))]
-    shape = np.stack([np.broadcast_to(N, 16) for N, _ in pairs], axis=1)
+    shape = np.stack([np.broadcast_to(N, q) for N, _ in pairs], axis=1)
     gradient = np.stack([np.asarray(dN)[across].T for _, dN in pairs], axis=1)
-    return shape, gradient, np.outer(w, w).ravel()
+    return shape, gradient, w if d == 2 else np.outer(w, w).ravel()
 
 
 def boundary(
     link: Link,
-) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f 4 3"], Float[np.ndarray, "f 3"]]:
+) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f c 3"], Float[np.ndarray, "f 3"]]:
     """Boundary facets with their corners and outward unit normals."""
     mesh = link.basis.mesh
     facets = mesh.boundary_facets()
-    corners = mesh.doflocs[:, mesh.facets[:, facets]].transpose(2, 1, 0)
-    inner = link.X[mesh.t[:8, mesh.f2t[0, facets]]].mean(axis=0)
-    # the four corners of a facet may be numbered in any order: two largest independent edges span it
+    corners = link.X[mesh.facets[:, facets]].transpose(1, 0, 2)
+    inner = link.X[mesh.t[: 2**link.d, mesh.f2t[0, facets]]].mean(axis=0)
     edges = corners[:, 1:] - corners[:, :1]
-    crosses = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in ((0, 1), (1, 2), (0, 2))], axis=1)
+    if link.d == 2:
+        crosses = np.cross(edges, [0.0, 0.0, 1.0])
+    else:  # the four corners of a facet may be numbered in any order: two largest independent edges span it
+        crosses = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in ((0, 1), (1, 2), (0, 2))], axis=1)
     largest = np.linalg.norm(crosses, axis=2).argmax(axis=1)
     normal = crosses[np.arange(len(facets)), largest]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -128,6 +141,10 @@ def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"
     centre = corners.mean(axis=1)
     height = np.abs(np.einsum("fck,fk->fc", corners - point, normals)).max(axis=1)
     touching = height <= PLANE_TOLERANCE * size
+    # a point at a corner of a curved facet lies in the plane of its corners, too
+    x = surface(link, facets[touching]).x
+    bulge = np.abs(np.einsum("fqk,fk->fq", x - corners[touching, :1], normals[touching]))
+    touching[touching] = bulge.max(axis=1) <= PLANE_TOLERANCE * size
     reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
     near = touching & (np.linalg.norm(centre - point, axis=1) <= 1.01 * reach)
     if not near.any():
@@ -155,11 +172,12 @@ def smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " 
 def neighbours(
     link: Link, facets: Int[np.ndarray, " f"]
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """Pairs of facets (their positions in the list) that share an edge, two of their corner nodes."""
+    """Pairs of facets (their positions in the list) that share an edge, two of their corner nodes; in a plane one."""
     numbers = np.sort(link.basis.mesh.facets[:, facets].T, axis=1)
-    corners = sp.csr_array((np.ones(numbers.size), numbers.ravel(), 4 * np.arange(len(facets) + 1)))
+    starts = numbers.shape[1] * np.arange(len(facets) + 1)
+    corners = sp.csr_array((np.ones(numbers.size), numbers.ravel(), starts))
     common = sp.coo_array(corners @ corners.T)
-    first, second = (index[common.data == 2] for index in common.coords)
+    first, second = (index[common.data == link.d - 1] for index in common.coords)
     return first, second
 
 

@@ -7,15 +7,8 @@ import numpy as np
 
 from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.hexahedra import (
-    HexMesh,
-    extruded,
-    frame_along,
-    linear,
-    placed,
-    quadratic,
-    rectangle_quads,
-)
+from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
+from kedfem.mesh.hexahedra import HexMesh, frame_along, linear, quadratic, rectangle_quads
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
@@ -61,35 +54,56 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
         The shape cannot be meshed as asked, a file cannot be used, or an element is not good enough.
     """
     where = f"links.{name}"
-    match link.shape:
-        case Bar() as shape:
-            mesh = bar_mesh(where, shape, link.mesh)
-        case PlateLink() as shape:
-            mesh = plate_mesh(where, shape, link.mesh)
-        case Extrusion() as shape:
-            mesh = extrusion_mesh(where, shape, link.mesh)
-        case Part() as shape:
-            mesh = part_mesh(where, shape, link.mesh, folder)
-        case MeshFile() as shape:
-            mesh = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
-        case other:
-            kind = "no shape" if other is None else other.kind
-            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part or mesh, got {kind}")
+    if isinstance(link.shape, MeshFile):
+        mesh = mesh_from_file(f"{where}.shape.file", folder / link.shape.file, link.shape.scale)
+    else:
+        mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
     mesh = linear(mesh) if link.element == "hex8" else quadratic(mesh)
     return checked_mesh(name, mesh, link.min_quality)
 
 
-def bar_mesh(where: str, shape: Bar, mesh: Meshing) -> HexMesh:
+def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:
+    """The quadrilateral mesh of a plane link: its plate's middle plane, in the scene's reference position.
+
+    Parameters and errors are those of `link_mesh`; there are 9 nodes to an element.
+    """
+    plate = link_plate(f"links.{name}", link, folder)
+    return checked_mesh(name, middle_mesh(plate), link.min_quality)
+
+
+def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
+    """The plate that a link's shape describes.
+
+    Raises
+    ------
+    MeshError
+        The shape is no plate or cannot be meshed as asked, or a part's file cannot be used.
+    """
+    match link.shape:
+        case Bar() as shape:
+            return bar_plate(where, shape, link.mesh)
+        case PlateLink() as shape:
+            return eye_plate(where, shape, link.mesh)
+        case Extrusion() as shape:
+            return extrusion_plate(where, shape, link.mesh)
+        case Part() as shape:
+            return part_plate(where, shape, link.mesh, folder)
+        case other:
+            kind = "no shape" if other is None else other.kind
+            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part or mesh, got {kind}")
+
+
+def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:
     """A box between two points, in equal elements."""
     elements = mesh.elements or 4
-    along, across, layers = elements if isinstance(elements, tuple) else (elements, 2, 1)
-    _check_count(f"{where}.mesh.elements", float(along * across * layers))
+    along, across, *layers = elements if isinstance(elements, tuple) else (elements, 2)
+    _check_count(f"{where}.mesh.elements", float(math.prod([along, across, *layers])))
     P, Q = np.array(shape.between)
     quads = rectangle_quads(math.dist(P, Q), shape.width, along, across)
-    return placed(extruded(*quads, shape.thickness, layers), P, frame_along(Q - P))
+    return Plate(quads, shape.thickness, P, frame_along(Q - P))
 
 
-def plate_mesh(where: str, shape: PlateLink, mesh: Meshing) -> HexMesh:
+def eye_plate(where: str, shape: PlateLink, mesh: Meshing) -> Plate:
     """A plate with a bore at each of two points."""
     P, Q = np.array(shape.between)
     length = math.dist(P, Q)
@@ -102,25 +116,32 @@ def plate_mesh(where: str, shape: PlateLink, mesh: Meshing) -> HexMesh:
     size = element_size(where, mesh, shape.width, length + shape.eye_diameter)
     _check_count(_size_key(where, mesh), mesh.layers * (length + shape.eye_diameter) * shape.width / size**2)
     axes = frame_along(Q - P)
-    plate = extruded(*plate_quads(sizes, size), shape.thickness, mesh.layers)
-    return placed(plate, P + shape.offset * axes[2], axes)
+    return Plate(plate_quads(sizes, size), shape.thickness, P + shape.offset * axes[2], axes)
 
 
-def extrusion_mesh(where: str, shape: Extrusion, mesh: Meshing) -> HexMesh:
+def extrusion_plate(where: str, shape: Extrusion, mesh: Meshing) -> Plate:
     """A plate of any outline, in a z plane."""
     quads = _outline_quads(where, profile_outline(shape), mesh)
     start = shape.outline[0]
     middle = np.array([0.0, 0.0, (start.to if isinstance(start, Arc) else start)[2] + shape.offset])
-    return placed(extruded(*quads, shape.thickness, mesh.layers), middle, np.eye(3))
+    return Plate(quads, shape.thickness, middle, np.eye(3))
 
 
-def part_mesh(where: str, shape: Part, mesh: Meshing, folder: Path) -> HexMesh:
+def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path) -> Plate:
     """A plate that a file describes, between two points."""
     part = _part(where, shape, folder)
     origin, x_point = np.array(part.origin[:2]), np.array(part.x_point[:2])
     quads = _outline_quads(where, turned_outline(profile_outline(part), origin, x_point - origin), mesh)
     P, Q = np.array(shape.between)
-    return placed(extruded(*quads, part.thickness, mesh.layers), P, frame_along(Q - P))
+    return Plate(quads, part.thickness, P, frame_along(Q - P))
+
+
+def _layers(link: LinkScene) -> int:
+    """Elements through the thickness: a bar has its own number."""
+    if not isinstance(link.shape, Bar):
+        return link.mesh.layers
+    elements = link.mesh.elements
+    return elements[2] if isinstance(elements, tuple) and len(elements) == 3 else 1
 
 
 def _part(where: str, shape: Part, folder: Path) -> PartGeometry:

@@ -1,13 +1,16 @@
 """Quality of meshes: the scaled Jacobian, and the gate that a link's mesh must pass."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
+from kedfem.mesh.flat import QuadMesh
 from kedfem.mesh.hexahedra import HEX8, HEX27, QUAD9, HexMesh, shape_gradients
 
+Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
 
 
@@ -69,14 +72,14 @@ def _scaled_determinants(
     return np.asarray(determinants / np.where(lengths > 0, lengths, np.inf))
 
 
-def mesh_quality(mesh: HexMesh) -> Quality:
+def mesh_quality(mesh: HexMesh | QuadMesh) -> Quality:
     """The scaled Jacobians of a mesh and its worst element."""
-    values = scaled_jacobian(mesh.points, mesh.cells)
+    values = scaled_jacobian(mesh.points[:, : 2 if isinstance(mesh, QuadMesh) else 3], mesh.cells)
     worst = int(np.argmin(values))
     return Quality(values, worst, mesh.points[mesh.cells[worst]].mean(axis=0))
 
 
-def checked_mesh(name: str, mesh: HexMesh, min_quality: float) -> HexMesh:
+def checked_mesh(name: str, mesh: Mesh, min_quality: float) -> Mesh:
     """The mesh itself, if it is good enough.
 
     Raises

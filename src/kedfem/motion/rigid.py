@@ -1,9 +1,10 @@
 """Rigid motion R, p, R'', p'' of all links at many times at once, [KED, eqs. (2)(3)]."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.errors import MotionError
 from kedfem.motion.linkage import Linkage
@@ -35,6 +36,21 @@ class RigidMotion:
     p2: Float[np.ndarray, "T B 3"]
     omega_phi: Float[np.ndarray, "T B 3"]
     v_phi: Float[np.ndarray, "T B 3"]
+
+    def part(self, first: int, end: int) -> "RigidMotion":
+        """The time points from one number up to another."""
+        return self.at(slice(first, end))
+
+    def at(self, which: slice | Int[np.ndarray, " k"]) -> "RigidMotion":
+        """Some of the time points."""
+        return RigidMotion(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
+    """Successive time points, one after the other."""
+    return RigidMotion(
+        *(np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(RigidMotion))
+    )
 
 
 Drive = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]

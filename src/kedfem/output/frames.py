@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.transient import Snapshot
 from kedfem.links.record import in_space
-from kedfem.links.recovery import StressRecovery, nodal_stress, von_mises
+from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von_mises
 from kedfem.output.vtu import LinkField
 
 
@@ -24,11 +24,11 @@ def link_fields(
     for link, body, recovery, state in zip(
         model.links, model.bodies, recoveries, snapshot.states, strict=True
     ):
-        displacement = recovery.at_points(in_space(link, state.u))
-        stress = nodal_stress(recovery, state.g)
-        points = (
-            motion.p[k, body] + recovery.at_points(link.X) @ motion.R[k, body].T + exaggeration * displacement
-        )
+        shown = link.full or link
+        displacement = recovery.at_points(in_space(shown, nodal_state(link, state.u)))
+        stress = nodal_stress(recovery, nodal_state(link, state.g))
+        drawn = recovery.at_points(shown.X)
+        points = motion.p[k, body] + drawn @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
             LinkField(
                 link.name, recovery.cell_type, recovery.cells, points, displacement, stress, von_mises(stress)

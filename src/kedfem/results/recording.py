@@ -1,4 +1,4 @@
-"""From elastic states to rows of channels: probes, joint forces, drive torque."""
+"""From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,18 +7,19 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import port_rotation
+from kedfem.dynamics.condensed import turned_ports
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, Slider
-from kedfem.dynamics.transient import Snapshot
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
+from kedfem.motion.rows import cross
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
-Row = Float[np.ndarray, " c"]
+Rows = Float[np.ndarray, "T c"]
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
@@ -27,10 +28,10 @@ UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A channel and how a snapshot fills a row of it."""
+    """A channel, and its rows over a block of time points."""
 
     channel: Channel
-    row: Callable[[Snapshot], Row]
+    rows: Callable[[Block], Rows]
 
 
 def recording(scene: Scene, model: Model) -> list[Recorded]:
@@ -46,9 +47,9 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     return [*probes, *joints, _torque(scene, model), _rigid_torque(model), _energy(model)]
 
 
-def rows(recorded: Sequence[Recorded], snapshot: Snapshot) -> dict[str, Row]:
-    """One row of every channel."""
-    return {each.channel.name: each.row(snapshot) for each in recorded}
+def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
+    """The rows of every channel."""
+    return {each.channel.name: each.rows(block) for each in recorded}
 
 
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
@@ -60,9 +61,10 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
     if probe.quantity == "stress":
         dofs, dense = _compact(at.stress)
 
-        def stress(snapshot: Snapshot) -> Row:
-            s = dense @ snapshot.states[k].g.ravel()[dofs]
-            return np.append(s, von_mises(s[None, :]))
+        def stress(block: Block) -> Rows:
+            g = block.links[k].g
+            s = g.reshape(len(g), -1)[:, dofs] @ dense.T
+            return np.column_stack([s, von_mises(s)])
 
         return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
     beside = float(np.linalg.norm(at.X - probe.at))
@@ -76,11 +78,12 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
     field = {"displacement": "u", "velocity": "v", "acceleration": "a"}[probe.quantity]
     columns = XYZ[:2] if link.planar else XYZ
 
-    def vector(snapshot: Snapshot) -> Row:
-        state = snapshot.states[k]
-        x = weights @ getattr(state, field)[nodes]
-        turned = x @ state.R @ link.axes[: link.d, : link.d] if probe.frame == "link" else x
-        return np.asarray(turned[: len(columns)])
+    def vector(block: Block) -> Rows:
+        history = block.links[k]
+        x = np.tensordot(getattr(history, field)[:, nodes], weights, (1, 0))
+        if probe.frame == "link":
+            x = (x[:, None] @ history.R)[:, 0] @ link.axes[: link.d, : link.d]
+        return np.asarray(x[:, : len(columns)])
 
     description = f"elastic {probe.quantity} {place}"
     return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
@@ -110,20 +113,20 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
 
 def _wrench(
     model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]
-) -> Callable[[Snapshot], tuple[Row, Row]]:
+) -> Callable[[Block], tuple[Rows, Rows]]:
     """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
     attachment, link = model.joints[k], model.links[k]
     rows = _rows_of(attachment, joint)
     arms = _arms(attachment, joint, at)
     shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
 
-    def wrench(snapshot: Snapshot) -> tuple[Row, Row]:
-        f = np.zeros(len(rows))
+    def wrench(block: Block) -> tuple[Rows, Rows]:
+        f = np.zeros((len(block), len(rows)))
         for j, share in shares:
-            state = snapshot.states[j]
-            f += share @ (port_rotation(model.joints[j], state.R) @ state.port_forces)
-        R = snapshot.motion.R[snapshot.k, model.bodies[k]]
-        return _resultant(link, arms @ R.T, f.reshape(-1, link.d))
+            history = block.links[j]
+            f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
+        R = block.motion.R[:, model.bodies[k]]
+        return _resultant(link, arms @ R.transpose(0, 2, 1), f.reshape(len(f), len(arms), link.d))
 
     return wrench
 
@@ -133,8 +136,9 @@ def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -
     attachment = model.joints[k]
     rows = _rows_of(attachment, joint)
     arms, link = _arms(attachment, joint, at), model.links[k]
-    unknown = [_resultant(link, arms, f.reshape(-1, link.d)) for f in attachment.loose[rows].T]
-    return bool(np.abs(unknown).max(initial=0.0) < INDETERMINATE)
+    loose = attachment.loose[rows].T
+    force, moment = _resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
+    return bool(max(np.abs(force).max(initial=0.0), np.abs(moment).max(initial=0.0)) < INDETERMINATE)
 
 
 def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
@@ -148,12 +152,14 @@ def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Flo
     return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
 
 
-def _resultant(link: Link, arms: Float[np.ndarray, "p 3"], f: Float[np.ndarray, "p d"]) -> tuple[Row, Row]:
+def _resultant(
+    link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray, "T p d"]
+) -> tuple[Rows, Rows]:
     """Force and moment of port forces, all in one frame."""
     if link.kind == "beam":  # third component is a moment
-        return in_space(link, f).sum(axis=0), f.sum(axis=0) * [0, 0, 1]
+        return in_space(link, f).sum(axis=1), f.sum(axis=1) * [0, 0, 1]
     force = in_space(link, f)
-    return force.sum(axis=0), np.cross(arms, force).sum(axis=0)
+    return force.sum(axis=1), cross(arms, force).sum(axis=1)
 
 
 def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list[Recorded]:
@@ -169,24 +175,23 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     if name == slider.guide:
         description = f"force of joint {name} on slider {slider.name} from ground"
 
-        def guide(snapshot: Snapshot) -> Row:
-            return np.asarray(np.sum([wrench(snapshot)[0] for wrench in wrenches], axis=0))
+        def guide(block: Block) -> Rows:
+            return np.asarray(np.sum([wrench(block)[0] for wrench in wrenches], axis=0))
 
         return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)]
     carrier = model.links[slider.carrier]
     description = f"force of joint {name} on link {carrier.name} from slider {slider.name}"
     gravity = np.asarray(scene.gravity)
 
-    def pin(snapshot: Snapshot) -> Row:
-        motion, k, state = snapshot.motion, snapshot.k, snapshot.states[slider.carrier]
-        body = model.bodies[slider.carrier]
-        nominal = motion.p2[k, body] + motion.R2[k, body] @ (slider.weights @ carrier.X)
-        a = nominal + in_space(carrier, slider.weights @ state.a)
-        t = np.array([snapshot.t])
-        loads = sum(
-            (x.factor(t)[0] * in_space(carrier, carrier.one @ x.forces) for x in slider.loads), np.zeros(3)
-        )
-        return np.asarray(wrenches[0](snapshot)[0] - slider.mass * (a - gravity) + loads)
+    def pin(block: Block) -> Rows:
+        motion, body = block.motion, model.bodies[slider.carrier]
+        nominal = motion.p2[:, body] + motion.R2[:, body] @ (slider.weights @ carrier.X)
+        elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
+        a = nominal + in_space(carrier, elastic)
+        force = wrenches[0](block)[0] - slider.mass * (a - gravity)
+        for x in slider.loads:
+            force += np.outer(x.factor(motion.t), in_space(carrier, carrier.one @ x.forces))
+        return np.asarray(force)
 
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
@@ -200,7 +205,7 @@ def _torque(scene: Scene, model: Model) -> Recorded:
         "drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {model.links[k].name}"
     )
     wrench = _wrench(model, k, scene.drive.joint, at)
-    return Recorded(channel, lambda s: np.array([wrench(s)[1] @ axis]))
+    return Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])
 
 
 def _rigid_torque(model: Model) -> Recorded:
@@ -209,17 +214,17 @@ def _rigid_torque(model: Model) -> Recorded:
         "drive/rigid_torque", ("torque",), "N m", "world", "torque of the drive were all links rigid"
     )
 
-    def torque(snapshot: Snapshot) -> Row:
-        motion, k, work = snapshot.motion, snapshot.k, 0.0
-        for link, body, state in zip(model.links, model.bodies, snapshot.states, strict=True):
-            v, w = motion.v_phi[k, body], motion.omega_phi[k, body]
-            N = motion.R[k, body] @ (link.X.T @ in_space(link, state.F))  # Σ (R X) ⊗ F
-            moment = np.array([N[1, 2] - N[2, 1], N[2, 0] - N[0, 2], N[0, 1] - N[1, 0]])
-            total = link.one @ state.F
+    def torque(block: Block) -> Rows:
+        motion, work = block.motion, np.zeros(len(block))
+        for link, body, history in zip(model.links, model.bodies, block.links, strict=True):
+            v, w = motion.v_phi[:, body], motion.omega_phi[:, body]
+            N = motion.R[:, body] @ (link.X.T @ in_space(link, history.F))  # Σ (R X) ⊗ F
+            moment = np.stack([N[:, i, j] - N[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
+            total = np.tensordot(history.F, link.one, (1, 0))
             if link.kind == "beam":
-                moment[2] += total[2]
-            work += float(in_space(link, total) @ v + w @ moment)
-        return np.array([-work])
+                moment[:, 2] += total[:, 2]
+            work += (in_space(link, total) * v + w * moment).sum(axis=1)
+        return -work[:, None]
 
     return Recorded(channel, torque)
 
@@ -227,7 +232,7 @@ def _rigid_torque(model: Model) -> Recorded:
 def _energy(model: Model) -> Recorded:
     """Strain energy ½ gᵀ K0 g of all links, [KED, eq. (13)]."""
     channel = Channel("energy/strain", ("strain",), "J", "", "strain energy of all links")
-    return Recorded(channel, lambda s: np.array([sum(0.5 * float(np.vdot(x.g, x.Kg)) for x in s.states)]))
+    return Recorded(channel, lambda block: np.sum([link.strain for link in block.links], axis=0)[:, None])
 
 
 def _number(model: Model, name: str) -> int:

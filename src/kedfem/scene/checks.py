@@ -15,9 +15,11 @@ from kedfem.scene.wording import shown, unknown_name
 
 SHAPES = {
     "solid": ["bar", "plate_link", "extrusion", "part", "mesh"],
+    "plane": ["bar", "plate_link", "extrusion", "part"],
     "beam": ["bar", "polyline"],
 }
-ELEMENTS = {"solid": ["hex27", "hex8"], "beam": ["beam3", "beam2"]}
+ELEMENTS = {"solid": ["hex27", "hex8"], "plane": ["quad9"], "beam": ["beam3", "beam2"]}
+NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}
 
 
 def fidelity(link: Entry) -> str:
@@ -65,7 +67,9 @@ def link_faults(parts: Parts) -> Iterator[str]:
 def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
     """A rigid link that is not a slider, or has keys of an elastic one."""
     if not any(is_slide(joint) and link.name in link_names(joint) for joint in parts.joints.values()):
-        wanted = "must be 'solid' or 'beam' unless the link is a slider (a prismatic joint to the ground)"
+        wanted = (
+            "must be 'solid', 'plane' or 'beam' unless the link is a slider (a prismatic joint to the ground)"
+        )
         yield link.fault("fidelity", f"{wanted}, got 'rigid'")
     for key in ("shape", "material", "element"):
         if link.has(key):
@@ -79,20 +83,21 @@ def is_slide(joint: Entry) -> bool:
 
 
 def elastic_faults(link: Entry) -> Iterator[str]:
-    """Missing or unsuitable keys of a solid or a beam."""
+    """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = fidelity(link), link.word("shape", "kind"), link.word("element")
+    noun = NOUNS[kind]
     for key in ("shape", "material"):
         if not link.has(key):
-            yield link.fault(key, f"is required for a {kind}, got nothing")
+            yield link.fault(key, f"is required for a {noun}, got nothing")
     every_shape = {name for names in SHAPES.values() for name in names}
     if shape in every_shape and shape not in SHAPES[kind]:
-        yield link.fault("shape", f"must be {either(SHAPES[kind])} for a {kind}, got {shape!r}", "kind")
+        yield link.fault("shape", f"must be {either(SHAPES[kind])} for a {noun}, got {shape!r}", "kind")
     every_element = {name for names in ELEMENTS.values() for name in names}
     if element in every_element and element not in ELEMENTS[kind]:
-        yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {kind}, got {element!r}")
+        yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
     if link.record is not None and link.record.mass:
         yield link.fault(
-            "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {kind}"
+            "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {noun}"
         )
 
 
@@ -102,6 +107,9 @@ def meshing_faults(link: Entry) -> Iterator[str]:
     if not isinstance(mesh, Mapping):
         return
     counted = "beam" if fidelity(link) == "beam" else "bar" if shape == "bar" else None
+    if fidelity(link) == "plane" and link.has("mesh", "layers"):
+        wanted = "must be left out for a plane link (it has one element through its thickness)"
+        yield link.fault("mesh", f"{wanted}, got {shown(mesh['layers'])}", "layers")
     if counted is not None:
         for key in ("size", "elements_across"):
             if link.has("mesh", key):
@@ -118,14 +126,18 @@ def meshing_faults(link: Entry) -> Iterator[str]:
 
 
 def count_faults(link: Entry, counted: str) -> Iterator[str]:
-    """One number of elements where three are needed, or the reverse."""
+    """Numbers of elements that are not as many as needed."""
     elements = link.record.mesh.elements if link.record is not None else None
     if counted == "beam" and isinstance(elements, tuple):
         wanted = "must be one number, per segment, for a beam"
         yield link.fault("mesh", f"{wanted}, got {list(elements)}", "elements")
-    if counted == "bar" and isinstance(elements, int):
-        wanted = "must be three numbers for a solid bar: along, across, thickness"
-        yield link.fault("mesh", f"{wanted}, got {elements}", "elements")
+    if counted == "bar" and elements is not None:
+        count, wanted = 3, "must be three numbers for a solid bar: along, across, thickness"
+        if fidelity(link) == "plane":
+            count, wanted = 2, "must be two numbers for a bar as a plane link: along, across"
+        if isinstance(elements, int) or len(elements) != count:
+            got = elements if isinstance(elements, int) else list(elements)
+            yield link.fault("mesh", f"{wanted}, got {got}", "elements")
 
 
 def joint_faults(parts: Parts) -> Iterator[str]:
@@ -182,12 +194,12 @@ def load_faults(parts: Parts) -> Iterator[str]:
         kind = load.word("kind")
         if link is None:
             continue
-        if kind == "surface" and fidelity(link) != "solid":
+        if kind == "surface" and fidelity(link) not in {"solid", "plane"}:
             got = f"got {link.name!r}, which is {fidelity(link)}"
-            yield load.fault("link", f"must name a solid for a surface load, {got}")
+            yield load.fault("link", f"must name a solid or a plane link for a surface load, {got}")
         if kind == "body" and fidelity(link) == "rigid":
             got = f"got {link.name!r}, which is rigid"
-            yield load.fault("link", f"must name a solid or a beam for a body load, {got}")
+            yield load.fault("link", f"must name an elastic link for a body load, {got}")
     for probe in parts.probes.values():
         link = parts.links.get(probe.word("link") or "")
         if link is not None and fidelity(link) == "rigid":

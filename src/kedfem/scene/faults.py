@@ -105,8 +105,8 @@ def choice(hint: Any) -> str:
 
 
 def either(words: list[Any]) -> str:
-    """'one of a, b, c'."""
-    return "one of " + ", ".join(str(word) for word in words)
+    """'one of a, b, c'; a single word as it is."""
+    return ("one of " if len(words) > 1 else "") + ", ".join(str(word) for word in words)
 
 
 def one_of(words: list[Any], got: Any) -> str:

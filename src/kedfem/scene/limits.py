@@ -1,4 +1,4 @@
-"""Cross checks of the analysis and its drive, and of files; each yields fault lines."""
+"""Cross checks of plane links and their plane, of the analysis and its drive, of files; each yields fault lines."""
 
 from __future__ import annotations
 
@@ -6,11 +6,76 @@ import math
 from collections.abc import Iterator
 
 from kedfem.errors import SceneError
+from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
-from kedfem.scene.parts import Parts
+from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.planes import FLAT, points_of, vector
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
+
+
+def planar_faults(parts: Parts) -> Iterator[str]:
+    """What leaves the plane of a scene with plane links."""
+    here = f"a scene of {NOUNS['plane']}s"
+    if not any(fidelity(link) == "plane" for link in parts.links.values()):
+        return
+    for joint in parts.joints.values():
+        axis = joint.record.axis if joint.record is not None else None
+        if axis is None:
+            continue
+        off = max(abs(axis[0]), abs(axis[1]))
+        if joint.record.kind == "revolute" and off > FLAT:
+            yield joint.fault("axis", f"must be along z in {here}, got {vector(axis)}")
+        if joint.record.kind == "prismatic" and abs(axis[2]) > FLAT:
+            yield joint.fault("axis", f"must lie in the xy plane in {here}, got {vector(axis)}")
+    if parts.gravity[2] != 0.0:
+        yield f"gravity: must lie in the xy plane in {here} [m/s^2], got {vector(parts.gravity)}"
+    for load in parts.loads.values():
+        if load.record is not None and load.record.vector[2] != 0.0:
+            yield load.fault(
+                "vector", f"must lie in the xy plane in {here}, got {vector(load.record.vector)}"
+            )
+    yield from mixed_faults(parts)
+    yield from plane_faults(parts, here)
+
+
+def mixed_faults(parts: Parts) -> Iterator[str]:
+    """Joints other than hinges between plane links and others."""
+    for joint in parts.joints.values():
+        held = [parts.links[name] for name in link_names(joint) if name in parts.links]
+        kinds = [NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS]
+        mixed = len(set(kinds)) == 2 and NOUNS["plane"] in kinds
+        if mixed and joint.word("kind") in {"weld", "prismatic"}:
+            names = " and ".join(f"{link.name!r}, a {kind}" for link, kind in zip(held, kinds, strict=True))
+            wanted = "must be revolute or spherical between a plane link and another"
+            yield joint.fault("kind", f"{wanted}, got {joint.word('kind')!r} of {names}")
+
+
+def plane_faults(parts: Parts, here: str) -> Iterator[str]:
+    """Points of joints and plane links that are not in the z plane of the first; those of other links may be."""
+    others = {link.name for link in parts.links.values() if fidelity(link) in {"solid", "beam"}}
+    placed = [
+        (entry, key, point)
+        for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes)
+        for entry in section.values()
+        if entry.record is not None and link_of(entry) not in others
+        for key, point in points_of(entry.record)
+        if all(math.isfinite(part) for part in point)
+    ]
+    if not placed:
+        return
+    first = placed[0][2]
+    size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
+    for entry, key, point in placed:
+        if abs(point[2] - first[2]) > FLAT * size:
+            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of {here} [m]"
+            yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
+
+
+def link_of(entry: Entry) -> str | None:
+    """The link that an entry is, or is on; none for a joint."""
+    return entry.name if entry.where[0] == "links" else entry.word("link")
 
 
 def analysis_faults(parts: Parts) -> Iterator[str]:

@@ -17,34 +17,34 @@ Count = Annotated[StrictInt, Field(ge=1)]
 
 
 def counts(value: object) -> object:
-    """One number of elements, or three."""
+    """One number of elements, or two or three."""
     if value is None:
         return None
     several = value if isinstance(value, (list, tuple)) else [value]
     whole = all(isinstance(number, int) and not isinstance(number, bool) and number > 0 for number in several)
-    if not whole or len(several) not in {1, 3}:
-        raise fault(f"must be one or three whole numbers of at least 1, got {value!r}")
+    if not whole or len(several) not in {1, 2, 3}:
+        raise fault(f"must be one, two or three whole numbers of at least 1, got {value!r}")
     return several[0] if len(several) == 1 else tuple(several)
 
 
 class Meshing(Record):
     """How finely a link is divided into elements."""
 
-    elements: Annotated[int | tuple[int, int, int] | None, BeforeValidator(counts)] = None
-    """solid bar: numbers along, across, through the thickness; beam: number per segment (1 if not given)"""
+    elements: Annotated[int | tuple[int, int] | tuple[int, int, int] | None, BeforeValidator(counts)] = None
+    """bar: numbers along and across, of a solid also through the thickness; beam: number per segment (1 if not given)"""
     size: PositiveLength | None = None
-    """other solids: edge length of the elements, instead of `elements_across`"""
+    """other shapes: edge length of the elements, instead of `elements_across`"""
     elements_across: Count | None = None
-    """other solids: number across the smallest width; 2 if neither this nor `size` is given"""
+    """other shapes: number across the smallest width; 2 if neither this nor `size` is given"""
     layers: Count = 1
-    """other solids: number through the thickness"""
+    """other shapes, solid: number through the thickness"""
 
 
 class LinkScene(Record):
     """A link: its material, shape, fidelity and mesh."""
 
-    fidelity: Literal["solid", "beam", "rigid"] = "solid"
-    """hexahedra, beams, or (sliders only) a rigid body"""
+    fidelity: Literal["solid", "plane", "beam", "rigid"] = "solid"
+    """hexahedra, quadrilaterals in plane stress, beams, or (sliders only) a rigid body"""
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid link"""
     shape: Shape | None = None
@@ -53,10 +53,10 @@ class LinkScene(Record):
     """mass of a rigid link"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
-    element: Literal["hex27", "hex8", "beam3", "beam2"] | None = None
-    """hex27 (or hex8) for a solid, beam3 (or beam2) for a beam"""
+    element: Literal["hex27", "hex8", "quad9", "beam3", "beam2"] | None = None
+    """hex27 (or hex8) for a solid, quad9 for a plane link, beam3 (or beam2) for a beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
-    """least scaled Jacobian of a solid's elements"""
+    """least scaled Jacobian of the elements of a solid or plane link"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
     """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
     beam: Literal["planar", "spatial"] | None = None
@@ -64,7 +64,8 @@ class LinkScene(Record):
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
-        element = self.element or {"solid": "hex27", "beam": "beam3", "rigid": None}[self.fidelity]
+        usual = {"solid": "hex27", "plane": "quad9", "beam": "beam3", "rigid": None}
+        element = self.element or usual[self.fidelity]
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
     def _mesh_defaults(self) -> dict[str, Any]:
@@ -73,7 +74,8 @@ class LinkScene(Record):
         if isinstance(self.shape, Bar):
             along = math.dist(*self.shape.between) / (1.5 * self.shape.width)
             along = min(max(math.ceil(along), 4), 40) if math.isfinite(along) else 4
-            return {"elements": self.mesh.elements or (along, 2, 1)}
+            usual = (along, 2) if self.fidelity == "plane" else (along, 2, 1)
+            return {"elements": self.mesh.elements or usual}
         across = self.mesh.elements_across or (2 if self.mesh.size is None else None)
         return {"elements_across": across}
 

@@ -142,6 +142,8 @@ def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:
     for key in ("between", "points"):
         for i, point in enumerate(getattr(shape, key, ())):
             yield ("shape", key, i), point
+    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
+        yield ("shape", "outline", i), getattr(item, "to", item)
     for key in ("at", "centre"):
         if hasattr(record, key):
             yield (key,), getattr(record, key)

@@ -47,9 +47,12 @@ as *where: what was wanted, what was got*.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
-* **Beams** are planar where they can be: if all points on the scene's beams are in one plane z = constant, all hinges
-  are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams. Else they are beams
-  in space; `beam = "planar"` or `"spatial"` settles it. Beams, solids and rigid sliders go together.
+* **Plane links** know no third dimension. A scene with any lies in one plane z = constant, with hinges along z and
+  forces in the plane; solids may share it, joined to them by hinges.
+* **Beams** are planar where they can be: if all that touches the beam is in one plane z = constant, all hinges of the
+  scene are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams. Else they
+  are beams in space; `beam = "planar"` or `"spatial"` settles it. Beams, plane links and solids go together: a hinge
+  joins any two, a weld a beam in space and a solid.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 

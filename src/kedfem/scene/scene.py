@@ -23,7 +23,7 @@ from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_motion_table
-from kedfem.scene.limits import analysis_faults, file_faults
+from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
@@ -142,6 +142,7 @@ def cross_faults(parts: Parts) -> list[str]:
         joint_faults,
         drive_faults,
         load_faults,
+        planar_faults,
         beam_faults,
         analysis_faults,
         file_faults,

@@ -1,0 +1,1 @@
+"""How far a result is from the truth, and the cheapest model that is near enough."""

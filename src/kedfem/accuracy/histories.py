@@ -1,0 +1,90 @@
+"""Runs kept in memory, and how far they are apart."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.results import Channel
+from kedfem.results.recording import recording, rows
+
+NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
+
+
+@dataclass(frozen=True, slots=True)
+class Histories:
+    """Channels over time.
+
+    time : (T,) [s]
+    channels : name → (channel, values (T, c))
+    kept : states at the steps that were asked for
+    """
+
+    time: Float[np.ndarray, " T"]
+    channels: Mapping[str, tuple[Channel, Float[np.ndarray, "T c"]]]
+    kept: tuple[Snapshot, ...] = ()
+
+
+def histories(ready: Prepared, keep: Collection[int] = ()) -> Histories:
+    """Run a prepared scene and keep its channels.
+
+    Parameters
+    ----------
+    keep : numbers of the steps whose states are kept too
+    """
+    recorded = recording(ready.scene, ready.model)
+    times, taken, kept = [], [], []
+    solver = steps_of(ready.scene, ready.model)
+    for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
+        times.append(block.motion.t)
+        taken.append(rows(recorded, block))
+        kept += [block.at(k) for k in range(len(block)) if block.step + k in keep]
+    channels = {
+        each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))
+        for each in recorded
+    }
+    return Histories(np.concatenate(times), channels, tuple(kept))
+
+
+def asked_for(name: str) -> bool:
+    """Whether a channel counts when an accuracy is asked for: probes, joint forces, the drive's torque."""
+    return name.startswith("probes/") or name.endswith("/force") or name == "drive/torque"
+
+
+def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
+    """Largest difference in time of every channel that counts, of the channel's largest value.
+
+    Both runs need not have the same steps: the reference is interpolated (cubic spline).
+    """
+    end = min(found.time[-1], reference.time[-1]) * (1 + 1e-12)
+    here = found.time <= end
+    units: dict[str, float] = {}
+    for channel, values in reference.channels.values():
+        units[channel.unit] = max(units.get(channel.unit, 0.0), float(np.abs(values).max()))
+    errors = {}
+    for name, (channel, wanted) in reference.channels.items():
+        size = float(np.linalg.norm(wanted, axis=1).max())
+        if asked_for(name) and name in found.channels and size > NOTHING * units[channel.unit]:
+            values = found.channels[name][1][here]
+            there = _at(found.time[here], reference.time, wanted)
+            errors[name] = float(np.linalg.norm(values - there, axis=1).max()) / size
+    return errors
+
+
+def worst(errors: Mapping[str, float]) -> float:
+    """The largest of relative errors; 0 where nothing was asked for."""
+    return max(errors.values(), default=0.0)
+
+
+def _at(
+    time: Float[np.ndarray, " t"], given: Float[np.ndarray, " T"], values: Float[np.ndarray, "T c"]
+) -> Float[np.ndarray, "t c"]:
+    if len(time) == len(given) and np.allclose(time, given, rtol=0, atol=1e-9 * given[-1]):
+        return values
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(given, values)(np.minimum(time, given[-1])))

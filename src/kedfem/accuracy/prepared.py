@@ -1,0 +1,34 @@
+"""A scene with everything that does not need a time step."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.transient import drive_range
+from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.path import Path, path
+from kedfem.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A scene, its rigid motion over the drive's range, and its elastic model."""
+
+    scene: Scene
+    linkage: Linkage
+    path: Path
+    model: Model
+
+
+def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
+    """Rigid path and elastic model of a scene with all its links in full; nothing is solved.
+
+    Raises
+    ------
+    MotionError, MeshError, SceneError
+    """
+    stage("motion")
+    joined = linkage(scene)
+    along = path(joined, *drive_range(scene))
+    stage("mesh and matrices")
+    return Prepared(scene, joined, along, elastic_model(scene, joined))

@@ -1,0 +1,141 @@
+"""Links reduced as far as a tolerance allows, with an estimate of what the reduction costs.
+
+The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
+the full linkage; these are added to the functions, and the run is repeated. What changes is the estimate: the residual
+measured in the norm dual to the energy's, carried through time. If it is above the tolerance, the richer functions are
+kept and the same is done again.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.condensed import Substructure
+from kedfem.dynamics.dense import SMALL
+from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.model import reduced_model
+from kedfem.dynamics.reduction import bases, enriched, static_parts
+from kedfem.dynamics.residual import residual_deflections
+from kedfem.dynamics.transient import instants
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import drive_angle, time_grid, turn_steps
+
+INSTANTS = 16  # where the linkage is looked at before the first run
+MOMENTS = 16  # of a run where its residual is taken
+ROUNDS = 4  # of enriching
+ADDED = 8  # functions that a round adds to a link, at most
+FIRST = 0.3  # of the tolerance: what the first functions leave out of the training deflections' energy norm
+
+Functions = list[Float[np.ndarray, "_ _"] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """A prepared scene with reduced links.
+
+    ready : its model reduced
+    functions : per link, None where it stays as it is
+    estimate : relative error of every channel that counts, compared with the full links
+    tolerance : that was asked for
+    """
+
+    ready: Prepared
+    functions: tuple[Float[np.ndarray, "_ _"] | None, ...]
+    estimate: dict[str, float]
+    tolerance: float
+
+
+def reduced(
+    full: Prepared, chosen: Collection[str], tolerance: float, counts: dict[str, int] | None = None,
+    stage: Callable[[str], None] = lambda name: None,
+) -> Reduction:  # fmt: skip
+    """Reduce some links of a prepared scene, as far as a tolerance allows.
+
+    Links that are not chosen but large are reduced too while the error is estimated, and left in full at the end.
+
+    Parameters
+    ----------
+    chosen : names of links
+    tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
+    counts : number of functions of links that have it given
+    """
+    stage("functions")
+    parts = static_parts(full.model)
+    found = bases(full.model, instants(full.model, _training(full)), parts)
+    given = counts or {}
+    Q: Functions = [
+        basis.first(given.get(link.name, basis.count(FIRST * tolerance)))
+        if link.name in chosen or link.unknowns > SMALL else None
+        for link, basis in zip(full.model.links, found, strict=True)
+    ]  # fmt: skip
+    stage("error of the reduction")
+    Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
+    kept = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
+    return Reduction(replace(full, model=reduced_model(full.model, kept)), tuple(kept), estimate, tolerance)
+
+
+def _settled(
+    full: Prepared, parts: Sequence[Substructure], Q: Functions, tolerance: float, chosen: Collection[str],
+    fixed: Collection[str],
+) -> tuple[Functions, dict[str, float]]:  # fmt: skip
+    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate."""
+    moments = _moments(full)
+    small = replace(full, model=reduced_model(full.model, Q))
+    run = histories(small, moments)
+    for _ in range(ROUNDS):
+        more = _enriched(full, parts, small, run.kept)
+        richer = replace(full, model=reduced_model(full.model, more))
+        better = histories(richer, moments)
+        estimate = relative_errors(run, better)
+        if worst(estimate) <= tolerance or set(chosen) <= set(fixed):
+            break
+        Q = [
+            old if link.name in fixed else new
+            for link, old, new in zip(full.model.links, Q, more, strict=True)
+        ]
+        small, run = (richer, better) if not fixed else _run(full, Q, moments)
+    return Q, estimate
+
+
+def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:
+    small = replace(full, model=reduced_model(full.model, Q))
+    return small, histories(small, moments)
+
+
+def _enriched(
+    full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]
+) -> Functions:
+    """Functions with the answers to the residual at some moments added."""
+    answers = [residual_deflections(full.model, parts, small.model, snapshot) for snapshot in kept]
+    return [
+        None if link.Q is None else enriched(link, each, ADDED)
+        for link, each in zip(small.model.links, zip(*answers, strict=True), strict=True)
+    ]
+
+
+def _training(full: Prepared) -> RigidMotion:
+    """Rigid motion at the instants where the linkage is looked at: over the whole time, the last turn more closely."""
+    scene, grid = full.scene, time_grid(full.scene)
+    per_turn = turn_steps(scene)
+    half = INSTANTS // 2
+    t = grid.end * (np.arange(half) + 0.5) / half
+    if per_turn is not None:
+        turn = min(per_turn * grid.step, grid.end)
+        t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
+    t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
+    return rigid_motion(full.linkage, full.path, t, drive_angle(scene.drive.motion, t))
+
+
+def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:
+    """The time at which each load is greatest, so that short ones are not missed."""
+    factors = [np.abs(load.factor(t)) for loads in full.model.loads for load in loads]
+    return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])
+
+
+def _moments(full: Prepared) -> set[int]:
+    steps: Int[np.ndarray, " k"] = np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int)
+    return set(steps.tolist())

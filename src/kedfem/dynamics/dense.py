@@ -1,0 +1,193 @@
+"""Steps of small links: dense constant matrices and one compiled loop over a block of time points."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.dynamics.condensed import port_columns, port_vectors
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import LinkState, Rayleigh
+from kedfem.links.record import Link
+
+SMALL = 360  # unknowns of a link: up to here dense matrices beat a sparse factor (docs/performance)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One link with its ports held, in mass-orthonormal coordinates x, component first: row c of δ is T[c] x[c].
+
+    T : per component (n, n)
+    G : (N, N) A⁻¹ with ports held; Y : (N, q) shape of the link as its ports move; S : (q, q) port stiffness of A
+    W : (q, N) ports; q counts all components of all ports, those that are not held are zero
+    """
+
+    T: tuple[Float[np.ndarray, "n n"], ...]
+    G: Float[np.ndarray, "N N"]
+    Y: Float[np.ndarray, "N q"]
+    S: Float[np.ndarray, "q q"]
+    W: Float[np.ndarray, "q N"]
+
+
+class DenseSteps:
+    """Advances all links by generalised-α steps, block by block; everything constant is made here, once."""
+
+    def __init__(
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
+    ) -> None:
+        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+        c_M = c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha
+        c_K = c_f * (1 + scheme.a1 * damping.beta)
+        b = c_m * scheme.acceleration
+        self.coefficients = np.array([
+            c_M, c_K, scheme.alpha_f, b[0], b[1], b[2] - scheme.alpha_m, c_f, *scheme.acceleration,
+            scheme.h * scheme.gamma, scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, *(c_f * scheme.rate),
+        ])  # fmt: skip
+        self.parts = [_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
+        self.factorisations = len(self.parts)
+        self._sizes = (
+            max(link.d for link in links), max(link.n for link in links), max(len(j.weights) for j in joints)
+        )  # fmt: skip
+        self._matrices = self._padded()
+
+    def begin(self, states: Sequence[LinkState]) -> tuple[np.ndarray, ...]:
+        """The loop's own state, from link states."""
+        D, n, P = self._sizes
+        L = len(self.links)
+        u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
+        R, forces, C = np.zeros((L, D, D)), np.zeros((L, D * P)), np.zeros((3, L, D, n))
+        for i, (link, joint, part, s) in enumerate(
+            zip(self.links, self.joints, self.parts, states, strict=True)
+        ):
+            for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
+                out[i, : link.d, : link.n] = _coordinates(link, part, rows)
+            for out, rows in ((F, s.F), (f, s.f)):
+                out[i, : link.d, : link.n] = _work(part, rows)
+            for k in range(3 if s.C is not None else 0):
+                C[k, i, : link.d, : link.n] = _work(part, s.C[k])  # type: ignore[index]
+            R[i, : link.d, : link.d] = s.R
+            forces[i] = self._ports_padded(joint, s.port_forces)
+        return u, v, a, F, f, R, forces, C
+
+    def advance(
+        self, state: tuple[np.ndarray, ...], forcing: Sequence[Forcing]
+    ) -> tuple[list[LinkHistory], tuple[np.ndarray, ...]]:
+        """All time points of a block, one step after the other, [KED, eq. (20)].
+
+        Parameters
+        ----------
+        state : of `begin` or of the block before; it is used up
+        forcing : per link over the block
+
+        Returns
+        -------
+        histories per link, and the state at the end
+        """
+        from kedfem.dynamics.kernel import advance_block
+
+        D, n, P = self._sizes
+        T, L = len(forcing[0].R), len(self.links)
+        R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
+        for i, (link, part, each) in enumerate(zip(self.links, self.parts, forcing, strict=True)):
+            R[:, i, : link.d, : link.d] = each.R
+            for c in range(link.d):
+                F[:, i, c, : link.n] = each.F[:, :, c] @ part.T[c]
+        u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
+        forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
+        history = (u, v, a, g, forces, strain)
+        advance_block(self.coefficients, self._matrices, (R, F), state, history)
+        return [self._history(i, each, history) for i, each in enumerate(forcing)], state
+
+    def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
+        link, joint, part = self.links[i], self.joints[i], self.parts[i]
+        u, v, a, g = (_rows(link, part, x[:, i]) for x in history[:4])
+        held = self._held(joint)
+        return LinkHistory(u, v, a, g, forcing.R, forcing.F, history[4][:, i, held], history[5][:, i].copy())
+
+    def _padded(self) -> tuple[np.ndarray, ...]:
+        D, n, P = self._sizes
+        L, k = len(self.links), self.joints[0].B.shape[1]
+        G, Yt = np.zeros((L, D * n, D * n)), np.zeros((L, D * P, D * n))
+        S, Wt = np.zeros((L, D * P, D * P)), np.zeros((L, D * n, D * P))
+        B = np.zeros((L, P, D, k))
+        for i, (link, joint, part) in enumerate(zip(self.links, self.joints, self.parts, strict=True)):
+            x = (n * np.arange(link.d)[:, None] + np.arange(link.n)).ravel()
+            held = self._held(joint)
+            G[i][np.ix_(x, x)] = part.G
+            Yt[i][np.ix_(held, x)] = part.Y.T
+            S[i][np.ix_(held, held)] = part.S
+            Wt[i][np.ix_(x, held)] = part.W.T
+            B[i].reshape(P * D, k)[held] = joint.B
+        return G, Yt, S, Wt, B
+
+    def _held(self, joint: Attachment) -> np.ndarray:
+        """Where the held components of a link stand among the padded ones."""
+        port, component = np.divmod(joint.keep, joint.components)
+        return np.asarray(self._sizes[0] * port + component)
+
+    def _ports_padded(self, joint: Attachment, force: np.ndarray) -> np.ndarray:
+        out = np.zeros((self._sizes[2], self._sizes[0]))
+        vectors = port_vectors(joint, force)
+        out[: len(vectors), : vectors.shape[1]] = vectors
+        return out.ravel()
+
+
+def _part(link: Link, joint: Attachment, c_M: float, c_K: float) -> _Part:
+    """A link in mass-orthonormal coordinates; its ports are held by a null-space basis, so that a long step, where A
+    nearly lets a free link go, does no harm."""
+    T = tuple(_mass_orthonormal(_dense(m)) for m in link.mass)
+    n, d = link.n, link.d
+    K = _dense(link.K0).reshape(n, d, n, d).transpose(1, 0, 3, 2)
+    K = np.concatenate(
+        [np.concatenate([T[i].T @ K[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)]
+    )
+    A = c_K * (K + K.T) / 2
+    A[np.diag_indices(len(A))] += c_M
+    W = port_columns(joint, n).T.reshape(-1, n, d).transpose(0, 2, 1)
+    W = np.concatenate([W[:, c] @ T[c] for c in range(d)], axis=1)
+    if not len(W):
+        return _Part(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W)
+    V, L = scipy.linalg.qr(W.T)
+    V1, Z = V[:, : len(W)], V[:, len(W) :]
+    factor = scipy.linalg.cho_factor(_symmetric(Z.T @ A @ Z))
+    G = Z @ scipy.linalg.cho_solve(factor, Z.T)
+    moved = V1 @ np.linalg.inv(L[: len(W)]).T  # W moved = 1
+    Y = moved - G @ (A @ moved)
+    return _Part(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W)
+
+
+def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
+    """T with Tᵀ m T = 1."""
+    if np.abs(m - np.eye(len(m))).max() < 1e-12:
+        return np.eye(len(m))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(m)).T)
+
+
+def _coordinates(link: Link, part: _Part, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+    """x of a state: T⁻¹ = Tᵀ m."""
+    return np.stack([part.T[c].T @ (link.mass[c] @ rows[:, c]) for c in range(link.d)])
+
+
+def _work(part: _Part, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+    """Nodal forces on x."""
+    return np.stack([T.T @ rows[:, c] for c, T in enumerate(part.T)])
+
+
+def _rows(link: Link, part: _Part, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
+    """States of x over time."""
+    return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=2)
+
+
+def _symmetric(A: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
+    return np.asarray((A + A.T) / 2)
+
+
+def _dense(matrix: Any) -> np.ndarray:
+    return matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)

@@ -1,0 +1,135 @@
+"""What the time integration hands on: all links over a block of time points."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.state import LinkState, Nominal
+from kedfem.motion.rigid import RigidMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Forcing:
+    """What rigid motion and loads do to one link over T time points.
+
+    R : (T, d, d) orientation, link to world
+    F : (T, n, d) P − M R0'', world components [N]
+    """
+
+    R: Float[np.ndarray, "T d d"]
+    F: Float[np.ndarray, "T n d"]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHistory:
+    """Elastic motion of one link over T time points.
+
+    u, v, a : (T, n, d) δ, δ', δ'', world components [m, m/s, m/s²; third row of a beam: ψ]
+    g : (T, n, d) δ in the link frame
+    R, F : as in `Forcing`
+    port_forces : (T, q) λ on the link at its ports, link frame [N]
+    strain : (T,) strain energy ½ gᵀ K0 g, [KED, eq. (13)] [J]
+    """
+
+    u: Float[np.ndarray, "T n d"]
+    v: Float[np.ndarray, "T n d"]
+    a: Float[np.ndarray, "T n d"]
+    g: Float[np.ndarray, "T n d"]
+    R: Float[np.ndarray, "T d d"]
+    F: Float[np.ndarray, "T n d"]
+    port_forces: Float[np.ndarray, "T q"]
+    strain: Float[np.ndarray, " T"]
+
+    def part(self, first: int, end: int) -> "LinkHistory":
+        """The time points from one number up to another."""
+        return LinkHistory(*(getattr(self, field.name)[first:end] for field in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class LinkMoment:
+    """`LinkHistory` at one time point, without the first dimension."""
+
+    u: Float[np.ndarray, "n d"]
+    v: Float[np.ndarray, "n d"]
+    a: Float[np.ndarray, "n d"]
+    g: Float[np.ndarray, "n d"]
+    R: Float[np.ndarray, "d d"]
+    F: Float[np.ndarray, "n d"]
+    port_forces: Float[np.ndarray, " q"]
+    strain: float
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Everything at T successive time points.
+
+    step : number of the first
+    motion : rigid motion at them
+    links : per link
+    """
+
+    step: int
+    motion: RigidMotion
+    links: Sequence[LinkHistory]
+
+    def __len__(self) -> int:
+        return len(self.motion.t)
+
+    def part(self, first: int, end: int) -> "Block":
+        """The time points from one number up to another."""
+        if (first, end) == (0, len(self)):
+            return self
+        links = [each.part(first, end) for each in self.links]
+        return Block(self.step + first, self.motion.part(first, end), links)
+
+    def at(self, k: int) -> "Snapshot":
+        """The k-th of its time points."""
+        moments = [
+            LinkMoment(**{f.name: getattr(each, f.name)[k] for f in fields(LinkMoment)})
+            for each in self.links
+        ]
+        return Snapshot(self.step + k, self.motion, k, moments)
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Everything at one time point: number of the step, rigid motion (entry k of a block), elastic states."""
+
+    step: int
+    motion: RigidMotion
+    k: int
+    states: list[LinkMoment]
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return float(self.motion.t[self.k])
+
+    @property
+    def phi(self) -> float:
+        """Drive angle [rad]."""
+        return float(self.motion.phi[self.k])
+
+
+def history(states: Sequence[LinkState]) -> LinkHistory:
+    """States of one link at successive time points, stacked."""
+    stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "g", "R", "F")}
+    return LinkHistory(
+        **stacked, port_forces=np.stack([s.port_forces for s in states]),
+        strain=np.array([0.5 * float(np.vdot(s.g, s.Kg)) for s in states]),
+    )  # fmt: skip
+
+
+def stepwise(
+    step: Callable[[Sequence[LinkState], Sequence[Nominal]], list[LinkState]],
+    states: list[LinkState],
+    forcing: Sequence[Forcing],
+) -> tuple[list[LinkHistory], list[LinkState]]:
+    """All time points of a block by a solver that takes one step at a time."""
+    taken = []
+    for k in range(len(forcing[0].R)):
+        states = step(states, [Nominal(each.R[k], each.F[k]) for each in forcing])
+        taken.append(states)
+    return [history([states[i] for states in taken]) for i in range(len(forcing))], states

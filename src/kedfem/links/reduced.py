@@ -1,0 +1,124 @@
+"""Links in the span of a few scalar functions: the equation stays what it is.
+
+Q (n, s) holds functions of a link, column by column. Q ⊗ Rᵈ is closed under rotation, so the reduced link is again a
+link: mass Qᵀ m Q, stiffness (Q ⊗ I)ᵀ K0 (Q ⊗ I) [KED, eqs. (12)(14)]. The same idea: Pechstein, Reischl, Gerstmayr
+(2013), "A generalized component mode synthesis approach for flexible multibody systems"; Gerstmayr, Schöberl (2006).
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.links.record import Link, read_only
+
+RIGID = 1e3
+
+
+def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
+    """The changed copy of a link that moves in the span of functions Q only.
+
+    Parameters
+    ----------
+    Q : (n, s) independent functions whose span holds 1 and the position [-]; they are made mass-orthonormal
+
+    Returns
+    -------
+    Link
+        With dense matrices; `full` and `Q` lead back to the link that it came from.
+    """
+    Q = mass_orthonormal(link, Q)
+    mass = tuple(_gram(m, Q) for m in link.mass)
+    mQ = np.asarray(link.mass[0] @ Q)
+    one, X = mQ.T @ link.one, mQ.T @ link.X
+    if (
+        link.planar
+    ):  # the height of a planar link's plane is not in the span of its functions: they need not know it
+        X[:, 2] = 0.0
+    K0 = projected_stiffness(link, Q)
+    m1, mX = Q.T @ link.m1, Q.T @ link.mX
+    volume = Q.T @ link.volume
+    read_only(Q, one, X, K0, m1, mX)
+    return replace(link, X=X, one=one, mass=mass, K0=K0, m1=m1, mX=mX, volume=volume, full=link, Q=Q)
+
+
+def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
+    """Q of a reduced link: weights of the full link @ Q are weights of its functions."""
+    if link.Q is None:
+        raise ValueError(f"link {link.name} is not reduced")
+    return link.Q
+
+
+def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
+    """Functions of the same span with Qᵀ m Q = 1."""
+    Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
+    for _ in range(2):  # the second time for rounding
+        values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
+        Q = Q @ (vectors / np.sqrt(values))
+    return np.ascontiguousarray(Q)
+
+
+def projected_stiffness(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "k k"]:
+    """(Q ⊗ I)ᵀ K0 (Q ⊗ I), scalar block by scalar block, (ds, ds) [KED, eq. (14)]."""
+    d, s = link.d, Q.shape[1]
+    out = np.empty((s, d, s, d))
+    for i, j in product(range(d), range(d)):
+        if i <= j:
+            out[:, i, :, j] = Q.T @ (scalar_block(link, i, j) @ Q)
+            out[:, j, :, i] = out[:, i, :, j].T
+    K0 = out.reshape(d * s, d * s)
+    return (K0 + K0.T) / 2
+
+
+def scalar_block(link: Link, i: int, j: int) -> sp.csr_array:
+    """Block (i, j) of the stiffness: the scalar matrix between components i and j, (n, n)."""
+    blocks = sp.bsr_array(link.K0, blocksize=(link.d, link.d))
+    return sp.csr_array((blocks.data[:, i, j].copy(), blocks.indices, blocks.indptr), shape=(link.n, link.n))
+
+
+def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s s"]:
+    G = Q.T @ np.asarray(m @ Q)
+    return np.asarray((G + G.T) / 2)
+
+
+def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
+    """1 and the coordinates, of planar links x and y; about the middle, so that they are far from dependent."""
+    X = link.X[:, :2] if link.planar else link.X
+    return np.concatenate([link.one[:, None], X - np.outer(link.one, X[link.one != 0].mean(axis=0))], axis=1)
+
+
+def rigid(link: Link) -> Link:
+    """The changed copy of a link that only moves rigidly: {1, x, y, z} made stiff.
+
+    Its own vibrations are put RIGID times above an axial wave's passing frequency √(E/ρ)/L.
+    """
+    made = reduced(link, rigid_functions(link))
+    density = float(link.m1[:, 0].sum() / link.volume.sum())
+    stiffness = (RIGID**2 * link.E / density) / link.size**2
+    B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
+    K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
+    return replace(made, K0=K0, rigid=True)
+
+
+def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
+    """States (dn,) of small rigid motion: translations and turns, column by column."""
+    translations = [np.outer(link.one, e) for e in np.eye(link.d)[: 2 if link.planar else 3]]
+    turns = []
+    for i, j in ((0, 1),) if link.planar else ((0, 1), (1, 2), (2, 0)):
+        u = np.zeros((link.n, link.d))
+        u[:, i], u[:, j] = -link.X[:, j], link.X[:, i]
+        if link.kind == "beam":
+            u[:, 2] = link.one
+        turns.append(u)
+    return np.stack([u.ravel() for u in (*translations, *turns)], axis=1)
+
+
+def _weighted(link: Link, A: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:
+    """M^½ A of a reduced link: only a beam's turning has another mass than 1."""
+    out = A.reshape(link.n, link.d, -1).copy()
+    for c, m in enumerate(link.mass):
+        values, vectors = np.linalg.eigh(m)
+        out[:, c] = (vectors * np.sqrt(values)) @ (vectors.T @ out[:, c])
+    return out.reshape(A.shape)

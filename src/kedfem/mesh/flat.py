@@ -1,0 +1,65 @@
+"""Plates before they have a third dimension: quadrilaterals with a thickness, and where they lie in the scene."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.mesh.hexahedra import HexMesh, extruded, placed
+from kedfem.mesh.plane import Quads
+
+
+@dataclass(frozen=True, slots=True)
+class QuadMesh:
+    """A mesh of quadrilaterals alone in a plane z = constant, every node used; the arrays are read-only copies.
+
+    Attributes
+    ----------
+    points : (n, 3) [m]
+        Nodes in the global reference position.
+    cells : (e, 9)
+        Node numbers in VTK order, anticlockwise (meshio: quad9).
+    thickness : float [m]
+        Extent along z, half of it to either side.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    cells: Int[np.ndarray, "e 9"]
+    thickness: float
+
+    def __post_init__(self) -> None:
+        for name, kind in (("points", np.float64), ("cells", np.int64)):
+            array = np.array(getattr(self, name), dtype=kind, order="C")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """A plate in a frame of its own, its middle plane at z = 0.
+
+    Attributes
+    ----------
+    quads : (n, 2) [m] and (e, 9)
+        Nodes and cells of the middle plane, all nodes used.
+    thickness : float [m]
+        Extent along z.
+    origin, axes : (3,) [m], (3, 3)
+        Where the frame's origin goes, and its x, y, z as rows.
+    """
+
+    quads: Quads
+    thickness: float
+    origin: Float[np.ndarray, "3"]
+    axes: Float[np.ndarray, "3 3"]
+
+
+def swept_mesh(plate: Plate, layers: int) -> HexMesh:
+    """hex27 mesh of a plate, with that many elements through its thickness."""
+    return placed(extruded(*plate.quads, plate.thickness, layers), plate.origin, plate.axes)
+
+
+def middle_mesh(plate: Plate) -> QuadMesh:
+    """quad9 mesh of a plate's middle plane."""
+    points, cells = plate.quads
+    return QuadMesh(plate.origin + points @ plate.axes[:2], cells, plate.thickness)
