@@ -173,7 +173,7 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     match body:
         case Flywheel(mass=mass, inertia=inertia):
             spin = unit((0, 0, 1)) if axis is None else axis
-            if link.kind != "beam" and not holds(seat, spin):
+            if not link.planar and not holds(seat, spin):
                 raise MeshError(f"{where}.at: a flywheel must sit on {_wide_seat(link)}")
             return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
         case PointMass(mass=mass):
