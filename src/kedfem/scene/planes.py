@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
 
 FLAT = 1e-9  # how far from the plane, relative to the size of the scene
+WORDS = ("fidelity", "beam", "kind", "link", "links")
 Key = tuple[str, *tuple[str | int, ...]]
 
 
@@ -33,8 +34,10 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
 
 
 def _entries(section: str, records: Mapping[str, Any], *above: str) -> dict[str, Entry]:
+    """Entries of records, with the keys that are looked up here."""
     return {
-        name: Entry((*above, section, name), record.model_dump(), record) for name, record in records.items()
+        name: Entry((*above, section, name), {key: getattr(record, key, None) for key in WORDS}, record)
+        for name, record in records.items()
     }
 
 
