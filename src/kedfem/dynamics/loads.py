@@ -60,7 +60,7 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
         case ForceLoad():
             rows = point_rows(link, f"{where}.at", np.asarray(load.at))
             beside = float(np.linalg.norm(rows.X - load.at))
-            if link.kind == "beam" and beside > 1e-6 * float(np.ptp(link.X, axis=0).max()):
+            if link.kind == "beam" and beside > 1e-6 * link.size:
                 raise SceneError(
                     f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
                 )

@@ -184,7 +184,7 @@ def _slider_on(slider: Slider, link: Link) -> Slider:
 
 def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     at = np.asarray(body.at)
-    near = 1e-6 * float(np.ptp(link.X, axis=0).max())
+    near = 1e-6 * link.size
     here = (
         j
         for j in scene.joints.values()
@@ -195,23 +195,32 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     match body:
         case Flywheel(mass=mass, inertia=inertia):
             spin = unit((0, 0, 1)) if axis is None else axis
-            if link.kind == "solid" and not holds(seat, spin):
-                raise MeshError(
-                    f"{where}.at: a flywheel must sit on a bore, or on a flat face that contains its axis"
-                )
+            if not link.planar and not holds(seat, spin):
+                raise MeshError(f"{where}.at: a flywheel must sit on {_wide_seat(link)}")
             return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
         case PointMass(mass=mass):
             return with_body(link, seat, mass, at, np.zeros((3, 3)))
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
-            if link.meshed and is_flat(seat):
+            if is_flat(seat):
+                wanted, got = (
+                    ("an end or a corner", "another node")
+                    if link.kind == "spatial_beam"
+                    else ("a bore", "a flat face")
+                )
                 raise MeshError(
-                    f"{where}.at: a rigid body with full inertia must sit on a bore, got a flat face of '{link.name}'"
+                    f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
                 )
             if link.kind == "beam" and np.linalg.norm(np.subtract(centre, at)[:2]) > 1e-9:
                 raise SceneError(
                     f"{where}.centre: a body on a planar beam must have its centre at its point {body.at}, got {centre}"
                 )
             return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+
+
+def _wide_seat(link: Link) -> str:
+    if link.kind == "spatial_beam":
+        return "an end or a corner of the beam, or have its axis across the beam"
+    return "a bore, or on a flat face that contains its axis"
 
 
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:

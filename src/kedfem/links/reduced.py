@@ -96,7 +96,7 @@ def rigid(link: Link) -> Link:
     """
     made = reduced(link, rigid_functions(link))
     density = float(link.m1[:, 0].sum() / link.volume.sum())
-    stiffness = (RIGID**2 * link.E / density) / float(np.ptp(link.X, axis=0).max()) ** 2
+    stiffness = (RIGID**2 * link.E / density) / link.size**2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)

@@ -70,7 +70,7 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
 
         return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
     beside = float(np.linalg.norm(at.X - probe.at))
-    if link.kind == "beam" and beside > 1e-6 * float(np.ptp((link.full or link).X, axis=0).max()):
+    if link.kind == "beam" and beside > 1e-6 * link.size:
         raise SceneError(
             f"output.probes.{name}.at: must lie on the axis of beam '{link.name}' for a {probe.quantity}, "
             f"got {beside:.3g} m beside it"
