@@ -200,7 +200,7 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wre
 def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
     """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
     force, moment = _loose(model, k, joint, at)
-    return _small(force), _small(moment)
+    return _small(force), _small(force) and _small(moment)
 
 
 def _loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
