@@ -147,7 +147,7 @@ def deep_beam_in_space() -> list[Row]:
     ]
     targets = [BENDING[0], BENDING[0], TORSION, AXIAL, BENDING[1], BENDING[1], 3 * TORSION, BENDING[2]]
     return [
-        Row(f"{n} [Hz]", t, float(g), 1e-3 if "torsion" in n else 1e-5, text_of(link, "40 beam3"))
+        Row(f"{n} [Hz]", t, float(g), 1e-3 if "torsion" in n else 5e-5, text_of(link, "40 beam3"))
         for n, t, g in zip(names, targets, got, strict=True)
     ]
 

@@ -297,10 +297,7 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     anchors = anchors_of(link)
     if link.full is not None:
         return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
-    stiffness = link.K0.diagonal()[anchors]
-    if link.kind != "spatial_beam":  # whose values and slopes differ by lengths squared
-        stiffness = np.full(len(anchors), stiffness.mean())
-    kappa = ANCHORAGE * c_K * stiffness
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     return substructure(
