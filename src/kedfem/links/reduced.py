@@ -15,6 +15,7 @@ from jaxtyping import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
+ROUNDING = 1e-15
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
@@ -54,9 +55,9 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
     """Functions of the same span with Qᵀ m Q = 1."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
-    for _ in range(2):  # the second time for rounding
+    for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
-        Q = Q @ (vectors / np.sqrt(values))
+        Q = Q @ (vectors / np.sqrt(np.maximum(values, ROUNDING * values[-1])))
     return np.ascontiguousarray(Q)
 
 
