@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy.interpolate
 from jaxtyping import Bool, Float, Int
 
 from kedfem.links.beam import line_axes
@@ -65,7 +64,9 @@ def smooth_axis(
     up : the section's z at the first point is as near to it as can be
     """
     chord = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
-    curve = scipy.interpolate.CubicSpline(chord, points)
+    from scipy.interpolate import CubicSpline
+
+    curve = CubicSpline(chord, points)
     steps = elements * (nodes - 1)
     number = np.arange((len(points) - 1) * steps + 1)
     s = np.interp(number / steps, np.arange(len(points)), chord)
