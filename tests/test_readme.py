@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from kedfem.accuracy.plan import planned
+from kedfem.scene import scene_from
+
 from kedfem.mesh.session import SYSTEM_PACKAGES
 from kedfem.scene import read_scene
 
@@ -33,7 +36,7 @@ def commands() -> list[str]:
 def test_the_scene_and_the_python_of_the_readme_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (scene,) = blocks("toml")
+    scene, accurate = blocks("toml")
     (code,) = blocks("python")
     (name,) = re.findall(r'read_scene\("(.*)"\)', code)
     monkeypatch.chdir(tmp_path)
@@ -48,6 +51,8 @@ def test_the_scene_and_the_python_of_the_readme_run(
         "plots",
         "worst.png",
     }
+    whole = scene.replace(scene[scene.index("[analysis]") : scene.index("[output.probes")], accurate)
+    assert planned(scene_from(tomllib.loads(whole))).reached
 
 
 def test_every_command_of_the_readme_is_there() -> None:
