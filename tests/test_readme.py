@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 
 from kedfem.accuracy.plan import planned
-from kedfem.scene import scene_from
-
 from kedfem.mesh.session import SYSTEM_PACKAGES
-from kedfem.scene import read_scene
+from kedfem.scene import read_scene, scene_from
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

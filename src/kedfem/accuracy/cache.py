@@ -5,9 +5,10 @@ that it depends on: the scene, the contents of its files, the versions of kedfem
 read is made again.
 """
 
+import json
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
@@ -60,30 +61,42 @@ def _made(what: str, key: str, made: Callable[[], Any]) -> Any:
 
 
 def cache_folder() -> Path | None:
-    """Where entries are kept; None if nowhere."""
+    """Where entries are kept; None if nowhere, or if the folder cannot be made."""
     given = os.environ.get("KEDFEM_CACHE")
-    if given is not None:
-        return None if given in {"", "off"} else Path(given)
+    if given in {"", "off"}:
+        return None
     from platformdirs import user_cache_path
 
-    return user_cache_path("kedfem")
+    folder = Path(given) if given else user_cache_path("kedfem")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder
 
 
 def key(scene: Scene) -> str:
     """A digest of everything that a plan or a reduced model depends on."""
     digest = sha256(_software().encode())
-    output: Any = {"output": {"folder", "csv", "plots", "picture", "animation"}, "title": True}
-    digest.update(scene.model_dump_json(exclude=output).encode())
-    for link in scene.links.values():
-        if isinstance(link.shape, MeshFile | Part):
-            digest.update((scene.folder / link.shape.file).read_bytes())
+    said = scene.model_dump(mode="json", exclude={"title"})
+    said["output"] = said["output"]["probes"]
+    digest.update(json.dumps(said).encode())
+    shapes = (link.shape for link in scene.links.values())
+    digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, MeshFile | Part)))
     return digest.hexdigest()
+
+
+def contents(files: Iterable[Path]) -> bytes:
+    """A digest of what files hold."""
+    digest = sha256()
+    for file in files:
+        digest.update(sha256(file.read_bytes()).digest())
+    return digest.digest()
 
 
 @cache
 def _software() -> str:
     """kedfem's own source, since versions do not change while it is worked on, and the libraries' versions."""
     digest = sha256(" ".join(f"{name} {version(name)}" for name in LIBRARIES).encode())
-    for file in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(file.read_bytes())
+    digest.update(contents(sorted(Path(__file__).parents[1].rglob("*.py"))))
     return digest.hexdigest()
