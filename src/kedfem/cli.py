@@ -85,6 +85,43 @@ def check(scene: ScenePath) -> None:
 
 
 @app.command()
+def accuracy(
+    scene: ScenePath,
+    folder: Annotated[
+        Path | None, typer.Option(help="Where table and plot go; default: SCENE-accuracy beside the scene.")
+    ] = None,
+    repeats: Annotated[int, typer.Option(help="Runs of short variants; medians are shown.")] = 3,
+    most: Annotated[float, typer.Option(metavar="SECONDS", help="What the whole study may take.")] = 60.0,
+    quick: Annotated[bool, typer.Option("--quick", help="A small reference and few variants.")] = False,
+) -> None:
+    """Run a scene in many variants: how fast, how near to the finest."""
+    from kedfem.accuracy.study import studied
+    from kedfem.accuracy.study_files import write_study, write_study_plot
+    from kedfem.bench.machine import machine
+    from kedfem.report import study_tables
+    from kedfem.results import ready_folder
+    from kedfem.scene import read_scene
+
+    if repeats < 1:
+        raise SceneError(f"--repeats: must be at least 1, got {repeats}")
+    if not 0.0 < most < float("inf"):
+        raise SceneError(f"--most: must be positive [s], got {most:g}")
+    loaded = read_scene(scene)
+    target = ready_folder(folder or scene.with_name(f"{scene.stem}-accuracy"))
+    try:
+        with _progress() as watch:
+            study = studied(loaded, most, repeats, quick, watch)
+    except KeyboardInterrupt:
+        err.print("interrupted; nothing was written", style="yellow")
+        raise typer.Exit(INTERRUPTED) from None
+    for table in study_tables(study, machine()):
+        out.print(table)
+    for name, write in (("accuracy.csv", write_study), ("accuracy.png", write_study_plot)):
+        write(study, target / name, machine())
+        out.print(f"{target / name}", markup=False, soft_wrap=True)
+
+
+@app.command()
 def new(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + ".")],
     path: Annotated[Path | None, typer.Argument(metavar="[FILE]", help="Default: KIND.toml here.")] = None,

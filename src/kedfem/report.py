@@ -7,6 +7,7 @@ from rich.text import Text
 from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
+from kedfem.accuracy.study import Measured, Study
 from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
@@ -24,6 +25,10 @@ ELEMENTS = {
     "line3": "beam3",
     "line": "beam2",
 }
+STUDY_COLUMNS = (
+    "fidelity", "mesh", "steps", "reduction", "unknowns", "prepare", "step", "whole", "error",
+    "worst channel",
+)  # fmt: skip
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -189,3 +194,48 @@ def _cost(ready: Prepared, cost: Cost) -> Table:
         f"{len(frame_steps(ready.scene))}, about {with_prefix(cost.frame_bytes, 'B')} each",
     )
     return table
+
+
+def study_tables(study: Study, machine: str) -> list[Table]:
+    """Variants by time with their errors, and what the reference's own error is made of."""
+    table = Table(title=Text(f"Speed against error: {study.title}"))
+    for column in STUDY_COLUMNS:
+        left = column in {"fidelity", "worst channel"}
+        table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
+    ran = [row for row in study.rows if row.seconds]
+    for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
+        table.add_row(*_study_row(row, study), style="bold" if row.front else None)
+    shares = ", ".join(f"{name} {_percent(share)}" for name, share in study.shares.items())
+    unknown = "" if "mesh" in study.shares else "; its mesh could not be compared with a coarser one"
+    table.caption = Text(
+        f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
+        f"{study.reference.variant.name}, whose own is about {_percent(study.floor)} ({shares or 'not known'}{unknown}): "
+        f"≤ is below that. prepare, step, whole: seconds, medians; {machine}"
+    )
+    return [table, _not_run(study)] if len(ran) < len(study.rows) else [table]
+
+
+def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
+    if row.seconds is None:
+        raise ValueError(f"{row.variant.name} was not run")
+    v, s = row.variant, row.seconds
+    model = (v.fidelity.name, f"{v.fineness:g}", f"{v.steps}", f"{v.tolerance:.0e}" if v.tolerance else "-")
+    times = (f"{s.preparation:.2f}", f"{s.stepping:.2f}", f"{s.whole:.2f}")
+    below = row.error <= study.floor
+    found = (f"≤ {_percent(study.floor)}" if below else _percent(row.error), row.worst_channel)
+    if v == study.reference.variant:
+        found = ("reference", "")
+    return (*model, str(row.unknowns), *times, *found)
+
+
+def _not_run(study: Study) -> Table:
+    """Variants that were not run, by reason."""
+    table = Table(title="Not run", show_header=False)
+    for row in study.rows:
+        if row.seconds is None:
+            table.add_row(row.variant.name, Text(row.note))
+    return table
+
+
+def _percent(x: float) -> str:
+    return f"{100 * x:.2g} %"

@@ -1,6 +1,6 @@
 """Runs kept in memory, and how far they are apart."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +29,15 @@ class Histories:
     kept: tuple[Snapshot, ...] = ()
 
 
-def histories(ready: Prepared, keep: Collection[int] = ()) -> Histories:
+def histories(
+    ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None
+) -> Histories:
     """Run a prepared scene and keep its channels.
 
     Parameters
     ----------
     keep : numbers of the steps whose states are kept too
+    watch : called now and then; what it raises ends the run
     """
     recorded = recording(ready.scene, ready.model)
     times, taken, kept = [], [], []
@@ -42,6 +45,7 @@ def histories(ready: Prepared, keep: Collection[int] = ()) -> Histories:
     for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
         times.append(block.motion.t)
         taken.append(rows(recorded, block))
+        watch()
         kept += [block.at(k) for k in range(len(block)) if block.step + k in keep]
     channels = {
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))

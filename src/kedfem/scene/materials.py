@@ -40,7 +40,8 @@ class Material(Record):
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         dumped: dict[str, Any] = handler(self)
-        dumped.pop("shear_modulus" if "poisson_ratio" in self.model_fields_set else "poisson_ratio")
+        derived = "shear_modulus" if "poisson_ratio" in self.model_fields_set else "poisson_ratio"
+        dumped.pop(derived, None)
         return dumped
 
     def lame(self) -> tuple[float, float]:

@@ -1,0 +1,293 @@
+"""Speed against error: a scene in many variants, measured and compared with its own finest one."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from statistics import median
+from time import perf_counter
+
+from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.menu import (
+    FINENESS,
+    STEPS,
+    Fidelity,
+    Variant,
+    coarser,
+    exponent,
+    first_variants,
+    further_variants,
+    reference_variant,
+    varied,
+)  # fmt: skip
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import reduced
+from kedfem.dynamics.cost import estimated_cost
+from kedfem.errors import KedfemError, SceneError
+from kedfem.scene import Scene, time_grid
+
+Watch = Callable[[str, int, int], None]
+SHORT = 0.02  # of the budget: runs that take less are repeated
+PREFERRED = 3.0  # the scene's own mesh and step come before others that take a third of its time
+FOR_REFERENCE = 0.75  # of what is left of the budget: the reference and its two coarser neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class Seconds:
+    """Medians over several runs: preparation, stepping, both together."""
+
+    preparation: float
+    stepping: float
+    whole: float
+    runs: int
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One variant of a study.
+
+    steps, unknowns : how many
+    seconds : None where it was not run; then the note says why
+    errors : relative error of every channel that counts, against the reference
+    front : whether no other variant is both faster and nearer
+    """
+
+    variant: Variant
+    steps: int = 0
+    unknowns: int = 0
+    seconds: Seconds | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    front: bool = False
+    note: str = ""
+
+    @property
+    def error(self) -> float:
+        """The worst channel's."""
+        return worst(self.errors)
+
+    @property
+    def worst_channel(self) -> str:
+        """Its name."""
+        return max(self.errors, key=lambda name: self.errors[name], default="")
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """All variants of a scene.
+
+    reference : with which all are compared
+    shares : parts of the reference's own error, estimated: mesh, step, reduction (worst channel each)
+    rows : in the order in which they were run; those that were not run at the end
+    """
+
+    title: str
+    reference: Measured
+    shares: dict[str, float]
+    rows: tuple[Measured, ...]
+
+    @property
+    def floor(self) -> float:
+        """Estimated error of the reference: errors below it are not known."""
+        return sum(self.shares.values())
+
+
+class _LateError(Exception):
+    """The budget is spent."""
+
+
+@dataclass
+class _Bench:
+    """What was measured so far, and the time that is left."""
+
+    scene: Scene
+    most: float
+    repeats: int
+    watch: Watch
+    since: float = field(default_factory=perf_counter)
+    rows: dict[Variant, Measured] = field(default_factory=dict)
+    runs: dict[Variant, Histories] = field(default_factory=dict)
+    estimates: dict[Variant, float] = field(default_factory=dict)
+    in_full: dict[Variant, float] = field(default_factory=dict)
+
+    @property
+    def left(self) -> float:
+        return self.most - (perf_counter() - self.since)
+
+    def tick(self) -> None:
+        """Raises when the budget is spent."""
+        if self.left < 0.0:
+            raise _LateError
+
+    def stage(self, name: str) -> None:
+        self.tick()
+
+    def run(self, variant: Variant) -> bool:
+        """Measure a variant, or note why it cannot be; whether it ran."""
+        if variant not in self.rows:
+            self.watch(variant.name, int(self.most - self.left), int(self.most))
+            try:
+                self.rows[variant] = self._measured(variant)
+            except KedfemError as error:
+                self.rows[variant] = Measured(variant, note=str(error).splitlines()[0])
+            except _LateError:
+                self.rows[variant] = Measured(variant, note="left out: the time was spent while it ran")
+        return self.rows[variant].seconds is not None
+
+    def _measured(self, variant: Variant) -> Measured:
+        scene = varied(self.scene, variant)
+        times: list[tuple[float, float]] = []
+        while not times or (
+            len(times) < self.repeats and sum(times[0]) < SHORT * self.most and self.left > 0
+        ):
+            *spent, unknowns = self._once(scene, variant)
+            times.append((spent[0], spent[1]))
+        preparation, stepping = zip(*times, strict=True)
+        seconds = Seconds(median(preparation), median(stepping), median(map(sum, times)), len(times))
+        return Measured(variant, time_grid(scene).steps, int(unknowns), seconds)
+
+    def _once(self, scene: Scene, variant: Variant) -> tuple[float, float, int]:
+        """Seconds to prepare and to step, unknowns."""
+        begun = perf_counter()
+        ready = meshed(scene, self.stage)
+        if variant.tolerance is not None:
+            cost = estimated_cost(scene, ready.model)
+            full = replace(variant, fidelity=replace(variant.fidelity, reduced=False), tolerance=None)
+            self.in_full[full] = perf_counter() - begun + cost.factor + cost.steps
+            chosen = [name for name, link in scene.links.items() if link.reduced]
+            found = reduced(ready, chosen, variant.tolerance, stage=self.stage)
+            ready, self.estimates[variant] = found.ready, worst(found.estimate)
+        prepared = perf_counter()
+        self.runs[variant] = histories(ready, watch=self.tick)
+        return prepared - begun, perf_counter() - prepared, ready.model.unknowns
+
+    def expected(self, variant: Variant) -> float:
+        """Seconds that a variant may take, judged by the most similar one that ran; infinite without one."""
+        alike = [
+            row for row in self.rows.values() if row.seconds and row.variant.fidelity == variant.fidelity
+        ]
+        if not alike:
+            return self.in_full.get(variant, float("inf"))
+        row = max(alike, key=lambda row: (row.variant.fineness <= variant.fineness, row.variant.fineness))
+        seconds, before = row.seconds or Seconds(0.0, 0.0, 0.0, 0), row.variant
+        more = (variant.fineness / before.fineness) ** exponent(self.scene, variant.fidelity)
+        steps = variant.steps / before.steps
+        tighter = 1.5 if (variant.tolerance or 1.0) < 0.5 * (before.tolerance or 1.0) else 1.0
+        stepping = seconds.stepping * steps * (more**1.2 if variant.tolerance is None else tighter**2)
+        return float(seconds.preparation * tighter * more**0.9 * max(1.0, steps) ** 0.4 + stepping)
+
+
+def studied(
+    scene: Scene, most: float = 60.0, repeats: int = 3, quick: bool = False,
+    watch: Watch = lambda stage, done, total: None,
+) -> Study:  # fmt: skip
+    """Run a scene in many variants and compare them with the finest that fits the budget.
+
+    Parameters
+    ----------
+    most : seconds that the study may take; variants that do not fit are left out
+    repeats : runs of short variants, whose medians are taken
+    quick : a small reference and few variants
+
+    Raises
+    ------
+    KedfemError
+        If no variant can be run, with the reason of the first.
+    """
+    bench = _Bench(scene, most, repeats, watch)
+    first = first_variants(scene)
+    if not first:
+        raise SceneError("links: must hold an elastic link with a shape, got rigid ones only")
+    _warm_up(bench, first[0])
+    for variant in first:
+        if variant.fidelity.reduced or _reduced(variant) not in [each.fidelity for each in first]:
+            bench.run(variant)
+    reference = _reference(bench, quick)
+    further = [*first, *([] if quick else further_variants(scene, reference))]
+    for variant in sorted(further, key=lambda v: bench.expected(v) / (PREFERRED if v in first else 1.0)):
+        if variant in bench.rows or _unbuildable(bench, variant):
+            continue
+        expected = bench.expected(variant)
+        if expected > bench.left:
+            known = f": would take about {expected:.0f} s" if expected < float("inf") else " with its like"
+            bench.rows[variant] = Measured(variant, note=f"left out{known}")
+        else:
+            bench.run(variant)
+    return _compared(bench, reference)
+
+
+def _reduced(variant: Variant) -> Fidelity:
+    return replace(variant.fidelity, reduced=True)
+
+
+def _warm_up(bench: _Bench, variant: Variant) -> None:
+    """Load libraries and compile the inner loop before the clock runs."""
+    bench.run(variant)
+    bench.rows.clear()
+
+
+def _unbuildable(bench: _Bench, variant: Variant) -> bool:
+    """Whether the same fidelity failed already: one row says why."""
+    return any(
+        row.variant.fidelity == variant.fidelity
+        and row.seconds is None
+        and not row.note.startswith("left out")
+        for row in bench.rows.values()
+    )
+
+
+def _reference(bench: _Bench, quick: bool) -> Variant:
+    """Run the finest variant that fits the budget, and its coarser neighbours; if it fails the next."""
+    finest = [(f, STEPS[-1]) for f in FINENESS[:0:-1]] if not quick else []
+    for fineness, steps in (*finest, (1.5, 2), (1.0, STEPS[-1]), (1.0, 2)):
+        variant = reference_variant(bench.scene, fineness, steps)
+        together = [variant, *(each for *_, each in coarser(variant))]
+        if sum(bench.expected(each) for each in together) <= FOR_REFERENCE * bench.left and bench.run(
+            variant
+        ):
+            for *_, each in coarser(variant):
+                bench.run(each)
+            return variant
+    ran = [variant for variant, row in bench.rows.items() if row.seconds]
+    if not ran:
+        note = next(iter(bench.rows.values())).note
+        late = f"most: must leave time for a run, got {bench.most:g} s"
+        raise SceneError(late if note.startswith("left out") else note)
+    return max(ran, key=lambda v: first_variants(bench.scene).index(v) if v.fidelity.rigid is None else -1)
+
+
+def _compared(bench: _Bench, reference: Variant) -> Study:
+    """Errors of all that ran, and the reference's own."""
+    finest = bench.runs[reference]
+    shares = {}
+    for direction, factor, variant in coarser(reference):
+        if variant in bench.runs and bench.rows[variant].seconds:
+            change = worst(relative_errors(bench.runs[variant], finest))
+            shares[direction] = change / (factor**2 - 1)
+    if reference in bench.estimates:
+        shares["reduction"] = bench.estimates[reference]
+    rows = [
+        replace(row, errors=relative_errors(bench.runs[variant], finest)) if row.seconds else row
+        for variant, row in bench.rows.items()
+    ]
+    floor = sum(shares.values())
+    ran = [row for row in rows if row.seconds]
+    on = pareto_front([(row.seconds.whole, max(row.error, floor)) for row in ran if row.seconds])
+    ran = [replace(row, front=k in on) for k, row in enumerate(ran)]
+    rest = [row for row in rows if not row.seconds]
+    found = next(row for row in ran if row.variant == reference)
+    return Study(bench.scene.title or "kedfem", found, shares, (*ran, *rest))
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> set[int]:
+    """Numbers of the points (time, error) that no other one beats in both.
+
+    >>> sorted(pareto_front([(1.0, 0.1), (2.0, 0.2), (3.0, 0.05), (3.0, 0.05)]))
+    [0, 2]
+    """
+    return set(_undominated(points))
+
+
+def _undominated(points: Sequence[tuple[float, float]]) -> Iterator[int]:
+    least = float("inf")
+    for k in sorted(range(len(points)), key=lambda k: points[k]):
+        if points[k][1] < least:
+            least = points[k][1]
+            yield k

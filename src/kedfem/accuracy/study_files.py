@@ -1,0 +1,124 @@
+"""A study as a table for spreadsheets and as a plot of time against error."""
+
+import csv
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+from kedfem.accuracy.study import Measured, Study
+from kedfem.results.files import replacing
+
+COLUMNS = (
+    "fidelity", "fineness", "times the steps", "reduction", "steps", "unknowns", "preparation [s]", "stepping [s]",
+    "whole [s]", "runs", "error", "worst channel", "on the front", "note",
+)  # fmt: skip
+MARKERS = "osD^vP*X<>"
+
+
+def study_rows(study: Study) -> list[dict[str, str]]:
+    """One row per variant; numbers have the digits that give back the same float."""
+    return [dict(zip(COLUMNS, _row(row), strict=True)) for row in study.rows]
+
+
+def _row(row: Measured) -> tuple[str, ...]:
+    v, s = row.variant, row.seconds
+    tolerance = "" if v.tolerance is None else repr(v.tolerance)
+    model = (v.fidelity.name, repr(v.fineness), str(v.steps), tolerance)
+    if s is None:
+        return (*model, *[""] * 9, row.note)
+    times = (repr(s.preparation), repr(s.stepping), repr(s.whole), str(s.runs))
+    found = (repr(row.error), row.worst_channel, "yes" if row.front else "no", row.note)
+    return (*model, str(row.steps), str(row.unknowns), *times, *found)
+
+
+def write_study(study: Study, path: Path, machine: str) -> None:
+    """Write all variants as comma-separated values, below the machine's name and the reference's own error.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# measured on: {machine}\n")
+        file.write(f"# reference: {study.reference.variant.name}; its own error about {study.floor!r}\n")
+        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows(study_rows(study))
+
+
+def read_study(path: Path) -> list[dict[str, str]]:
+    """The rows of a written study."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def write_study_plot(study: Study, path: Path, machine: str) -> None:
+    """Time against error, one marker per fidelity; the front is drawn and its points are named.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 7.0), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    ran = [row for row in study.rows if row.seconds]
+    least = _least(study, ran)
+    for marker, name in zip(
+        cycle(MARKERS), dict.fromkeys(row.variant.fidelity.name for row in ran), strict=False
+    ):
+        points = [_point(row, least) for row in ran if row.variant.fidelity.name == name]
+        axes.plot(*zip(*points, strict=True), marker, label=name, markersize=7, alpha=0.75)
+    front = _front(ran, least)
+    axes.plot(*zip(*(point for point, _ in front), strict=True), color="0.2", linewidth=1.0, zorder=1)
+    axes.set(xscale="log", yscale="log")
+    _name_points(axes, front)
+    axes.axhline(least, color="0.5", linestyle="--", linewidth=0.8)
+    axes.set_xlabel("seconds of the whole run: preparation and all steps")
+    axes.set_ylabel("largest relative error of probes, joint forces and drive torque")
+    axes.grid(visible=True, which="major", alpha=0.3)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    below = f"dashed: error of the reference itself, {study.reference.variant.name}"
+    title = study.title.replace("$", r"\$")
+    axes.set_title(f"{title}\n{below}\n{machine}", loc="left", fontsize=9)
+    with replacing(path) as part:
+        figure.savefig(part, format="png")
+
+
+def _least(study: Study, ran: Sequence[Measured]) -> float:
+    """Where errors that are not known are drawn."""
+    known = [row.error for row in ran if row.error > 0.0]
+    return study.floor or (0.5 * min(known) if known else 1e-6)
+
+
+def _point(row: Measured, least: float) -> tuple[float, float]:
+    if row.seconds is None:
+        raise ValueError(f"{row.variant.name} was not run")
+    return row.seconds.whole, max(row.error, least)
+
+
+def _front(ran: Sequence[Measured], least: float) -> list[tuple[tuple[float, float], Measured]]:
+    return sorted(((_point(row, least), row) for row in ran if row.front), key=lambda pair: pair[0])
+
+
+def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], Measured]]) -> None:
+    """Numbers at the points of the front, their names in a list beside the axes."""
+    lines = []
+    for number, (point, row) in enumerate(front, start=1):
+        axes.annotate(
+            str(number),
+            point,
+            xytext=(-6, -6),
+            textcoords="offset points",
+            ha="right",
+            va="top",
+            weight="bold",
+        )
+        lines.append(f"{number}  " + row.variant.name.replace(", mesh", ",\n    mesh", 1))
+    axes.text(1.02, 0.0, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=8)
