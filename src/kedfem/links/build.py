@@ -19,23 +19,18 @@ def bare_links(scene: Scene) -> dict[str, Link]:
     MeshError
         If a link cannot be meshed well enough.
     """
-    return {
-        name: _bare_link(scene, name, link) for name, link in scene.links.items() if link.shape is not None
-    }
+    return {name: bare_link(scene, name) for name, link in scene.links.items() if link.shape is not None}
 
 
-def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
-    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
-    match link.shape:
-        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
-            return line_axes(np.asarray(a), np.asarray(b))
-        case Polyline(points=points):
-            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
-        case _:
-            return np.eye(3)
+def bare_link(scene: Scene, name: str) -> Link:
+    """The record of one link that has a shape, without attached bodies.
 
-
-def _bare_link(scene: Scene, name: str, link: LinkScene) -> Link:
+    Raises
+    ------
+    MeshError
+        If it cannot be meshed well enough.
+    """
+    link = scene.links[name]
     material = scene.materials[str(link.material)]
     if link.family == "solid":
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
@@ -49,3 +44,14 @@ def _bare_link(scene: Scene, name: str, link: LinkScene) -> Link:
     elements = link.mesh.elements
     nodes = 3 if link.element == "beam3" else 2
     return beam_link(name, points, section, material, elements if isinstance(elements, int) else 1, nodes)
+
+
+def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
+    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
+    match link.shape:
+        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
+            return line_axes(np.asarray(a), np.asarray(b))
+        case Polyline(points=points):
+            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
+        case _:
+            return np.eye(3)
