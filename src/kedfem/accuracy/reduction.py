@@ -6,7 +6,7 @@ measured in the norm dual to the energy's, carried through time. If it is above 
 kept and the same is done again.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,31 +104,39 @@ def reduced(
     """
     stage("functions")
     parts = static_parts(full.model)
-    found = bases(full.model, instants(full.model, _training(full)), parts)
+    needed = [link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL]
+    found = bases(full.model, instants(full.model, _training(full)), parts, needed)
     given = counts or {}
     Q: Functions = [
-        basis.first(given.get(link.name, basis.count(FIRST * tolerance)))
-        if link.name in chosen or link.unknowns > SMALL else None
+        None if basis is None else basis.first(given.get(link.name, basis.count(FIRST * tolerance)))
         for link, basis in zip(full.model.links, found, strict=True)
-    ]  # fmt: skip
+    ]
     stage("error of the reduction")
     Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
 
 
-def first_reduced(full: Prepared, tolerance: float) -> Prepared:
-    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at."""
-    if all(link.unknowns <= SMALL and link.full is None for link in full.model.links):
+def first_reduced(
+    full: Prepared, tolerance: float, known: Mapping[str, Float[np.ndarray, "_ _"]] | None = None
+) -> Prepared:
+    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
+
+    Parameters
+    ----------
+    known : functions of links that need not be found any more
+    """
+    links = full.model.links
+    if all(link.unknowns <= SMALL and link.full is None for link in links):
         return full
-    found = bases(full.model, instants(full.model, _training(full)), static_parts(full.model))
-    Q = [
-        None
-        if link.unknowns <= MINUTE or link.full is not None
-        else basis.first(basis.count(FIRST * tolerance))
-        for link, basis in zip(full.model.links, found, strict=True)
-    ]
-    return replace(full, model=reduced_model(full.model, Q))
+    given = [None if known is None else known.get(link.name) for link in links]
+    model = reduced_model(full.model, given)
+    left = [link.name for link in model.links if link.unknowns > MINUTE and link.full is None]
+    if not left:
+        return replace(full, model=model)
+    found = bases(model, instants(model, _training(full)), static_parts(model), only=left)
+    Q = [None if basis is None else basis.first(basis.count(FIRST * tolerance)) for basis in found]
+    return replace(full, model=reduced_model(model, Q))
 
 
 def _settled(

@@ -1,6 +1,6 @@
 """The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -85,8 +85,12 @@ class Model:
         return self.unknowns - held + int(self.joints[0].B.shape[1])
 
 
-def elastic_model(scene: Scene, linkage: Linkage) -> Model:
+def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None) -> Model:
     """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
+
+    Parameters
+    ----------
+    bare : `bare_links` of the scene, if they are there already
 
     Raises
     ------
@@ -95,7 +99,7 @@ def elastic_model(scene: Scene, linkage: Linkage) -> Model:
     SceneError
         If a load or body does not fit its link.
     """
-    links = bare_links(scene)
+    links = bare_links(scene) if bare is None else dict(bare)
     for key, body in scene.bodies.items():
         if body.link in links:
             links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])

@@ -32,32 +32,24 @@ def bare_links(scene: Scene) -> dict[str, Link]:
     MeshError
         If a link cannot be meshed well enough.
     """
-    spatial = spatial_beams(scene)
-    return {
-        name: _bare_link(scene, name, link, name in spatial)
-        for name, link in scene.links.items()
-        if link.shape is not None
-    }
+    return {name: bare_link(scene, name) for name, link in scene.links.items() if link.shape is not None}
 
 
-def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
-    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
-    match link.shape:
-        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
-            return line_axes(np.asarray(a), np.asarray(b))
-        case Polyline(points=points):
-            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
-        case _:
-            return np.eye(3)
+def bare_link(scene: Scene, name: str) -> Link:
+    """The record of one link that has a shape, without attached bodies.
 
-
-def _bare_link(scene: Scene, name: str, link: LinkScene, spatial: bool) -> Link:
+    Raises
+    ------
+    MeshError
+        If it cannot be meshed well enough.
+    """
+    link = scene.links[name]
     material = scene.materials[str(link.material)]
     if link.family == "solid":
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
     if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
-    return _beam(name, link, material, spatial)
+    return _beam(name, link, material, name in spatial_beams(scene))
 
 
 def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link:
@@ -80,3 +72,14 @@ def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link
 
 def _of_bar(bar: Bar) -> RectangleSection:
     return RectangleSection(width=bar.width, thickness=bar.thickness)
+
+
+def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
+    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
+    match link.shape:
+        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
+            return line_axes(np.asarray(a), np.asarray(b))
+        case Polyline(points=points):
+            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
+        case _:
+            return np.eye(3)

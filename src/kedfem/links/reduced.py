@@ -16,6 +16,8 @@ from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
 ROUNDING = 1e-15
+STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
+INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
@@ -53,11 +55,13 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
 
 
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
-    """Functions of the same span with Qᵀ m Q = 1."""
+    """Functions of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
     for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
         Q = Q @ (vectors / np.sqrt(np.maximum(values, ROUNDING * values[-1])))
+        kept = values > INDEPENDENT * values[-1]
+        Q = Q @ (vectors[:, kept] / np.sqrt(values[kept]))
     return np.ascontiguousarray(Q)
 
 
@@ -85,9 +89,11 @@ def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s 
 
 
 def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
-    """1 and the coordinates, of planar links x and y; about the middle, so that they are far from dependent."""
+    """1 and the coordinates about the middle, of planar links x and y only; of a straight beam the one along it."""
     X = link.X[:, :2] if link.planar else link.X
-    return np.concatenate([link.one[:, None], X - np.outer(link.one, X[link.one != 0].mean(axis=0))], axis=1)
+    X = X - np.outer(link.one, X[link.one != 0].mean(axis=0))
+    sizes, axes = np.linalg.svd(X, full_matrices=False)[1:]
+    return np.concatenate([link.one[:, None], X @ axes[sizes > STRAIGHT * sizes[0]].T], axis=1)
 
 
 def rigid(link: Link) -> Link:
