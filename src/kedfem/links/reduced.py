@@ -15,7 +15,6 @@ from jaxtyping import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
-ROUNDING = 1e-15
 STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
 INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
 
@@ -36,10 +35,8 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     mass = tuple(_gram(m, Q) for m in link.mass)
     mQ = np.asarray(link.mass[0] @ Q)
     one, X = mQ.T @ link.one, mQ.T @ link.X
-    if (
-        link.planar
-    ):  # the height of a planar link's plane is not in the span of its functions: they need not know it
-        X[:, 2] = 0.0
+    if link.planar:
+        X[:, 2] = 0.0  # the height of its plane, which is not in the span and matters to nothing
     K0 = projected_stiffness(link, Q)
     m1, mX = Q.T @ link.m1, Q.T @ link.mX
     volume = Q.T @ link.volume
@@ -59,7 +56,6 @@ def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarra
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
     for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
-        Q = Q @ (vectors / np.sqrt(np.maximum(values, ROUNDING * values[-1])))
         kept = values > INDEPENDENT * values[-1]
         Q = Q @ (vectors[:, kept] / np.sqrt(values[kept]))
     return np.ascontiguousarray(Q)
