@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from kedfem.accuracy.plan import planned
 from kedfem.mesh.session import SYSTEM_PACKAGES
-from kedfem.scene import read_scene
+from kedfem.scene import read_scene, scene_from
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,7 +34,7 @@ def commands() -> list[str]:
 def test_the_scene_and_the_python_of_the_readme_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (scene,) = blocks("toml")
+    scene, accurate = blocks("toml")
     (code,) = blocks("python")
     (name,) = re.findall(r'read_scene\("(.*)"\)', code)
     monkeypatch.chdir(tmp_path)
@@ -48,6 +49,8 @@ def test_the_scene_and_the_python_of_the_readme_run(
         "plots",
         "worst.png",
     }
+    whole = scene.replace(scene[scene.index("[analysis]") : scene.index("[output.probes")], accurate)
+    assert planned(scene_from(tomllib.loads(whole))).reached
 
 
 def test_every_command_of_the_readme_is_there() -> None:

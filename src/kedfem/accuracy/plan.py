@@ -5,14 +5,14 @@ making it finer, simpler links by putting them in. What the scene states stays; 
 """
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.prepared import meshed
-from kedfem.accuracy.reduction import first_reduced
+from kedfem.accuracy.cache import kept
+from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
     of_family,
@@ -26,17 +26,13 @@ from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, time_grid
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
-TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
 )
 STEP_ORDER = 2.0
 MOST_STEPS = 200_000  # of the analysis
-TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
 TRIES = 6  # steps tried
-
-Stage = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +50,14 @@ class Plan:
 
     scene : the scene with everything chosen
     asked : the accuracy
+    finer : of the usual meshes, by which factor elements are smaller
     shares : parts of the error; the reduction's is what it may cause
     notes : what was tried, left out, and what limits the accuracy
     """
 
     scene: Scene
     asked: float
+    finer: float
     shares: tuple[Share, ...]
     notes: tuple[str, ...]
 
@@ -74,28 +72,6 @@ class Plan:
         return self.error <= self.asked
 
 
-@dataclass
-class _Search:
-    """What trial runs found so far."""
-
-    asked: float
-    stage: Stage
-    notes: list[str] = field(default_factory=list)
-    runs: dict[str, Histories] = field(default_factory=dict)
-
-    def run(self, scene: Scene) -> Histories:
-        """A trial run, reduced."""
-        key = scene.model_dump_json()
-        if key not in self.runs:
-            full = meshed(_shortened(scene))
-            self.runs[key] = histories(first_reduced(full, TRIAL * self.asked))
-        return self.runs[key]
-
-    def difference(self, scene: Scene, better: Scene) -> float:
-        """Worst relative difference between two scenes."""
-        return worst(relative_errors(self.run(scene), self.run(better)))
-
-
 def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     """Choose fidelities, mesh sizes, functions and step of a scene with `analysis.accuracy`.
 
@@ -107,12 +83,21 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     asked = scene.analysis.accuracy
     if asked is None:
         raise ValueError("the scene asks for no accuracy")
-    search = _Search(asked, stage)
+    return kept("plan", scene, partial(_planned, scene, asked, stage), _itself, _itself)
+
+
+def _itself(plan: Plan) -> Plan:
+    """A plan can be kept as it is."""
+    return plan
+
+
+def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
+    search = Trials(asked, stage)
     stage("plan: step")
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
     scene, step = _with_step(search, _opened(scene, left_open))
     stage("plan: mesh")
-    scene, mesh = _with_mesh(search, scene)
+    scene, mesh, finer = _with_mesh(search, scene)
     stage("plan: simpler links")
     scene, model = _with_simpler_links(search, scene, left_open)
     scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy=None)
@@ -122,7 +107,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
         Share("simpler links", model, MODEL * asked),
         Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
     )  # fmt: skip
-    plan = Plan(scene, asked, shares, ())
+    plan = Plan(scene, asked, finer, shares, ())
     return replace(plan, notes=(*search.notes, *_limits(plan)))
 
 
@@ -154,17 +139,7 @@ def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
     return other.model_copy(update=keep)
 
 
-def _shortened(scene: Scene) -> Scene:
-    """The beginning of an analysis that is too long for trials."""
-    grid = time_grid(scene)
-    if grid.steps <= TRIAL_STEPS:
-        return scene
-    return with_analysis(
-        scene, end_time=TRIAL_STEPS * grid.step, turns=None, step=grid.step, steps_per_turn=None
-    )
-
-
-def _with_step(search: _Search, scene: Scene) -> tuple[Scene, float]:
+def _with_step(search: Trials, scene: Scene) -> tuple[Scene, float]:
     """The scene with the largest step whose error is within its share, and that error."""
     allowed = STEP * search.asked
     given = {"step", "steps_per_turn"} & scene.analysis.model_fields_set
@@ -194,14 +169,14 @@ def _unresolved(steps: int, error: float) -> str:
     )
 
 
-def _with_mesh(search: _Search, scene: Scene) -> tuple[Scene, float]:
-    """The scene with the coarsest mesh whose error is within its share, and that error."""
+def _with_mesh(search: Trials, scene: Scene) -> tuple[Scene, float, float]:
+    """The scene with the coarsest mesh whose error is within its share, that error, and by what it is finer."""
     open_links = [
         name for name, link in scene.links.items() if "mesh" not in link.model_fields_set and refinable(link)
     ]
     if not open_links:
         search.notes.append("the scene states all meshes; their error was not looked at")
-        return scene, 0.0
+        return scene, 0.0, 1.0
     meshes = [_finer(scene, open_links, factor) for factor in FINER]
     error = math.inf
     for k, (now, finer) in enumerate(pairwise(meshes)):
@@ -209,23 +184,23 @@ def _with_mesh(search: _Search, scene: Scene) -> tuple[Scene, float]:
             change = search.difference(now, finer)
         except KedfemError as fault:
             search.notes.append(f"a finer mesh could not be tried: {str(fault).splitlines()[0]}")
-            return now, error
+            return now, error, FINER[k]
         beyond = change / ((FINER[k + 1] / FINER[k]) ** MESH_ORDER - 1)
         error = change + beyond
         if error <= MESH * search.asked:
-            return now, error
+            return now, error, FINER[k]
         if beyond <= MESH * search.asked:
-            return finer, beyond
+            return finer, beyond, FINER[k + 1]
         error = beyond
     search.notes.append(f"the finest mesh tried still leaves an error of {error:.2g}")
-    return meshes[-1], error
+    return meshes[-1], error, FINER[-1]
 
 
 def _finer(scene: Scene, names: list[str], factor: float) -> Scene:
     return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
 
 
-def _with_simpler_links(search: _Search, scene: Scene, left_open: list[str]) -> tuple[Scene, float]:
+def _with_simpler_links(search: Trials, scene: Scene, left_open: list[str]) -> tuple[Scene, float]:
     """The scene with links made rigid, beams or plane as far as the error stays within its share, and that error."""
     reference, error = scene, 0.0
     for name in left_open:

@@ -28,7 +28,17 @@ def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Pr
     MotionError, MeshError, SceneError
     """
     stage("motion")
-    joined = linkage(scene)
-    along = path(joined, *drive_range(scene))
+    joined, along = moving(scene)
     stage("mesh and matrices")
     return Prepared(scene, joined, along, elastic_model(scene, joined))
+
+
+def moving(scene: Scene) -> tuple[Linkage, Path]:
+    """The linkage of a scene, and its rigid motion over the drive's range.
+
+    Raises
+    ------
+    MotionError
+    """
+    joined = linkage(scene)
+    return joined, path(joined, *drive_range(scene))

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from kedfem.scene import Bar, Extrusion, LinkScene, MeshFile, Part, PlateLink, Scene, time_grid
 
 Family = Literal["solid", "plane", "beam", "rigid"]
+CHOSEN = {"element", "mesh", "fidelity", "reduced", "functions"}
 
 
 def with_links(scene: Scene, links: Mapping[str, LinkScene]) -> Scene:
@@ -26,9 +27,7 @@ def with_steps(scene: Scene, steps: int) -> Scene:
 
 def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:
     """The link meshed in another way, with the usual element and mesh of that way."""
-    given = link.model_dump(
-        exclude_unset=True, exclude={"element", "mesh", "fidelity", "reduced", "functions"}
-    )
+    given = {key: getattr(link, key) for key in link.model_fields_set - CHOSEN}
     return LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
 
 

@@ -19,7 +19,7 @@ def bar_four_bar(
     elements : of each bar: along, across, through the thickness
     """
     bar = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
-    raw = _four_bar(bar, {"element": "hex27", "mesh": {"elements": list(elements)}})
+    raw = four_bar_of(bar, {"element": "hex27", "mesh": {"elements": list(elements)}})
     raw["analysis"] = {"turns": turns, "steps_per_turn": steps_per_turn, "solver": solver}
     return scene_from(raw)
 
@@ -40,12 +40,8 @@ def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn:
         "bore_diameter": 0.02,
     }
     element = {"solid": "hex27", "plane": "quad9"}[fidelity]
-    raw = _four_bar(plate, {"fidelity": fidelity, "element": element, "mesh": {"elements_across": across}})
+    raw = four_bar_of(plate, {"fidelity": fidelity, "element": element, "mesh": {"elements_across": across}})
     raw["drive"]["motion"]["speed"] = "150 rpm"
-    raw["points"] |= {
-        "M": {"between": ["C", "D"], "fraction": 0.5, "offset": 0.0127},
-        "N": {"between": ["B", "C"], "fraction": 0.5},
-    }
     raw["damping"] = {"ratio": 0.02, "frequencies": [20, 200]}
     raw["analysis"] = {"turns": 1, "steps_per_turn": steps_per_turn, "initial": "quasi-static"}
     raw["output"] = {
@@ -57,7 +53,8 @@ def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn:
     return scene_from(raw)
 
 
-def _four_bar(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
+def four_bar_of(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a four-bar whose links have one shape."""
     links = {
         name: {"material": "alloy", "shape": {**shape, "between": list(ends)}, **link}
         for name, ends in LENGTHS.items()
@@ -75,6 +72,8 @@ def _four_bar(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
             "D": [0.9144, 0],
             "B": {"from": "A", "distance": 0.3048, "angle": "60 deg"},
             "C": {"from": ["B", "D"], "distances": [0.9144, 0.762], "side": "left"},
+            "M": {"between": ["C", "D"], "fraction": 0.5, "offset": 0.0127},
+            "N": {"between": ["B", "C"], "fraction": 0.5},
         },
         "materials": {"alloy": {"density": 2796, "youngs_modulus": 7.031e10, "shear_modulus": 2.712e10}},
         "links": links,

@@ -119,7 +119,7 @@ def gathered(S, RB, reaction, columns, count, SRB, H, z):  # type: ignore[no-unt
 
 
 @compiled
-def end_of_step(coefficients, t, i, R, F, g, Kg, force, state, history):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
+def end_of_step(coefficients, t, i, R, F, g, Kg, force, state, history):  # type: ignore[no-untyped-def]
     """State of link i from its displacement g, its balance Kg = r + Wᵀ λ = A g and λ; the rest by recurrence."""
     c_M, c_K, alpha_f = coefficients[:3]
     n0, n1, n2, h1, h0, alpha, beta = coefficients[7:14]

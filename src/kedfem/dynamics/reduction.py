@@ -5,7 +5,7 @@ vibration modes that this deflection excites (Lanczos steps K⁻¹ M on the whol
 later. Taken apart into scalar components and sorted by strain energy, the first few of them make the basis.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,23 +50,25 @@ class Basis:
 
 
 def bases(
-    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure], levels: int = LANCZOS
-) -> list[Basis]:
-    """A basis for every link of a model, from instants spread over the analysis.
+    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure],
+    only: Collection[str] | None = None,
+) -> list[Basis | None]:  # fmt: skip
+    """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
 
     Parameters
     ----------
     parts : `static_parts` of the model
-    levels : modes per instant
+    only : names of the links that need one; all if not given
     """
     deflections: list[list[NodalOf]] = [[] for _ in model.links]
     for instant in instants:
-        for kept, found in zip(deflections, excited(model, parts, instant, levels), strict=True):
+        for kept, found in zip(deflections, excited(model, parts, instant), strict=True):
             kept.extend(found)
     return [
         energy_sorted(link, port_functions(link, joint, part), found)
+        if only is None or link.name in only else None
         for link, joint, part, found in zip(model.links, model.joints, parts, deflections, strict=True)
-    ]
+    ]  # fmt: skip
 
 
 def static_parts(model: Model) -> list[Substructure]:
@@ -75,7 +77,7 @@ def static_parts(model: Model) -> list[Substructure]:
 
 
 def excited(
-    model: Model, parts: Sequence[Substructure], instant: Instant, levels: int
+    model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
 ) -> list[list[NodalOf]]:
     """Static deflection at an instant, and its shares in the modes of the frozen linkage that it excites; per link."""
     R = [now.R for now in instant.at]

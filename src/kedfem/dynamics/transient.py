@@ -18,6 +18,7 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.errors import SolveError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -43,9 +44,14 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
-    small = all(link.unknowns <= SMALL for link in model.links)
-    solver = DenseSteps if small and find_spec("numba") else CondensedSteps
+    small = all(map(_is_small, model.links)) and find_spec("numba")
+    solver = DenseSteps if small else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
+
+
+def _is_small(link: Link) -> bool:
+    """Whether dense matrices serve a link; the stiff hubs of a spatial beam would cost them digits."""
+    return link.unknowns <= SMALL and (link.kind != "spatial_beam" or link.full is not None)
 
 
 def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Block]:

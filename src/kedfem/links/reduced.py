@@ -15,6 +15,8 @@ from jaxtyping import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
+STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
+INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
@@ -33,10 +35,8 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     mass = tuple(_gram(m, Q) for m in link.mass)
     mQ = np.asarray(link.mass[0] @ Q)
     one, X = mQ.T @ link.one, mQ.T @ link.X
-    if (
-        link.planar
-    ):  # the height of a planar link's plane is not in the span of its functions: they need not know it
-        X[:, 2] = 0.0
+    if link.planar:
+        X[:, 2] = 0.0  # the height of its plane, which is not in the span and matters to nothing
     K0 = projected_stiffness(link, Q)
     m1, mX = Q.T @ link.m1, Q.T @ link.mX
     volume = Q.T @ link.volume
@@ -52,11 +52,12 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
 
 
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
-    """Functions of the same span with Qᵀ m Q = 1."""
+    """Functions of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
-    for _ in range(2):  # the second time for rounding
+    for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
-        Q = Q @ (vectors / np.sqrt(values))
+        kept = values > INDEPENDENT * values[-1]
+        Q = Q @ (vectors[:, kept] / np.sqrt(values[kept]))
     return np.ascontiguousarray(Q)
 
 
@@ -84,9 +85,11 @@ def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s 
 
 
 def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
-    """1 and the coordinates, of planar links x and y; about the middle, so that they are far from dependent."""
+    """1 and the coordinates about the middle, of planar links x and y only; of a straight beam the one along it."""
     X = link.X[:, :2] if link.planar else link.X
-    return np.concatenate([link.one[:, None], X - np.outer(link.one, X[link.one != 0].mean(axis=0))], axis=1)
+    X = X - np.outer(link.one, X[link.one != 0].mean(axis=0))
+    sizes, axes = np.linalg.svd(X, full_matrices=False)[1:]
+    return np.concatenate([link.one[:, None], X @ axes[sizes > STRAIGHT * sizes[0]].T], axis=1)
 
 
 def rigid(link: Link) -> Link:
@@ -96,7 +99,7 @@ def rigid(link: Link) -> Link:
     """
     made = reduced(link, rigid_functions(link))
     density = float(link.m1[:, 0].sum() / link.volume.sum())
-    stiffness = (RIGID**2 * link.E / density) / float(np.ptp(link.X, axis=0).max()) ** 2
+    stiffness = (RIGID**2 * link.E / density) / link.size**2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)

@@ -16,6 +16,7 @@ from kedfem.links.record import Link
 CYLINDER_TOLERANCE = 1e-3  # of the radius, between the corner nodes of one bore
 PLANE_TOLERANCE = 1e-6  # of the link's size
 FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
+AROUND = 0.1  # of a bore's radius: how near the middle of one of its facets may be to the axis
 SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved face
 
 
@@ -104,7 +105,10 @@ def cylinder(
     r = r - (r @ axis)[..., None] * axis
     radius = np.linalg.norm(r, axis=2)
     mean = radius.mean(axis=1)
-    inward = np.einsum("fk,fk->f", normals, r.mean(axis=1)) < -0.5 * np.linalg.norm(r.mean(axis=1), axis=1)
+    middle = r.mean(axis=1)
+    inward = np.einsum("fk,fk->f", normals, middle) < -0.5 * np.linalg.norm(middle, axis=1)
+    # a facet around the axis, whose corners are as far from it too, is no part of a bore
+    inward &= np.linalg.norm(middle, axis=1) > AROUND * mean
     size = np.ptp(link.X, axis=0).max()
     round_ = (np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean) & (mean > PLANE_TOLERANCE * size) & inward
     if not round_.any():

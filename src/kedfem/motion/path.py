@@ -24,6 +24,7 @@ GRID_STEP = np.radians(3.0)
 JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
 CONTRACTION = 0.1  # Newton's second step against its first: well within the branch's own basin
 SMALLEST_STEP = 1e-7
+ROUNDING = 1e-12  # of an angle [rad]
 WEAK, SINGULAR = 0.05, 1e-7  # relative singular values: worth a closer look; a dead point
 
 
@@ -45,6 +46,10 @@ class Path:
     second: Twists
     periodic: bool
     weakest: tuple[float, float]
+
+    def holds(self, low: float, high: float) -> bool:
+        """Whether it reaches so far, up to rounding."""
+        return self.periodic or bool(self.phi[0] - ROUNDING <= low and high <= self.phi[-1] + ROUNDING)
 
 
 def path(link: Linkage, low: float, high: float) -> Path:

@@ -1,0 +1,105 @@
+"""Trial runs of changed copies of one scene, reduced; what several of them share is made once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.prepared import Prepared, moving
+from kedfem.accuracy.reduction import first_reduced
+from kedfem.accuracy.variants import with_analysis
+from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.transient import drive_range
+from kedfem.links.build import bare_link
+from kedfem.links.record import Link
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.scene import Scene, spatial_beams, time_grid
+
+TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
+TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
+
+Stage = Callable[[str], None]
+
+
+@dataclass
+class Trials:
+    """What trial runs found, and what they were made of: links by their text, functions of each.
+
+    asked : the accuracy
+    """
+
+    asked: float
+    stage: Stage
+    notes: list[str] = field(default_factory=list)
+    runs: dict[str, Histories] = field(default_factory=dict)
+    models: dict[str, Prepared] = field(default_factory=dict)
+    links: dict[str, Link] = field(default_factory=dict)
+    functions: dict[str, Float[np.ndarray, "_ _"]] = field(default_factory=dict)
+    motion: tuple[Linkage, Path] | None = None
+
+    def difference(self, scene: Scene, better: Scene) -> float:
+        """Worst relative difference between two scenes."""
+        return worst(relative_errors(self.run(scene), self.run(better)))
+
+    def run(self, scene: Scene) -> Histories:
+        """A trial run."""
+        scene = shortened(scene)
+        key = scene.model_dump_json()
+        if key not in self.runs:
+            self.runs[key] = histories(self.ready(scene))
+        return self.runs[key]
+
+    def ready(self, scene: Scene) -> Prepared:
+        """A scene's reduced model; scenes that differ in the step only share it."""
+        joined, along = self._moving(scene)
+        key = scene.model_dump_json(exclude={"analysis"})
+        if key not in self.models:
+            bare = {
+                name: self._bare(scene, name) for name in scene.links if scene.links[name].shape is not None
+            }
+            self.models[key] = self._reduced(
+                Prepared(scene, joined, along, elastic_model(scene, joined, bare))
+            )
+        return replace(self.models[key], scene=scene, path=along)
+
+    def _moving(self, scene: Scene) -> tuple[Linkage, Path]:
+        """Rigid motion is the same for all, unless other steps reach another angle."""
+        low, high = drive_range(scene)
+        if self.motion is None or not self.motion[1].holds(low, high):
+            self.motion = moving(scene)
+        return self.motion
+
+    def _bare(self, scene: Scene, name: str) -> Link:
+        key = _text(scene, name)
+        if key not in self.links:
+            self.links[key] = bare_link(scene, name)
+        return self.links[key]
+
+    def _reduced(self, full: Prepared) -> Prepared:
+        """With the functions of links that an earlier trial had too: the difference is then of the others alone."""
+        texts = {link.name: _text(full.scene, link.name) for link in full.model.links}
+        known = {name: self.functions[text] for name, text in texts.items() if text in self.functions}
+        ready = first_reduced(full, TRIAL * self.asked, known)
+        for link in ready.model.links:
+            if link.Q is not None and not link.rigid:
+                self.functions[texts[link.name]] = link.Q
+        return ready
+
+
+def shortened(scene: Scene) -> Scene:
+    """The beginning of an analysis that is too long for trials."""
+    grid = time_grid(scene)
+    if grid.steps <= TRIAL_STEPS:
+        return scene
+    return with_analysis(
+        scene, end_time=TRIAL_STEPS * grid.step, turns=None, step=grid.step, steps_per_turn=None
+    )
+
+
+def _text(scene: Scene, name: str) -> str:
+    """All that a link's mesh and matrices depend on."""
+    text = scene.links[name].model_dump_json(exclude={"reduced", "functions"})
+    return f"{name} {name in spatial_beams(scene)} {text}"

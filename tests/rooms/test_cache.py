@@ -1,0 +1,127 @@
+"""What is kept between runs: the same results, and new ones when anything changes or an entry is damaged."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from kedfem.accuracy import reduction
+from kedfem.accuracy.cache import contents, kept, key
+from kedfem.accuracy.histories import histories
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.model import Model
+from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery
+from kedfem.scene import Scene, scene_from
+
+from .test_dynamics import four_bar
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def scene(**changes: Any) -> Scene:
+    raw = four_bar("bar", turns=0.1, initial="quasi-static", rho_inf=0.9, **changes)
+    for link in raw["links"].values():
+        link["fidelity"] = "reduced"
+    raw["links"]["crank"]["fidelity"] = "rigid"
+    raw["links"]["crank"].pop("mesh")
+    return scene_from(raw)
+
+
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Grows whenever links are reduced."""
+    calls: list[int] = []
+    real = reduction.reduced
+
+    def counted(*arguments: Any) -> Any:
+        calls.append(1)
+        return real(*arguments)
+
+    monkeypatch.setattr(reduction, "reduced", counted)
+    return calls
+
+
+def test_the_second_run_reduces_nothing_and_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = made(monkeypatch)
+    first, again = (prepared(scene()) for _ in range(2))
+    assert len(calls) == 1
+    a, b = histories(first[0]), histories(again[0])
+    for name, (_, values) in a.channels.items():
+        assert_array_equal(b.channels[name][1], values)
+    assert first[1] is not None
+    assert again[1] is not None
+    assert first[1].estimate == again[1].estimate
+    assert_array_equal(peak_stress(again[0].model), peak_stress(first[0].model))
+
+
+def peak_stress(model: Model) -> np.ndarray:
+    """Nodal stresses of the first link under its first function along x: needs the function space of the full link."""
+    link = model.links[0]
+    g = np.zeros((link.n, link.d))
+    g[-1, 0] = 1.0
+    return nodal_stress(stress_recovery(link), nodal_state(link, g))
+
+
+def test_a_damaged_entry_is_made_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = made(monkeypatch)
+    prepared(scene())
+    for file in folder.rglob("*.pkl"):
+        file.write_bytes(b"not a pickle")
+    found, _ = prepared(scene())
+    assert len(calls) == 2
+    assert [link.name for link in found.model.links] == ["coupler", "rocker"]
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        ({}, True),
+        ({"title": "another"}, True),
+        ({"output": {"folder": "elsewhere", "csv": True, "animation": False}}, True),
+        ({"gravity": [0, -9.81, 0]}, False),
+        ({"analysis": {"turns": 0.2, "steps_per_turn": 120}}, False),
+    ],
+)
+def test_the_key_belongs_to_what_the_result_depends_on(change: dict[str, Any], same: bool) -> None:
+    raw = four_bar("bar")
+    assert (key(scene_from(raw)) == key(scene_from(raw | change))) == same
+
+
+def test_the_key_belongs_to_the_contents_of_files(tmp_path: Path) -> None:
+    file = tmp_path / "part.toml"
+    file.write_text("thickness = 0.01", "utf-8")
+    before = contents([file])
+    file.write_text("thickness = 0.02", "utf-8")
+    assert contents([file]) != before
+
+
+def test_nothing_is_kept_where_the_cache_is_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+    prepared(scene())
+    assert not folder.exists()
+
+
+def test_what_cannot_be_packed_is_made_each_time() -> None:
+    calls: list[int] = []
+
+    def work() -> int:
+        calls.append(1)
+        return 7
+
+    assert [kept("number", scene(), work, lambda _: None, lambda x: x) for _ in range(2)] == [7, 7]
+    assert len(calls) == 2
+
+
+def test_a_folder_that_cannot_be_written_does_not_stop_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way", "utf-8")
+    monkeypatch.setenv("KEDFEM_CACHE", str(blocked / "cache"))
+    found, _ = prepared(scene())
+    assert found.model.links
