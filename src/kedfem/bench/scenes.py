@@ -90,11 +90,10 @@ DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
 
 def mechanisms() -> dict[str, dict[str, Any]]:
     """Scenes of one turn in 720 steps, as the keys of a file: planar and spatial, beams, bars, plates, an extrusion."""
-    beam = _four_bar({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {"fidelity": "beam"})
-    plate = _four_bar({"kind": "plate_link", **EYE}, {})
+    beam = four_bar_of({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {"fidelity": "beam"})
+    plate = four_bar_of({"kind": "plate_link", **EYE}, {})
     plate["drive"]["motion"]["speed"] = "150 rpm"
     for four_bar in (beam, plate):
-        four_bar["points"]["M"] = {"between": ["C", "D"], "fraction": 0.5, "offset": 0.0127}
         four_bar["output"] = _probe("rocker", "M", "stress")
     found = {"beam four-bar": beam, "solid four-bar": plate, "slider-crank": _slider_crank(), "RSSR": _rssr(),
              "bell crank": _bell_crank()}  # fmt: skip
@@ -198,6 +197,7 @@ def _bell_crank() -> dict[str, Any]:
             "C": [0.3, 0.15],
             "D": [0.3, 0],
             "E": [0.48, 0],
+            "F": [0.4, 0],
         },
         "links": {
             "crank": {
@@ -215,5 +215,5 @@ def _bell_crank() -> dict[str, Any]:
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "600 rpm"}},
         "bodies": {"load": {"kind": "point_mass", "link": "bell", "at": "E", "mass": 0.3}},
-        "output": _probe("bell", "E", "displacement"),
+        "output": _probe("bell", "F", "displacement"),
     }

@@ -6,7 +6,8 @@ from pathlib import Path
 from statistics import median
 
 from kedfem.accuracy.histories import worst
-from kedfem.accuracy.reduction import Reduction, prepared
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import Reduction, reduced
 from kedfem.analysis import Clock
 from kedfem.bench.machine import Watch, markdown, write_page
 from kedfem.bench.scenes import mechanisms, with_reduced_links
@@ -43,8 +44,9 @@ def bench_suite(folder: Path, quick: bool, watch: Watch) -> str:
     header = ("scene", "unknowns", "motion [s]", "mesh, matrices [s]", "functions [s]", "factor [s]", "steps [s]",
               "a step [µs]", "whole [s]", "estimated error")  # fmt: skip
     note = (
-        "One turn of 720 steps with recording, quasi-static start; no files. Medians of 3 runs. Solids of the usual mesh; "
-        "functions: static factors, training, trial runs and the error's estimate, asked for: 0.1 %.\n\n![suite](suite.png)"
+        "One turn of 720 steps with recording, quasi-static start; no files, nothing kept from earlier runs. Medians of 3 "
+        "runs. Solids of the usual mesh; functions: static factors, training, trial runs and the error's estimate, asked "
+        "for: 0.1 %.\n\n![suite](suite.png)"
     )
     text = markdown(
         "Mechanisms from scene to last step",
@@ -70,7 +72,11 @@ def _measured(scene: Scene, repeats: int) -> _Measured:
 def _once(scene: Scene) -> tuple[dict[str, float], int, Reduction | None]:
     """A run without files: seconds per stage, unknowns."""
     clock = Clock(lambda stage, done, total: None)
-    ready, reduction = prepared(scene, clock.stage)
+    ready, reduction = meshed(scene, clock.stage), None
+    chosen = [name for name, link in scene.links.items() if link.reduced]
+    if chosen:
+        reduction = reduced(ready, chosen, scene.analysis.reduction, stage=clock.stage)
+        ready = reduction.ready
     solver: Steps = clock.timed("factor", lambda: steps_of(scene, ready.model))
 
     def stepped() -> None:
