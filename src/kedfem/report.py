@@ -25,10 +25,7 @@ ELEMENTS = {
     "line3": "beam3",
     "line": "beam2",
 }
-STUDY_COLUMNS = (
-    "fidelity", "mesh", "steps", "reduction", "unknowns", "prepare", "step", "whole", "error",
-    "worst channel",
-)  # fmt: skip
+STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -200,8 +197,14 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     """Variants by time with their errors, and what the reference's own error is made of."""
     table = Table(title=Text(f"Speed against error: {study.title}"))
     for column in STUDY_COLUMNS:
-        left = column in {"fidelity", "worst channel"}
-        table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
+        left = column == "fidelity"
+        table.add_column(
+            column,
+            justify="left" if left else "right",
+            overflow="fold",
+            no_wrap=not left,
+            min_width=13 if left else None,
+        )
     ran = [row for row in study.rows if row.seconds]
     for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
         table.add_row(*_study_row(row, study), style="bold" if row.front else None)
@@ -210,7 +213,8 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     table.caption = Text(
         f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
         f"{study.reference.variant.name}, whose own is about {_percent(study.floor)} ({shares or 'not known'}{unknown}): "
-        f"≤ is below that. prepare, step, whole: seconds, medians; {machine}"
+        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: seconds, "
+        f"medians; worst channels: see the CSV. {machine}"
     )
     return [table, _not_run(study)] if len(ran) < len(study.rows) else [table]
 
@@ -219,13 +223,16 @@ def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
     if row.seconds is None:
         raise ValueError(f"{row.variant.name} was not run")
     v, s = row.variant, row.seconds
-    model = (v.fidelity.name, f"{v.fineness:g}", f"{v.steps}", f"{v.tolerance:.0e}" if v.tolerance else "-")
-    times = (f"{s.preparation:.2f}", f"{s.stepping:.2f}", f"{s.whole:.2f}")
+    model = (
+        v.fidelity.name,
+        f"{v.fineness:g}",
+        f"{v.steps}",
+        f"{v.tolerance:.0e}".replace("e-0", "e-") if v.tolerance else "-",
+    )
+    times = (f"{s.preparation:.2g}", f"{s.stepping:.2g}", f"{s.whole:.2g}")
     below = row.error <= study.floor
-    found = (f"≤ {_percent(study.floor)}" if below else _percent(row.error), row.worst_channel)
-    if v == study.reference.variant:
-        found = ("reference", "")
-    return (*model, str(row.unknowns), *times, *found)
+    found = f"≤ {_percent(study.floor)}" if below else _percent(row.error)
+    return (*model, str(row.unknowns), *times, "reference" if v == study.reference.variant else found)
 
 
 def _not_run(study: Study) -> Table:
