@@ -203,7 +203,7 @@ def study_tables(study: Study, machine: str) -> list[Table]:
             justify="left" if left else "right",
             overflow="fold",
             no_wrap=not left,
-            min_width=13 if left else None,
+            min_width=11 if left else None,
         )
     ran = [row for row in study.rows if row.seconds]
     for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
@@ -213,8 +213,8 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     table.caption = Text(
         f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
         f"{study.reference.variant.name}, whose own is about {_percent(study.floor)} ({shares or 'not known'}{unknown}): "
-        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: seconds, "
-        f"medians; worst channels: see the CSV. {machine}"
+        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: "
+        f"seconds, medians; worst channels: see the CSV. {machine}"
     )
     return [table, _not_run(study)] if len(ran) < len(study.rows) else [table]
 
