@@ -1,9 +1,12 @@
 """The benchmark of the elements: its parts against beam theory, and how it reads a cost from errors."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.bench import BENCHMARKS
 from kedfem.bench.elements import cost
 from kedfem.bench.parts import BAR, FORMS, STEEL, answer
 
@@ -37,3 +40,13 @@ def test_cost_counts_no_error_that_rises_again_and_no_target_that_is_missed() ->
     assert cost(work, [1e-1, 1e-5, 1e-3], 1e-2) == pytest.approx(10**0.5)  # halfway from 1e-1 to 1e-3
     assert cost(work, [1e-3, 1e-3, 1e-3], 1e-2) == 1.0
     assert cost(work, [1e-3, 1e-3, 1e-1], 1e-2) is None
+
+
+@pytest.mark.parametrize(("name", "pictures"), [("suite", ["suite.png"])])
+def test_a_benchmark_writes_its_page(name: str, pictures: list[str], tmp_path: Path) -> None:
+    text = BENCHMARKS[name](tmp_path, True, lambda stage, done, total: None)
+    assert (tmp_path / f"{name}.md").read_text(encoding="utf-8") == text
+    assert f"`kedfem bench {name}`" in text
+    for picture in pictures:
+        assert f"({picture})" in text
+        assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")

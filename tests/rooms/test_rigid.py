@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.accuracy.histories import Histories, histories
+from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import reduced
+from kedfem.bench.scenes import mechanisms
 from kedfem.scene import scene_from
 
 from .test_dynamics import four_bar
@@ -68,3 +70,17 @@ def test_a_rigid_crank_has_no_unknowns() -> None:
     ready = meshed(scene_from(scene("bar", rigid=("crank",))))
     assert [link.name for link in ready.model.links] == ["coupler", "rocker"]
     assert [x.link.name for x in ready.model.carried] == ["crank"]
+
+
+def test_a_rigid_link_stays_rigid_beside_reduced_ones() -> None:
+    raw = {
+        **mechanisms()["RSSR"],
+        "analysis": {"turns": 0.25, "steps_per_turn": 200, "initial": "quasi-static"},
+    }
+    full = meshed(scene_from(raw))
+    found = reduced(full, ["crank", "coupler", "rocker"], 1e-3)
+    links = {link.name: link for link in found.ready.model.links}
+    assert (links["cross"].rigid, links["cross"].unknowns) == (True, 12)  # {1, x, y, z} in three components
+    errors = relative_errors(histories(found.ready), histories(full))
+    assert worst(errors) < 2e-3  # twice what was asked for
+    assert 0.3 * worst(errors) < worst(found.estimate) < 3 * worst(errors) + 1e-4

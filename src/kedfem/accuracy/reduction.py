@@ -173,8 +173,10 @@ def _enriched(
     """Functions with the answers to the residual at some moments added."""
     answers = [residual_deflections(full.model, parts, small.model, snapshot) for snapshot in kept]
     return [
-        None if link.Q is None else enriched(link, each, ADDED)
-        for link, each in zip(small.model.links, zip(*answers, strict=True), strict=True)
+        None if link is whole else enriched(link, each, ADDED)
+        for whole, link, each in zip(
+            full.model.links, small.model.links, zip(*answers, strict=True), strict=True
+        )
     ]
 
 

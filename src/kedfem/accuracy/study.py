@@ -101,7 +101,7 @@ class _Bench:
     most: float
     repeats: int
     watch: Watch
-    since: float = field(default_factory=perf_counter)
+    since: float = field(default_factory=lambda: perf_counter())  # noqa: PLW0108
     rows: dict[Variant, Measured] = field(default_factory=dict)
     runs: dict[Variant, Histories] = field(default_factory=dict)
     estimates: dict[Variant, float] = field(default_factory=dict)
@@ -130,6 +130,11 @@ class _Bench:
             except _LateError:
                 self.rows[variant] = Measured(variant, note="left out: the time was spent while it ran")
         return self.rows[variant].seconds is not None
+
+    def leave_out(self, variant: Variant, expected: float) -> None:
+        """Note that a variant does not fit the budget."""
+        known = f": would take about {expected:.0f} s" if expected < float("inf") else " with its like"
+        self.rows[variant] = Measured(variant, note=f"left out{known}")
 
     def _measured(self, variant: Variant) -> Measured:
         scene = varied(self.scene, variant)
@@ -204,10 +209,8 @@ def studied(
     for variant in sorted(further, key=lambda v: bench.expected(v) / (PREFERRED if v in first else 1.0)):
         if variant in bench.rows or _unbuildable(bench, variant):
             continue
-        expected = bench.expected(variant)
-        if expected > bench.left:
-            known = f": would take about {expected:.0f} s" if expected < float("inf") else " with its like"
-            bench.rows[variant] = Measured(variant, note=f"left out{known}")
+        if (expected := bench.expected(variant)) > bench.left:
+            bench.leave_out(variant, expected)
         else:
             bench.run(variant)
     return _compared(bench, reference)
@@ -238,10 +241,10 @@ def _reference(bench: _Bench, quick: bool) -> Variant:
     finest = [(f, STEPS[-1]) for f in FINENESS[:0:-1]] if not quick else []
     for fineness, steps in (*finest, (1.5, 2), (1.0, STEPS[-1]), (1.0, 2)):
         variant = reference_variant(bench.scene, fineness, steps)
-        together = [variant, *(each for *_, each in coarser(variant))]
-        if sum(bench.expected(each) for each in together) <= FOR_REFERENCE * bench.left and bench.run(
-            variant
-        ):
+        together = sum(bench.expected(each) for each in (variant, *(v for *_, v in coarser(variant))))
+        if together > FOR_REFERENCE * bench.left:
+            bench.leave_out(variant, together)
+        elif bench.run(variant):
             for *_, each in coarser(variant):
                 bench.run(each)
             return variant

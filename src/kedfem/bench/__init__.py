@@ -10,6 +10,7 @@ from kedfem.bench.plane import bench_plane
 from kedfem.bench.solvers import bench_solvers
 from kedfem.bench.start import bench_start
 from kedfem.bench.steps import bench_steps
+from kedfem.bench.suite import bench_suite
 
 BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "steps": bench_steps,
@@ -18,4 +19,5 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "plane": bench_plane,
     "start": bench_start,
     "elements": bench_elements,
+    "suite": bench_suite,
 }

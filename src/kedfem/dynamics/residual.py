@@ -49,7 +49,7 @@ def _residual(
 ) -> Float[np.ndarray, "n d"]:  # fmt: skip
     """Without the port forces; the rate of g is that of the co-rotated deformation, Rᵀ (δ' − ω × δ)."""
     a, g, rate = state.a, state.g, (state.v - state.u @ spin.T) @ state.R
-    if small.Q is not None:
+    if small is not link and small.Q is not None:
         a, g, rate = small.Q @ a, small.Q @ g, small.Q @ rate
     r = (F - mass_times(link.mass, a)) @ state.R
     r -= (link.K0 @ g.ravel()).reshape(r.shape)
