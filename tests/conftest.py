@@ -1,4 +1,4 @@
-"""For all tests: shapes of arrays are checked as they run, nothing needs a display, random tests repeat in CI."""
+"""For all tests: array shapes are checked as they run, nothing needs a display or is kept, random tests repeat in CI."""
 
 import os
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from hypothesis import settings
 from jaxtyping import AbstractArray, install_import_hook
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ["KEDFEM_CACHE"] = "off"
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 IN_CI = bool(os.environ.get("CI"))

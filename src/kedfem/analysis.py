@@ -173,7 +173,8 @@ def reduction_warning(reduction: Reduction | None) -> tuple[str, ...]:
 
 
 def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
-    return [stress_recovery(link) for link in model.links] if scene.output.animation else []
+    links = [*model.links, *(carried.link for carried in model.carried)]
+    return [stress_recovery(link) for link in links] if scene.output.animation else []
 
 
 def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
@@ -261,9 +262,10 @@ def _deflection(model: Model, block: Block) -> float:
     """Largest component of the displacement of any link, of the link's size [-]; of a reduced one at a few moments."""
     worst = 0.0
     for link, history in zip(model.links, block.links, strict=True):
+        shown = link.full or link
         u = history.u if link.Q is None else link.Q @ history.u[:: max(1, len(block) // 4)]
-        size = float(np.ptp((link.full or link).X, axis=0).max())
-        worst = max(worst, float(np.abs(in_space(link, u)).max()) / size)
+        moved = in_space(shown, u)[..., shown.one != 0, :]
+        worst = max(worst, float(np.abs(moved).max()) / link.size)
     return worst
 
 

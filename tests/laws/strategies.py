@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.links.beam import beam_link
 from kedfem.links.plane import plane_link
-from kedfem.links.record import Link, Section
+from kedfem.links.record import Link
+from kedfem.links.section import Section, rectangle
 from kedfem.links.solid import solid_link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.mesh.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
@@ -151,7 +152,7 @@ def beams(draw: st.DrawFn) -> Beam:
     steps = random.uniform(0.3, 1.0, (draw(st.integers(1, 3)), 1)) * np.array([[1.0, 0.0, 0.0]])
     steps[:, 1] = random.uniform(-0.5, 0.5, len(steps))
     points = np.concatenate([random.uniform(-1, 1, (1, 3)), steps]).cumsum(axis=0)
-    section = Section(*random.uniform(0.01, 0.1, 2).tolist())
+    section = rectangle(*random.uniform(0.01, 0.1, 2).tolist())
     return Beam(points, section, draw(st.integers(1, 2)), draw(st.sampled_from([2, 3])))
 
 

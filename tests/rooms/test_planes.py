@@ -49,7 +49,8 @@ def both(kind: str, **link: Any) -> tuple[QuadMesh, HexMesh]:
     shape, mesh = SHAPES[kind]
     folder = ROOT / "geometry"
     plane = LinkScene(shape=shape, mesh=mesh, fidelity="plane", **link)
-    return plane_mesh("any", plane, folder), link_mesh("any", LinkScene(shape=shape, mesh=mesh), folder)
+    solid = LinkScene(shape=shape, mesh=mesh, element="hex27")
+    return plane_mesh("any", plane, folder), link_mesh("any", solid, folder)
 
 
 # -- meshes -------------------------------------------------------------------------------------------------
@@ -346,7 +347,8 @@ def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) ->
     assert mesh.point_data["von_mises"].max() > 0
     assert (tmp_path / "worst.png").stat().st_size > 10_000
     ready = meshed(scene)
-    kind, elements, unknowns, quality = (list(check_tables(ready)[0].columns[i].cells) for i in (1, 2, 3, 5))
+    columns = check_tables(ready, None, None)[0].columns
+    kind, elements, unknowns, quality = (list(columns[i].cells) for i in (1, 2, 3, 5))
     assert kind == ["quad9"] * 3
     assert elements == [str(len(link.cells)) for link in ready.model.links]
     assert unknowns == [str(2 * link.n) for link in ready.model.links]

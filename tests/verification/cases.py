@@ -13,7 +13,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
-MODULES = ("vibrations", "statics", "planes", "histories", "rotation", "kinematics", "mechanisms")
+MODULES = (
+    "vibrations",
+    "statics",
+    "planes",
+    "spatial_beams",
+    "histories",
+    "rotation",
+    "kinematics",
+    "mechanisms",
+)
 
 
 @dataclass(frozen=True, slots=True)

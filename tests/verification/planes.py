@@ -140,6 +140,7 @@ def four_bar(fidelity: str, thickness: float) -> list[np.ndarray]:
     raw["analysis"] |= {"turns": 1, "steps_per_turn": 90}
     for link in raw["links"].values():
         link["fidelity"], link["shape"]["thickness"] = fidelity, thickness
+        link["element"] = {"plane": "quad9", "solid": "hex27"}[fidelity]
     return histories(scene_from(raw, SCENE.parent), *CHANNELS.values())[1]
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from kedfem.links.beam import beam_link
-from kedfem.links.record import Link, Section
+from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
 from kedfem.links.seats import face_seat, surface_weights
+from kedfem.links.section import rectangle
 from kedfem.scene import Material
 
 from .cases import Row, case
@@ -149,7 +150,7 @@ def straight_planar_beams() -> list[Row]:
     """Six elements, bent about either axis (slenderness 30, 60): full integration of the shear would lock."""
     out = []
     for name, target, section in zip(
-        LOADS[1:], PUBLISHED[1:], (Section(0.2, 0.1), Section(0.1, 0.2)), strict=True
+        LOADS[1:], PUBLISHED[1:], (rectangle(0.2, 0.1), rectangle(0.1, 0.2)), strict=True
     ):
         for nodes, cap in ((2, 0.008), (3, 0.0005)):
             link = beam_link("beam", np.array([[0.0, 0, 0], [6, 0, 0]]), section, SLENDER, 6, nodes)

@@ -15,6 +15,15 @@ from .linear import free_map, frequencies, frequency_of
 from .meshes import box, mapped_link
 from .planes import energy_error
 from .rotation import bar, steady_deflection, steady_state
+from .spatial_beams import (
+    FLAT,
+    cantilever_modes,
+    curved_cantilever,
+    quarter_circle,
+    straight,
+    tip_displacement,
+    wanted_modes,
+)
 from .vibrations import CUBE, DEEP, STEEL, lame_mode, lame_shape, pinned_beam, timoshenko
 
 
@@ -86,6 +95,41 @@ def test_beams_converge_to_timoshenko(nodes: int, order: int, cap: float, mode: 
     found, last = slopes(error, [10, 20, 40])
     np.testing.assert_allclose(found, order, atol=0.1)
     assert last < mode**2 * cap
+
+
+@pytest.mark.parametrize(("nodes", "order", "cap"), [(2, 2, 1e-2), (3, 4, 1.2e-4)])
+@pytest.mark.parametrize("kind", ["along y", "along z"])
+def test_beams_in_space_converge_to_timoshenkos_cantilever(nodes: int, order: int, cap: float, kind: str):
+    """Second bending frequencies, about both axes of the section."""
+    exact = wanted_modes(0.5, FLAT)[kind][1]
+
+    def error(n: int) -> float:
+        link = straight([[0, 0, 0], [0.5, 0, 0]], FLAT, n, nodes)
+        return cantilever_modes(link, 8, 80)[kind][1] / exact - 1
+
+    found, last = slopes(error, [4, 8, 16])
+    np.testing.assert_allclose(found, order, atol=0.35)  # of 4 elements not yet
+    assert last < cap
+
+
+def curved_error(radius: float, axis: str) -> Callable[[int], float]:
+    """Of a quarter circle's tip under a force in its plane or across it."""
+    k, exact = "xyz".index(axis), quarter_circle(radius, FLAT)[axis]
+    return lambda n: tip_displacement(curved_cantilever(radius, FLAT, n + 1), np.eye(3)[k])[k] / exact - 1
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_curved_beams_converge_to_castigliano(axis: str):
+    found, last = slopes(curved_error(0.5, axis), [16, 32, 64])
+    assert ((found > 3.4) & (found < 4.3)).all()  # element's and spline's error, in part against each other
+    assert last < 3e-8
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_slender_curved_beams_do_not_lock(axis: str):
+    """170 sections in radius: as exact with the same elements as 17 sections in radius."""
+    for n, cap in ((4, 2e-3), (8, 1e-4), (16, 1e-5)):
+        assert abs(curved_error(5.0, axis)(n)) < cap
 
 
 def test_a_plane_cantilever_converges_in_energy() -> None:

@@ -15,7 +15,8 @@ from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.state import LinkState, Rayleigh
 from kedfem.links.beam import beam_link
-from kedfem.links.record import Link, Section, mass_times
+from kedfem.links.record import Link, mass_times
+from kedfem.links.section import rectangle
 from kedfem.scene import Material
 
 from .histories import Run, grounded, history, pinned_beam
@@ -52,7 +53,7 @@ def inertia_load(link: Link, t: float) -> np.ndarray:
 def turning_link(kind: str) -> tuple[Link, np.ndarray]:
     """One element, held at its end x = 0, which is the axis of turning."""
     if kind == "beam":
-        link = beam_link("arm", np.array([[0.0, 0, 0], [1, 0, 0]]), Section(0.2, 0.2), SOFT, 1, 3)
+        link = beam_link("arm", np.array([[0.0, 0, 0], [1, 0, 0]]), rectangle(0.2, 0.2), SOFT, 1, 3)
     else:
         link = mapped_link((1, 1, 1), box((1, 0.3, 0.3)), SOFT, 8)
     return link, held((link.X[:, 0] == 0, "xyz"))

@@ -4,7 +4,8 @@ import numpy as np
 import scipy.linalg
 
 from kedfem.links.beam import beam_link
-from kedfem.links.record import Link, Section
+from kedfem.links.record import Link
+from kedfem.links.section import Section, rectangle
 from kedfem.scene import Material
 
 from .cases import Row, case
@@ -118,7 +119,9 @@ def timoshenko(n: int, length: float, section: Section, material: Material) -> f
     return float(np.sqrt(2 * c / (b + np.sqrt(b**2 - 4 * a * c))) / (2 * np.pi))
 
 
-DEEP = Section(2.0, 2.0, shear_coefficient=10 * (1 + 0.3) / (12 + 11 * 0.3))  # Cowper's κ gives FV5's numbers
+DEEP = rectangle(
+    2.0, 2.0, shear_coefficient=10 * (1 + 0.3) / (12 + 11 * 0.3)
+)  # Cowper's κ gives FV5's numbers
 
 
 def pinned_beam(elements: int, nodes: int = 3) -> tuple[Link, np.ndarray]:

@@ -7,9 +7,11 @@ making it finer, simpler links by putting them in. What the scene states stays; 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
+from kedfem.accuracy.cache import kept
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
@@ -81,6 +83,15 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     asked = scene.analysis.accuracy
     if asked is None:
         raise ValueError("the scene asks for no accuracy")
+    return kept("plan", scene, partial(_planned, scene, asked, stage), _itself, _itself)
+
+
+def _itself(plan: Plan) -> Plan:
+    """A plan can be kept as it is."""
+    return plan
+
+
+def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     search = Trials(asked, stage)
     stage("plan: step")
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]

@@ -12,15 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.accuracy.cache import kept
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.model import reduced_model
+from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
 from kedfem.dynamics.reduction import bases, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, drive_angle, time_grid, turn_steps
 
@@ -31,7 +34,7 @@ MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
 ADDED = 8  # functions that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
-FIRST = 0.3  # of the tolerance: what the first functions leave out of the training deflections' energy norm
+FIRST = 0.1  # of the tolerance: what the first functions leave out of the training deflections' energy norm
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
 
@@ -41,13 +44,11 @@ class Reduction:
     """A prepared scene with reduced links.
 
     ready : its model reduced
-    functions : per link, None where it stays as it is
     estimate : relative error of every channel that counts, compared with the full links
     tolerance : that was asked for
     """
 
     ready: Prepared
-    functions: tuple[Float[np.ndarray, "_ _"] | None, ...]
     estimate: dict[str, float]
     tolerance: float
 
@@ -59,13 +60,32 @@ def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, 
     ------
     MotionError, MeshError, SceneError
     """
-    full = meshed(scene, stage)
     chosen = {name: link.functions for name, link in scene.links.items() if link.reduced}
     if not chosen:
-        return full, None
+        return meshed(scene, stage), None
     counts = {name: count for name, count in chosen.items() if count is not None}
-    found = reduced(full, chosen, scene.analysis.reduction, counts, stage)
+    found = kept(
+        "reduction", scene,
+        lambda: reduced(meshed(scene, stage), chosen, scene.analysis.reduction, counts, stage),
+        _packed, lambda stored: _unpacked(stored, scene),
+    )  # fmt: skip
     return found.ready, found
+
+
+Stored = tuple[Linkage, Path, Model, dict[str, float]]
+
+
+def _packed(reduction: Reduction) -> Stored | None:
+    """A reduction as it is kept between runs; None if links are left in full."""
+    ready, model = reduction.ready, stored_model(reduction.ready.model)
+    return None if model is None else (ready.linkage, ready.path, model, reduction.estimate)
+
+
+def _unpacked(stored: Stored, scene: Scene) -> Reduction:
+    joined, along, model, estimate = stored
+    return Reduction(
+        Prepared(scene, joined, along, restored_model(model)), estimate, scene.analysis.reduction
+    )
 
 
 def reduced(
@@ -93,8 +113,8 @@ def reduced(
     ]
     stage("error of the reduction")
     Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
-    kept = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
-    return Reduction(replace(full, model=reduced_model(full.model, kept)), tuple(kept), estimate, tolerance)
+    taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
+    return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
 
 
 def first_reduced(

@@ -16,7 +16,7 @@ from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import LinkScene, Scene, time_grid
+from kedfem.scene import Scene, spatial_beams, time_grid
 
 TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
 TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
@@ -69,14 +69,14 @@ class Trials:
         return self.motion
 
     def _bare(self, scene: Scene, name: str) -> Link:
-        key = _text(name, scene.links[name])
+        key = _text(scene, name)
         if key not in self.links:
             self.links[key] = bare_link(scene, name)
         return self.links[key]
 
     def _reduced(self, full: Prepared) -> Prepared:
         """With the functions of links that an earlier trial had too: the difference is then of the others alone."""
-        texts = {link.name: _text(link.name, full.scene.links[link.name]) for link in full.model.links}
+        texts = {link.name: _text(full.scene, link.name) for link in full.model.links}
         known = {name: self.functions[text] for name, text in texts.items() if text in self.functions}
         ready = first_reduced(full, TRIAL * self.asked, known)
         for link in ready.model.links:
@@ -95,6 +95,7 @@ def shortened(scene: Scene) -> Scene:
     )
 
 
-def _text(name: str, link: LinkScene) -> str:
+def _text(scene: Scene, name: str) -> str:
     """All that a link's mesh and matrices depend on."""
-    return name + link.model_dump_json(exclude={"reduced", "functions"})
+    text = scene.links[name].model_dump_json(exclude={"reduced", "functions"})
+    return f"{name} {name in spatial_beams(scene)} {text}"

@@ -48,7 +48,7 @@ class Substructure:
 
 def substructure(
     attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
-    anchors: Int[np.ndarray, " e"] | None = None, kappa: float = 1.0,
+    anchors: Int[np.ndarray, " e"] | None = None, kappa: Float[np.ndarray, " e"] | None = None,
 ) -> Substructure:  # fmt: skip
     """Condense a link onto its ports and anchors.
 
@@ -64,7 +64,9 @@ def substructure(
     C = np.concatenate([port_columns(attachment, n), E], axis=1)
     Y = solve_many(C)
     F = C.T @ Y
-    F[np.arange(len(F) - len(held), len(F)), np.arange(len(F) - len(held), len(F))] -= 1 / kappa
+    if kappa is not None:
+        at = np.arange(len(F) - len(held), len(F))
+        F[at, at] -= 1 / kappa
     return Substructure(solve, attachment, Y, np.linalg.inv(F), held)
 
 
@@ -268,7 +270,7 @@ def mass_matrix(link: Link) -> sp.csr_array:
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
-    """Components that hold a link against rigid motion: a middle node's of a beam, those of d nodes far apart else."""
+    """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
     if link.kind == "beam":
         return np.arange(3) + 3 * (link.n // 2)
     if (
@@ -276,6 +278,10 @@ def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
     ):  # as functions are mass-orthonormal, those with most of 1 and x move the link most
         share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()
         return (link.d * np.argsort(share)[::-1][: link.d + 1, None] + np.arange(link.d)).ravel()
+    if link.kind == "spatial_beam":
+        # its nodes may be in line: the turn about it is held by the slopes of one
+        values = np.flatnonzero(link.one)
+        return np.asarray(np.arange(9) + 3 * values[len(values) // 2])
     nodes = np.flatnonzero(link.one)
     X = link.X[nodes]
     first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
@@ -291,8 +297,8 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     anchors = anchors_of(link)
     if link.full is not None:
         return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
-    kappa = ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean())
-    springs = sp.coo_array((np.full(len(anchors), kappa), (anchors, anchors)), shape=link.K0.shape)
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
+    springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     return substructure(
         joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
@@ -303,7 +309,7 @@ def _dense_factored(
     link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
 ) -> Substructure:
     """`factored` of a reduced link, whose matrices are dense."""
-    kappa = ANCHORAGE * c_K * float(link.K0.diagonal().mean())
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal().mean()))
     dense = A.toarray()
     dense[anchors, anchors] += kappa
     try:

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.seats import Seat, holds, joint_seat, port_weights
+from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.motion.linkage import joint_axis, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
@@ -266,6 +266,7 @@ def port_points(
         points = [centre + half * axis, centre - half * axis]
         points += _points_off(centre, seats, [across, np.cross(axis, across)]) if driven else []
     else:
+        seat = next((s for s in seats.values() if is_flat(s)), seat)
         e1, e2 = seat.directions[:2]
         directions = [e1, e2]
         points = [seat.origin + seat.spread[0] * e1 * c + seat.spread[1] * e2 * s
@@ -273,11 +274,21 @@ def port_points(
         points += _points_off(seat.origin, seats, [seat.directions[2]])
     for link, s in seats.items():
         if not all(holds(s, d) for d in directions):
-            raise MeshError(
-                f"joints.{name}: must sit on a bore of link '{link}', or on a flat face that contains its axis, "
-                "got a flat face across the axis: give the link a bore about the joint's axis"
-            )
+            raise MeshError(f"joints.{name}: {_unheld(links[link])}")
     return np.array(points)
+
+
+def _unheld(link: Link) -> str:
+    """What to do about a seat that does not hold a joint's points."""
+    if link.kind == "spatial_beam":
+        return (
+            f"must sit at an end or a corner of beam '{link.name}', or need its section only, got a joint that "
+            "needs the direction of its axis too: give the beam a point there"
+        )
+    return (
+        f"must sit on a bore of link '{link.name}', or on a flat face that contains its axis, "
+        "got a flat face across the axis: give the link a bore about the joint's axis"
+    )
 
 
 def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:

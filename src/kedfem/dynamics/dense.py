@@ -1,4 +1,4 @@
-"""Steps of small links: dense constant matrices and one compiled loop over a block of time points."""
+"""Steps of small links: dense constant matrices and one compiled loop over a block of time points. Needs numba."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.condensed import port_columns, port_vectors
 from kedfem.dynamics.coupling import Attachment
@@ -55,6 +55,7 @@ class DenseSteps:
         self._sizes = (
             max(link.d for link in links), max(link.n for link in links), max(len(j.weights) for j in joints)
         )  # fmt: skip
+        self._unknowns = _known([joint.B for joint in joints])
         self._matrices = self._padded()
 
     def begin(self, states: Sequence[LinkState]) -> tuple[np.ndarray, ...]:
@@ -102,7 +103,7 @@ class DenseSteps:
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
         forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
         history = (u, v, a, g, forces, strain)
-        advance_block(self.coefficients, self._matrices, (R, F), state, history)
+        advance_block(self.coefficients, self._matrices, *self._unknowns, (R, F), state, history)
         return [self._history(i, each, history) for i, each in enumerate(forcing)], state
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
@@ -113,19 +114,20 @@ class DenseSteps:
 
     def _padded(self) -> tuple[np.ndarray, ...]:
         D, n, P = self._sizes
-        L, k = len(self.links), self.joints[0].B.shape[1]
+        columns, count = self._unknowns
+        L, k = len(self.links), columns.shape[1]
         G, Yt = np.zeros((L, D * n, D * n)), np.zeros((L, D * P, D * n))
-        S, Wt = np.zeros((L, D * P, D * P)), np.zeros((L, D * n, D * P))
-        B = np.zeros((L, P, D, k))
+        S, W = np.zeros((L, D * P, D * P)), np.zeros((L, D * P, D * n))
+        B = np.zeros((L, D * P, k))
         for i, (link, joint, part) in enumerate(zip(self.links, self.joints, self.parts, strict=True)):
             x = (n * np.arange(link.d)[:, None] + np.arange(link.n)).ravel()
             held = self._held(joint)
             G[i][np.ix_(x, x)] = part.G
             Yt[i][np.ix_(held, x)] = part.Y.T
             S[i][np.ix_(held, held)] = part.S
-            Wt[i][np.ix_(x, held)] = part.W.T
-            B[i].reshape(P * D, k)[held] = joint.B
-        return G, Yt, S, Wt, B
+            W[i][np.ix_(held, x)] = part.W
+            B[i][held, : count[i]] = joint.B[:, columns[i, : count[i]]]
+        return G, Yt, S, W, B
 
     def _held(self, joint: Attachment) -> np.ndarray:
         """Where the held components of a link stand among the padded ones."""
@@ -137,6 +139,15 @@ class DenseSteps:
         vectors = port_vectors(joint, force)
         out[: len(vectors), : vectors.shape[1]] = vectors
         return out.ravel()
+
+
+def _known(B: Sequence[Float[np.ndarray, "_ k"]]) -> tuple[Int[np.ndarray, "L k"], Int[np.ndarray, " L"]]:
+    """Which interface unknowns each link knows, and how many."""
+    columns, count = np.zeros((len(B), B[0].shape[1]), int), np.zeros(len(B), int)
+    for i, each in enumerate(B):
+        found = np.flatnonzero(each.any(axis=0))
+        columns[i, : len(found)], count[i] = found, len(found)
+    return columns, count
 
 
 def _part(link: Link, joint: Attachment, c_M: float, c_K: float) -> _Part:

@@ -1,35 +1,29 @@
-"""The inner loop of small links, compiled where numba is there; the same lines run without it, slower.
+"""The inner loop of small links, compiled by numba.
 
 Coordinates are mass-orthonormal: M = 1. Every array has a row per link, padded to the largest: D components, S functions,
-N = D·S coordinates (component first), P ports, Q = D·P port components, k interface unknowns. A padded zero stays zero.
+N = D·S coordinates (component first), P ports, Q = D·P port components; k interface unknowns. A padded zero stays zero.
 
     coefficients : (17,) c_M, c_K, α_f; factors of u, v, a and of the load in the right-hand side; Newmark's
         acceleration (3); h γ, h (1 − γ); damping α, β; the rate's factors (3) times 1 − α_f
-    matrices : G (L, N, N), Yt (L, Q, N), S (L, Q, Q), Wt (L, N, Q), B (L, P, D, k)
+    matrices : G (L, N, N), Yt (L, Q, N), S (L, Q, Q), W (L, Q, N), B (L, Q, k)
+    columns, count : (L, k), (L,) which interface unknowns a link knows, and how many
     forcing : R (T, L, D, D), F (T, L, D, S)
     state : u, v, a, F, f (L, D, S), R (L, D, D), port forces (L, Q), C (3, L, D, S)
     history : u, v, a, g (T, L, D, S), port forces (T, L, Q), strain energy (T, L)
 
-Imported when it is first needed: numba takes a while to load.
+Imported when it is first needed: numba takes a while to load. Plain loops, so that nothing is allocated in a step.
 """
 
 from typing import Any
 
 import numpy as np
+from numba import njit
 
-try:
-    from numba import njit
-
-    compiled: Any = njit(cache=True, error_model="numpy")
-except ImportError:
-
-    def compiled(function: Any) -> Any:
-        """Without numba: leave functions as they are."""
-        return function
+compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 @compiled
-def advance_block(coefficients, matrices, forcing, state, history):  # type: ignore[no-untyped-def]
+def advance_block(coefficients, matrices, columns, count, forcing, state, history):  # type: ignore[no-untyped-def]
     """Take T generalised-α steps of all links in place, [KED, eq. (20)].
 
     With g the displacement and r the right-hand side in the link frame, w = W g its ports:
@@ -38,80 +32,177 @@ def advance_block(coefficients, matrices, forcing, state, history):  # type: ign
 
     G, Y, S are A⁻¹ with ports held, the shapes of moved ports, and the port stiffness of A = c_M + c_K K0.
     """
-    Yt, S, B = matrices[1], matrices[2], matrices[4]
+    G, Yt, S, W, B = matrices
     Rs, Fs = forcing
     T, L, D, n = Fs.shape
-    P, k = B.shape[1], B.shape[3]
-    rhs, RB, SRB = np.zeros((L, D * n)), np.zeros((L, P * D, k)), np.zeros((L, P * D, k))
-    reaction = np.zeros((L, P * D))
+    Q, k = B.shape[1], B.shape[2]
+    rhs, g, Kg = np.zeros((L, D * n)), np.zeros(D * n), np.zeros(D * n)
+    RB, SRB = np.zeros((L, Q, k)), np.zeros((L, Q, k))
+    reaction, w, force = np.zeros((L, Q)), np.zeros(Q), np.zeros(Q)
+    H, z = np.zeros((k, k)), np.zeros(k)
     for t in range(T):
-        H, load = np.zeros((k, k)), np.zeros(k)
+        H[:] = 0.0
+        z[:] = 0.0
         for i in range(L):
-            Rt = np.ascontiguousarray(Rs[t, i].T)
-            rhs[i] = right_hand_side(coefficients, i, Rt, Fs[t, i], state)
-            reaction[i] = np.dot(Yt[i], rhs[i])
-            for p in range(P):
-                RB[i, p * D : (p + 1) * D] = np.dot(Rt, B[i, p])
-            SRB[i] = np.dot(S[i], RB[i])
-            H += np.dot(RB[i].T, SRB[i])
-            load += np.dot(RB[i].T, reaction[i])
-        z = np.linalg.solve(H, load) if k else load
+            right_hand_side(coefficients, i, Rs[t, i], Fs[t, i], state, rhs[i])
+            times(Yt[i], rhs[i], reaction[i])
+            turned_ports(Rs[t, i], B[i], count[i], RB[i])
+            gathered(S[i], RB[i], reaction[i], columns[i], count[i], SRB[i], H, z)
+        solve_definite(H, z)
         for i in range(L):
-            force = np.dot(SRB[i], z) - reaction[i]
-            g = np.dot(matrices[0][i], rhs[i]) + np.dot(Yt[i].T, np.dot(RB[i], z))
-            balance = rhs[i] + np.dot(matrices[3][i], force)
-            end_of_step(
-                coefficients,
-                t,
-                i,
-                np.ascontiguousarray(Rs[t, i]),
-                Fs[t, i],
-                g,
-                balance,
-                force,
-                state,
-                history,
-            )
+            for q in range(Q):
+                force[q], w[q] = -reaction[i, q], 0.0
+                for c in range(count[i]):
+                    force[q] += SRB[i, q, c] * z[columns[i, c]]
+                    w[q] += RB[i, q, c] * z[columns[i, c]]
+            times(G[i], rhs[i], g)
+            add_transposed(Yt[i], w, g)
+            Kg[:] = rhs[i]
+            add_transposed(W[i], force, Kg)
+            end_of_step(coefficients, t, i, Rs[t, i], Fs[t, i], g, Kg, force, state, history)
 
 
 @compiled
-def right_hand_side(coefficients, i, Rt, F, state):  # type: ignore[no-untyped-def]
+def right_hand_side(coefficients, i, R, F, state, out):  # type: ignore[no-untyped-def]
     """History + (P − M R0'') of link i, link frame at the end of the step."""
     alpha_f, from_u, from_v, from_a, from_F = coefficients[2:7]
     u, v, a, F0, f, R0, _, C = state
-    total = from_u * u[i] + from_v * v[i] + from_a * a[i] + from_F * F
-    if alpha_f != 0.0:
-        total += alpha_f * (F0[i] - np.dot(R0[i], f[i]))
-    r = np.dot(Rt, total)
-    if coefficients[12] != 0.0 or coefficients[13] != 0.0:
-        r += coefficients[14] * C[0, i] + coefficients[15] * C[1, i] + coefficients[16] * C[2, i]
-    return r.ravel()
+    damped = coefficients[12] != 0.0 or coefficients[13] != 0.0
+    D, n = F.shape
+    out[:] = 0.0
+    for b in range(D):
+        for j in range(n):
+            x = from_u * u[i, b, j] + from_v * v[i, b, j] + from_a * a[i, b, j] + from_F * F[b, j]
+            if alpha_f != 0.0:
+                inner = 0.0
+                for c in range(D):
+                    inner += R0[i, b, c] * f[i, c, j]
+                x += alpha_f * (F0[i, b, j] - inner)
+            for c in range(D):
+                out[c * n + j] += R[b, c] * x
+    if damped:
+        for b in range(D):
+            for j in range(n):
+                for m in range(3):
+                    out[b * n + j] += coefficients[14 + m] * C[m, i, b, j]
 
 
 @compiled
-def end_of_step(coefficients, t, i, R, F, g, balance, force, state, history):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
-    """State of link i from its displacement g, its balance r + Wᵀ λ = A g and λ; the rest by recurrence."""
+def turned_ports(R, B, count, out):  # type: ignore[no-untyped-def]
+    """Rᵀ B, port by port."""
+    D = len(R)
+    for p in range(len(B) // D):
+        for a in range(D):
+            for c in range(count):
+                x = 0.0
+                for b in range(D):
+                    x += R[b, a] * B[p * D + b, c]
+                out[p * D + a, c] = x
+
+
+@compiled
+def gathered(S, RB, reaction, columns, count, SRB, H, z):  # type: ignore[no-untyped-def]
+    """S Rᵀ B of a link, and its share in the interface equations H z = Σ Bᵀ R Yᵀ r."""
+    for q in range(len(S)):
+        for c in range(count):
+            SRB[q, c] = 0.0
+        for p in range(len(S)):
+            s = S[q, p]
+            for c in range(count):
+                SRB[q, c] += s * RB[p, c]
+    for q in range(len(S)):
+        for c in range(count):
+            x = RB[q, c]
+            z[columns[c]] += x * reaction[q]
+            for d in range(count):
+                H[columns[c], columns[d]] += x * SRB[q, d]
+
+
+@compiled
+def end_of_step(coefficients, t, i, R, F, g, Kg, force, state, history):  # type: ignore[no-untyped-def]
+    """State of link i from its displacement g, its balance Kg = r + Wᵀ λ = A g and λ; the rest by recurrence."""
     c_M, c_K, alpha_f = coefficients[:3]
     n0, n1, n2, h1, h0, alpha, beta = coefficients[7:14]
     u, v, a, F0, f, R0, port_forces, C = state
     us, vs, as_, gs, forces, strain = history
+    damped = alpha != 0.0 or beta != 0.0
     D, n = F.shape
-    Kg = (balance - c_M * g) / c_K
-    shape, internal = g.reshape((D, n)), Kg.reshape((D, n)).copy()
-    u1 = np.dot(R, shape)
-    a1 = n0 * (u1 - u[i]) - n1 * v[i] - n2 * a[i]
-    v1 = v[i] + h1 * a1 + h0 * a[i]
-    if alpha != 0.0 or beta != 0.0:
-        Cg = alpha * shape + beta * internal
-        Ca = n0 * (Cg - C[0, i]) - n1 * C[1, i] - n2 * C[2, i]
-        Cv = C[1, i] + h1 * Ca + h0 * C[2, i]
-        C[0, i], C[1, i], C[2, i] = Cg, Cv, Ca
-        internal += Cv
+    energy = 0.0
+    for b in range(D):
+        for j in range(n):
+            m = b * n + j
+            Kg[m] = (Kg[m] - c_M * g[m]) / c_K
+            energy += g[m] * Kg[m]
+            inner = Kg[m]
+            if damped:
+                x = alpha * g[m] + beta * Kg[m]
+                x2 = n0 * (x - C[0, i, b, j]) - n1 * C[1, i, b, j] - n2 * C[2, i, b, j]
+                x1 = C[1, i, b, j] + h1 * x2 + h0 * C[2, i, b, j]
+                C[0, i, b, j], C[1, i, b, j], C[2, i, b, j] = x, x1, x2
+                inner += x1
+            f[i, b, j] = inner
+            u1 = 0.0
+            for c in range(D):
+                u1 += R[b, c] * g[c * n + j]
+            a1 = n0 * (u1 - u[i, b, j]) - n1 * v[i, b, j] - n2 * a[i, b, j]
+            v[i, b, j] += h1 * a1 + h0 * a[i, b, j]
+            u[i, b, j], a[i, b, j], F0[i, b, j] = u1, a1, F[b, j]
+            us[t, i, b, j], vs[t, i, b, j], as_[t, i, b, j], gs[t, i, b, j] = u1, v[i, b, j], a1, g[m]
+    strain[t, i] = 0.5 * energy
     if alpha_f != 0.0:
-        turned = np.dot(np.ascontiguousarray(R.T), R0[i])
-        for p in range(len(force) // D):
-            force[p * D : (p + 1) * D] -= alpha_f * np.dot(turned, port_forces[i, p * D : (p + 1) * D])
-        force /= 1.0 - alpha_f
-    us[t, i], vs[t, i], as_[t, i], gs[t, i], forces[t, i] = u1, v1, a1, shape, force
-    strain[t, i] = 0.5 * np.dot(g, Kg)
-    u[i], v[i], a[i], f[i], F0[i], R0[i], port_forces[i] = u1, v1, a1, internal, F, R, force
+        earlier_forces(R, R0[i], alpha_f, port_forces[i], force)
+    R0[i] = R
+    port_forces[i] = force
+    forces[t, i] = force
+
+
+@compiled
+def earlier_forces(R, R0, alpha_f, before, force):  # type: ignore[no-untyped-def]
+    """λ at the end of a step from the λ of its balance, (1 − α_f) λ1 + α_f λ0, in the link frame at the end."""
+    D = len(R)
+    for p in range(len(force) // D):
+        for a in range(D):
+            x = 0.0
+            for b in range(D):
+                for c in range(D):
+                    x += R[b, a] * R0[b, c] * before[p * D + c]
+            force[p * D + a] = (force[p * D + a] - alpha_f * x) / (1.0 - alpha_f)
+
+
+@compiled
+def times(A, x, out):  # type: ignore[no-untyped-def]
+    """A x."""
+    for i in range(len(A)):
+        total = 0.0
+        for j in range(len(x)):
+            total += A[i, j] * x[j]
+        out[i] = total
+
+
+@compiled
+def add_transposed(A, x, out):  # type: ignore[no-untyped-def]
+    """out + Aᵀ x."""
+    for i in range(len(A)):
+        if x[i] != 0.0:
+            for j in range(len(out)):
+                out[j] += x[i] * A[i, j]
+
+
+@compiled
+def solve_definite(H, x):  # type: ignore[no-untyped-def]
+    """x becomes H⁻¹ x, H symmetric positive definite and used up (Cholesky)."""
+    k = len(x)
+    for i in range(k):
+        for j in range(i + 1):
+            total = H[i, j]
+            for m in range(j):
+                total -= H[i, m] * H[j, m]
+            H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
+    for i in range(k):
+        for j in range(i):
+            x[i] -= H[i, j] * x[j]
+        x[i] /= H[i, i]
+    for i in range(k - 1, -1, -1):
+        for j in range(i + 1, k):
+            x[i] -= H[j, i] * x[j]
+        x[i] /= H[i, i]

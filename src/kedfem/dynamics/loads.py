@@ -5,6 +5,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -50,11 +51,8 @@ def patterns(scene: Scene, name: str, link: Link) -> tuple[Pattern, ...]:
 
 def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
     """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
-    return Pattern(
-        np.outer(weights, as_rows(link, np.asarray(load.vector))),
-        False,
-        lambda t: load_factor(load.factor, t),
-    )
+    forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
+    return Pattern(forces, False, partial(load_factor, load.factor))
 
 
 def _pattern(where: str, load: Load, link: Link) -> Pattern:
@@ -62,7 +60,7 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
         case ForceLoad():
             rows = point_rows(link, f"{where}.at", np.asarray(load.at))
             beside = float(np.linalg.norm(rows.X - load.at))
-            if link.kind == "beam" and beside > 1e-6 * float(np.ptp(link.X, axis=0).max()):
+            if link.kind == "beam" and beside > 1e-6 * link.size:
                 raise SceneError(
                     f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
                 )
@@ -76,7 +74,7 @@ def _pattern(where: str, load: Load, link: Link) -> Pattern:
                 f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
             )
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
-    return Pattern(forces, load.frame == "link", lambda t: load_factor(load.factor, t))
+    return Pattern(forces, load.frame == "link", partial(load_factor, load.factor))
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:

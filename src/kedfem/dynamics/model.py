@@ -1,6 +1,6 @@
 """The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from kedfem.links.build import bare_links
 from kedfem.links.record import Link
 from kedfem.links.reduced import on_functions, reduced, rigid
 from kedfem.links.seats import holds, is_flat, joint_seat, port_weights
+from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
 
@@ -151,6 +152,23 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
     )
 
 
+def stored_model(model: Model) -> Model | None:
+    """A copy of a model that can be pickled, of links that are small; None if one is not."""
+    if not all(can_be_stored(link) for link in model.links):
+        return None
+    return _with_links(model, stored)
+
+
+def restored_model(model: Model) -> Model:
+    """The model that `stored_model` was given; full links come without their matrices."""
+    return _with_links(model, restored)
+
+
+def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
+    carried = tuple(replace(x, link=changed(x.link)) for x in model.carried)
+    return replace(model, links=tuple(map(changed, model.links)), carried=carried)
+
+
 def _joint_on(joint: Attachment, link: Link) -> Attachment:
     """A joint of the full link on the functions of the reduced one."""
     return replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on_functions(link)[joint.nodes])
@@ -170,7 +188,7 @@ def _slider_on(slider: Slider, link: Link) -> Slider:
 
 def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     at = np.asarray(body.at)
-    near = 1e-6 * float(np.ptp(link.X, axis=0).max())
+    near = 1e-6 * link.size
     here = (
         j
         for j in scene.joints.values()
@@ -181,23 +199,32 @@ def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
     match body:
         case Flywheel(mass=mass, inertia=inertia):
             spin = unit((0, 0, 1)) if axis is None else axis
-            if link.kind == "solid" and not holds(seat, spin):
-                raise MeshError(
-                    f"{where}.at: a flywheel must sit on a bore, or on a flat face that contains its axis"
-                )
+            if not link.planar and not holds(seat, spin):
+                raise MeshError(f"{where}.at: a flywheel must sit on {_wide_seat(link)}")
             return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
         case PointMass(mass=mass):
             return with_body(link, seat, mass, at, np.zeros((3, 3)))
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
-            if link.meshed and is_flat(seat):
+            if is_flat(seat):
+                wanted, got = (
+                    ("an end or a corner", "another node")
+                    if link.kind == "spatial_beam"
+                    else ("a bore", "a flat face")
+                )
                 raise MeshError(
-                    f"{where}.at: a rigid body with full inertia must sit on a bore, got a flat face of '{link.name}'"
+                    f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
                 )
             if link.kind == "beam" and np.linalg.norm(np.subtract(centre, at)[:2]) > 1e-9:
                 raise SceneError(
                     f"{where}.centre: a body on a planar beam must have its centre at its point {body.at}, got {centre}"
                 )
             return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+
+
+def _wide_seat(link: Link) -> str:
+    if link.kind == "spatial_beam":
+        return "an end or a corner of the beam, or have its axis across the beam"
+    return "a bore, or on a flat face that contains its axis"
 
 
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:

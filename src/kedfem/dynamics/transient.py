@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.errors import SolveError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -42,9 +44,14 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
-    small = all(link.unknowns <= SMALL for link in model.links)
+    small = all(map(_is_small, model.links)) and find_spec("numba")
     solver = DenseSteps if small else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
+
+
+def _is_small(link: Link) -> bool:
+    """Whether dense matrices serve a link; the stiff hubs of a spatial beam would cost them digits."""
+    return link.unknowns <= SMALL and (link.kind != "spatial_beam" or link.full is not None)
 
 
 def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Block]:

@@ -4,7 +4,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.record import Link, Mass, Section, mass_constants, read_only
+from kedfem.links.record import Link, Mass, mass_constants, read_only
+from kedfem.links.section import Section
 from kedfem.scene import Material
 
 CELL_TYPES = {2: "line", 3: "line3"}
@@ -105,9 +106,9 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     E, G = material.youngs_modulus, material.shear_modulus
     A, I = section.area, section.second_moment  # noqa: E741
     rigidity = np.array([E * A, section.shear_coefficient * G * A, E * I])
-    gram = _assembled([element_mass(X[c, :2]) for c in cells], cells, len(X))
+    gram = assembled([element_mass(X[c, :2]) for c in cells], cells, len(X))
     dofs = (3 * cells[:, :, None] + np.arange(3)).reshape(len(cells), -1)
-    K0 = _assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs, 3 * len(X))
+    K0 = assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs, 3 * len(X))
     translation, rotation = material.density * A * gram, material.density * I * gram
     mass: Mass = (translation, translation, rotation)
     one = np.ones(len(X))
@@ -129,7 +130,8 @@ def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Flo
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
+def assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
+    """The sum of element matrices, each at its dofs."""
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
     return sp.csr_array(

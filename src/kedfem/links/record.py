@@ -11,31 +11,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.links.section import Section
+
 Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
 Mass = tuple[Matrix, ...]
 Kind = Literal["solid", "plane", "beam", "spatial_beam"]
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """Rectangular cross-section of a planar beam, bending in the xy plane.
-
-    height : extent in the plane of motion [m]; thickness : extent along z [m]; shear_coefficient : κ of κGA [-].
-    """
-
-    height: float
-    thickness: float
-    shear_coefficient: float = 5 / 6
-
-    @property
-    def area(self) -> float:
-        """A [m²]."""
-        return self.height * self.thickness
-
-    @property
-    def second_moment(self) -> float:
-        """I about z [m⁴]."""
-        return self.thickness * self.height**3 / 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +25,9 @@ class Link:
     name : key of the link in the scene.
     kind : ``solid``, ``spatial_beam``: rows of a state are (u, v, w); ``plane``: (u, v); ``beam``: (u, v, ψ),
         [KED, eq. (21)].
-    X : (n, 3) coefficients of position, Σ N_a X_a = x: of nodal functions their nodes [m].
+    X : (n, 3) coefficients of position, Σ N_a X_a = x: of nodal functions their nodes [m], of slopes directions [-].
     one : (n,) coefficients of the constant, Σ N_a one_a = 1 [-].
-    cells, cell_type : elements in VTK order and their meshio name.
+    cells, cell_type : elements in VTK order and their meshio name; of a spatial beam by stations (`triples`).
     axes : (3, 3) columns are the link axes (x along the link) in the reference position.
     mass : one scalar (n, n) matrix per component [kg; ψ: kg m²]; but for beams all the same object.
     K0 : (dn, dn) stiffness in the link frame, dof d·node + component [N/m].
@@ -57,6 +37,7 @@ class Link:
     E, lame : Young's modulus and Lamé's (λ, μ) [Pa], for stresses; of a plane link those of plane stress.
     section : of a beam, else None.
     basis : scikit-fem basis of a solid or plane link (for this room only), else None.
+    triples : of a spatial beam, (3s, n): (u, p, q) at each station of its axis from the state; else None.
     thickness : of a plane link [m], else one: what integrals over its area or edges are multiplied by.
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
@@ -79,6 +60,7 @@ class Link:
     lame: tuple[float, float]
     section: Section | None = None
     basis: Any = None
+    triples: Matrix | None = None
     thickness: float = 1.0
     full: "Link | None" = None
     Q: Float[np.ndarray, "_ n"] | None = None
@@ -98,6 +80,16 @@ class Link:
     def unknowns(self) -> int:
         """d·n."""
         return self.d * self.n
+
+    @property
+    def nodes(self) -> Float[np.ndarray, "k 3"]:
+        """Nodes of the link: coefficients of position of the functions that are values, not slopes [m]."""
+        return np.asarray(self.X[self.one != 0])
+
+    @property
+    def size(self) -> float:
+        """Largest extent along a reference axis [m]; of a reduced link that of the link it was made from."""
+        return float(np.ptp((self.full or self).nodes, axis=0).max())
 
     @property
     def planar(self) -> bool:

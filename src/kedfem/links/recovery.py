@@ -14,6 +14,13 @@ from jaxtyping import Float, Int
 from kedfem.errors import SceneError
 from kedfem.links.beam import shape_functions, strain_rows
 from kedfem.links.record import Link
+from kedfem.links.spatial_recovery import (
+    beam_strains,
+    drawn,
+    nearest_on_axis,
+    section_stress,
+    section_value,
+)
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
@@ -49,7 +56,13 @@ def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRo
     if link.full is not None and link.Q is not None:
         at = point_rows(link.full, where, point)
         return PointRows(at.value @ link.Q, _on_functions(at.stress, link.Q, link.d), at.X)
-    return _solid_rows(link, where, point) if link.meshed else _beam_rows(link, where, point)
+    match link.kind:
+        case "spatial_beam":
+            return _section_rows(link, where, point)
+        case "beam":
+            return _beam_rows(link, where, point)
+        case _:
+            return _solid_rows(link, where, point)
 
 
 def _on_functions(stress: sp.csr_array, Q: Float[np.ndarray, "n s"], d: int) -> sp.csr_array:
@@ -107,10 +120,22 @@ def stress_of_gradient(H: Float[np.ndarray, "p d d"], link: Link) -> Float[np.nd
 
 @dataclass(frozen=True, slots=True)
 class StressRecovery:
-    """Nodal stresses of a whole link; `matrices` are gradients of a meshed link or element rows of a beam."""
+    """Stresses all over a link, at its nodes or, of a spatial beam, at points of its sections.
+
+    link, matrices : the link; gradients of a meshed link or stress rows of a beam
+    cells, cell_type : elements between the points, VTK order
+    values : (p, n) displacement of the points from the state; None if they are the nodes
+    """
 
     link: Link
     matrices: tuple[sp.csr_array, ...]
+    cells: Int[np.ndarray, "e m"]
+    cell_type: str
+    values: sp.csr_array | None = None
+
+    def at_points(self, state: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p d"]:
+        """What coefficients (of position, of displacement) mean at the points."""
+        return state if self.values is None else np.asarray(self.values @ state)
 
 
 def stress_recovery(link: Link) -> StressRecovery:
@@ -118,13 +143,19 @@ def stress_recovery(link: Link) -> StressRecovery:
     if link.full is not None:
         return stress_recovery(link.full)
     if link.meshed:
-        return StressRecovery(link, nodal_gradients(link))
+        return StressRecovery(link, nodal_gradients(link), link.cells, link.cell_type)
+    if link.kind == "spatial_beam":
+        values, stresses, cells = drawn(link)
+        return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
-    return StressRecovery(link, (_beam_fibre(link, half), _beam_fibre(link, -half)))
+    fibres = (_beam_fibre(link, half), _beam_fibre(link, -half))
+    return StressRecovery(link, fibres, link.cells, link.cell_type)
 
 
-def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n 6"]:
-    """Stresses at the nodes in link axes [Pa]; of a beam σ_xx of the outer fibre where it is larger in size.
+def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p 6"]:
+    """Stresses at the nodes in link axes [Pa]; of a planar beam σ_xx of the outer fibre where it is larger in size.
+
+    Of a spatial beam at the points of its sections, in the axes (tangent, n1, n2) of the section.
 
     Parameters
     ----------
@@ -133,6 +164,10 @@ def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float
     if recovery.link.meshed:
         H = np.stack([G @ g for G in recovery.matrices], axis=2)  # (n, i, j)
         return stress_of_gradient(H, recovery.link)
+    if recovery.link.kind == "spatial_beam":
+        sections = np.zeros((recovery.matrices[0].shape[0], 6))
+        sections[:, [0, 3, 5]] = np.stack([m @ g.ravel() for m in recovery.matrices], axis=1)
+        return sections
     top, bottom = (m @ g.ravel() for m in recovery.matrices)
     out = np.zeros((recovery.link.n, 6))
     out[:, 0] = np.where(np.abs(top) >= np.abs(bottom), top, bottom)
@@ -243,6 +278,16 @@ def _beam_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRo
     row = _fibre_row(link, e, r, offset)
     stress = sp.csr_array(sp.vstack([row[None, :], np.zeros((5, 3 * link.n))]))
     return PointRows(value, stress, value @ link.X)
+
+
+def _section_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+    beyond, e, r, (y, z) = nearest_on_axis(link, point)
+    if beyond > POINT_TOLERANCE * link.size:
+        raise SceneError(_outside(link, where, point, beyond))
+    value = section_value(link, e, r, y, z)
+    stress = np.zeros((6, 3 * link.n))
+    stress[[0, 3, 5]] = section_stress(link, beam_strains(link, e, r), y, z)
+    return PointRows(value, sp.csr_array(stress), value @ link.X)
 
 
 def _beam_coordinates(

@@ -16,7 +16,7 @@ from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
 STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
-INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
+INDEPENDENT = 1e-14  # of the largest eigenvalue: a function below repeats others
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
@@ -56,7 +56,7 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
     """Functions of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
-    for _ in range(2):  # the second time for rounding
+    for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
         kept = values > INDEPENDENT * values[-1]
         Q = Q @ (vectors[:, kept] / np.sqrt(values[kept]))
@@ -101,7 +101,7 @@ def rigid(link: Link) -> Link:
     """
     made = reduced(link, rigid_functions(link))
     density = float(link.m1[:, 0].sum() / link.volume.sum())
-    stiffness = (RIGID**2 * link.E / density) / float(np.ptp(link.X, axis=0).max()) ** 2
+    stiffness = (RIGID**2 * link.E / density) / link.size**2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)

@@ -50,7 +50,7 @@ def holds(seat: Seat, direction: Float[np.ndarray, "3"]) -> bool:
 
 
 def is_flat(seat: Seat) -> bool:
-    """Whether the seat is a plane face, of a plane link a straight edge; a beam's node is not."""
+    """Whether the seat is a plane face, of a plane link a straight edge, of a spatial beam a section between its hubs."""
     return bool(seat.spread[0] > 0 and seat.spread[seat.dimensions - 1] == 0)
 
 
@@ -80,6 +80,8 @@ def joint_seat(
         return replace(seat, fit=seat.fit @ link.Q)
     if link.kind == "beam":
         return _node_seat(link, where, point)
+    if link.kind == "spatial_beam":
+        return _section_seat(link, where, point)
     facets = _surface_at(link, point, axis)
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
@@ -122,14 +124,37 @@ def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
 
 
-def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
-    distance = np.linalg.norm(link.X - point, axis=1)
+def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
+    """The function whose node is at a point."""
+    distance = np.where(link.one != 0, np.linalg.norm(link.X - point, axis=1), np.inf)
     node = int(distance.argmin())
-    if distance[node] > PLANE_TOLERANCE * np.ptp(link.X, axis=0).max():
+    if distance[node] > PLANE_TOLERANCE * link.size:
         raise MeshError(_not_touching(link, where, point))
+    return node
+
+
+def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
+    node = _node_at(link, where, point)
     fit = np.zeros((4, link.n))
     fit[0, node] = 1.0
     return Seat(fit, link.X[node], np.eye(3), np.zeros(3))
+
+
+def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
+    """The section at a node of a spatial beam: between its hubs it does not know how a field changes along the axis.
+
+    Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
+    could be told of the section's turn from their difference.
+    """
+    node = _node_at(link, where, point)
+    following = np.flatnonzero(link.one[node + 1 :])
+    slopes = np.arange(node + 1, node + 1 + following[0] if len(following) else link.n)
+    fit = np.zeros((4, link.n))
+    fit[0, node] = 1.0
+    fit[1:, slopes] = link.X[slopes].T
+    y, z = link.X[slopes[-2:]]
+    known = np.array([1.0, 1.0, len(slopes) - 2.0])
+    return Seat(fit, link.X[node], np.stack([y, z, np.cross(y, z)]), known * link.size / np.sqrt(12))
 
 
 def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
@@ -182,9 +207,9 @@ def _surface_at(
 
 def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:
     point = _in_its_plane(link, point)
-    nearest = link.X[np.linalg.norm(link.X - point, axis=1).argmin()]
+    nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
     gap = np.linalg.norm(nearest - point)
-    what = "a node of" if link.kind == "beam" else "a bore or a flat face of"
+    what = "a node of" if link.kind in {"beam", "spatial_beam"} else "a bore or a flat face of"
     return (
         f"{where}: must sit on {what} link '{link.name}' at {_shown(point)}, "
         f"got none there (nearest node {_shown(nearest)}, {gap:.3g} m away)"

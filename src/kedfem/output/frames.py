@@ -18,26 +18,30 @@ def link_fields(
 
     Parameters
     ----------
-    recoveries : per link
+    recoveries : per link, then per carried link
     exaggeration : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
     """
     motion, k = snapshot.motion, snapshot.k
     fields = []
     for link, body, recovery, state in zip(
-        model.links, model.bodies, recoveries, snapshot.states, strict=True
+        model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
     ):
         shown = link.full or link
-        displacement = in_space(shown, nodal_state(link, state.u))
+        displacement = recovery.at_points(in_space(shown, nodal_state(link, state.u)))
         stress = nodal_stress(recovery, nodal_state(link, state.g))
         if link.rigid:
             stress = np.zeros_like(stress)
-        points = motion.p[k, body] + shown.X @ motion.R[k, body].T + exaggeration * displacement
+        drawn = recovery.at_points(shown.X)
+        points = motion.p[k, body] + drawn @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
-            LinkField(link.name, link.cell_type, link.cells, points, displacement, stress, von_mises(stress))
+            LinkField(
+                link.name, recovery.cell_type, recovery.cells, points, displacement, stress, von_mises(stress)
+            )
         )
-    for carried in model.carried:
-        link = carried.link.full or carried.link
-        points = motion.p[k, carried.body] + link.X @ motion.R[k, carried.body].T
-        still, none = np.zeros_like(link.X), np.zeros((link.n, 6))
-        fields.append(LinkField(link.name, link.cell_type, link.cells, points, still, none, none[:, 0]))
+    for carried, recovery in zip(model.carried, recoveries[len(model.links) :], strict=True):
+        X = recovery.at_points((carried.link.full or carried.link).X)
+        points = motion.p[k, carried.body] + X @ motion.R[k, carried.body].T
+        none = np.zeros((len(X), 6))
+        name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
+        fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0]))
     return fields

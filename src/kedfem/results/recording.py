@@ -70,7 +70,7 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
 
         return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
     beside = float(np.linalg.norm(at.X - probe.at))
-    if link.kind == "beam" and beside > 1e-6 * float(np.ptp((link.full or link).X, axis=0).max()):
+    if link.kind == "beam" and beside > 1e-6 * link.size:
         raise SceneError(
             f"output.probes.{name}.at: must lie on the axis of beam '{link.name}' for a {probe.quantity}, "
             f"got {beside:.3g} m beside it"
@@ -200,7 +200,7 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wre
 def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
     """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
     force, moment = _loose(model, k, joint, at)
-    return _small(force), _small(moment)
+    return _small(force), _small(force) and _small(moment)
 
 
 def _loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:

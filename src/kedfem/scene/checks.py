@@ -212,9 +212,9 @@ def load_faults(parts: Parts) -> Iterator[str]:
         if kind == "surface" and fidelity(link) not in {"solid", "plane"}:
             got = f"got {link.name!r}, which is {fidelity(link)}"
             yield load.fault("link", f"must name a solid or a plane link for a surface load, {got}")
-        if kind == "body" and fidelity(link) == "rigid":
+        if kind == "body" and fidelity(link) == "rigid" and not link.has("shape"):
             got = f"got {link.name!r}, which is rigid"
-            yield load.fault("link", f"must name an elastic link for a body load, {got}")
+            yield load.fault("link", f"must name a link with a shape for a body load, {got}")
     for probe in parts.probes.values():
         link = parts.links.get(probe.word("link") or "")
         if link is not None and fidelity(link) == "rigid":

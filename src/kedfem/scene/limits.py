@@ -1,27 +1,24 @@
-"""Cross checks of planar links and their plane, of the analysis and its drive, of files; each yields fault lines."""
+"""Cross checks of plane links and their plane, of the analysis and its drive, of files; each yields fault lines."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from kedfem.errors import SceneError
 from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.points import XYZ
+from kedfem.scene.planes import FLAT, points_of, vector
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
-FLAT = 1e-9  # how far from the plane, relative to the size of the scene
-
 
 def planar_faults(parts: Parts) -> Iterator[str]:
-    """What leaves the plane of a scene with beams or plane links."""
-    here = planar_scene(parts)
-    if not here:
+    """What leaves the plane of a scene with plane links."""
+    here = f"a scene of {NOUNS['plane']}s"
+    if not any(fidelity(link) == "plane" for link in parts.links.values()):
         return
     for joint in parts.joints.values():
         axis = joint.record.axis if joint.record is not None else None
@@ -44,38 +41,25 @@ def planar_faults(parts: Parts) -> Iterator[str]:
 
 
 def mixed_faults(parts: Parts) -> Iterator[str]:
-    """Joints other than hinges between links of different kinds."""
+    """Joints other than hinges between plane links and others."""
     for joint in parts.joints.values():
         held = [parts.links[name] for name in link_names(joint) if name in parts.links]
         kinds = [NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS]
-        if len(set(kinds)) == 2 and joint.word("kind") in {"weld", "prismatic"}:
+        mixed = len(set(kinds)) == 2 and NOUNS["plane"] in kinds
+        if mixed and joint.word("kind") in {"weld", "prismatic"}:
             names = " and ".join(f"{link.name!r}, a {kind}" for link, kind in zip(held, kinds, strict=True))
-            wanted = "must be revolute or spherical between links of different fidelity"
+            wanted = "must be revolute or spherical between a plane link and another"
             yield joint.fault("kind", f"{wanted}, got {joint.word('kind')!r} of {names}")
 
 
-def planar_scene(parts: Parts) -> str:
-    """What messages call a scene with links that know no third dimension; nothing if there are none."""
-    kinds = {fidelity(link) for link in parts.links.values()}
-    return " and ".join(
-        f"a scene of {NOUNS[kind]}s" if i == 0 else f"{NOUNS[kind]}s"
-        for i, kind in enumerate(kind for kind in ("plane", "beam") if kind in kinds)
-    )
-
-
-def vector(parts: tuple[float, ...]) -> str:
-    """A vector as text."""
-    return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
-
-
 def plane_faults(parts: Parts, here: str) -> Iterator[str]:
-    """Points of a planar scene that are not in the z plane of the first; those of solids may be."""
-    solids = {link.name for link in parts.links.values() if fidelity(link) == "solid"}
+    """Points of joints and plane links that are not in the z plane of the first; those of other links may be."""
+    others = {link.name for link in parts.links.values() if fidelity(link) in {"solid", "beam"}}
     placed = [
         (entry, key, point)
         for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes)
         for entry in section.values()
-        if entry.record is not None and link_of(entry) not in solids
+        if entry.record is not None and link_of(entry) not in others
         for key, point in points_of(entry.record)
         if all(math.isfinite(part) for part in point)
     ]
@@ -92,19 +76,6 @@ def plane_faults(parts: Parts, here: str) -> Iterator[str]:
 def link_of(entry: Entry) -> str | None:
     """The link that an entry is, or is on; none for a joint."""
     return entry.name if entry.where[0] == "links" else entry.word("link")
-
-
-def points_of(record: Any) -> Iterator[tuple[tuple[str, *tuple[str | int, ...]], XYZ]]:
-    """The points of a link, joint, load, body or probe, with their keys."""
-    shape = getattr(record, "shape", None)
-    for key in ("between", "points"):
-        for i, point in enumerate(getattr(shape, key, ())):
-            yield ("shape", key, i), point
-    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
-        yield ("shape", "outline", i), getattr(item, "to", item)
-    for key in ("at", "centre"):
-        if hasattr(record, key):
-            yield (key,), getattr(record, key)
 
 
 def analysis_faults(parts: Parts) -> Iterator[str]:

@@ -63,8 +63,10 @@ class LinkScene(Record):
     """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2) for a beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of the elements of a solid or plane link"""
-    shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] = 5.0 / 6.0
-    """part of the section that carries the shear force of a beam"""
+    shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
+    """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
+    beam: Literal["planar", "spatial"] | None = None
+    """what moves of a beam: (u, v, ψ) in a plane z = constant, or all in space; if not given, planar where it can be"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:

@@ -14,7 +14,19 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from kedfem.scene import analysis, damping, drives, links, loads, materials, outlines, points, scene, shapes
+from kedfem.scene import (
+    analysis,
+    damping,
+    drives,
+    links,
+    loads,
+    materials,
+    outlines,
+    points,
+    scene,
+    sections,
+    shapes,
+)
 from kedfem.scene.hints import field_hint, keys, kind_of, models, options
 from kedfem.scene.units import Quantity
 
@@ -35,8 +47,12 @@ as *where: what was wanted, what was got*.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
-* **Plane links and beams** know no third dimension. A scene with any lies in one plane z = constant, with hinges
-  along z and forces in the plane; solids may share it, joined to the others by hinges.
+* **Plane links** know no third dimension. A scene with any lies in one plane z = constant, with hinges along z and
+  forces in the plane; solids may share it, joined to them by hinges.
+* **Beams** are planar where they can be: if all that touches the beam is in one plane z = constant, all hinges of the
+  scene are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams. Else they
+  are beams in space; `beam = "planar"` or `"spatial"` settles it. Beams, plane links and solids go together: a hinge
+  joins any two, a weld a beam in space and a solid.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 
@@ -55,6 +71,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("[links.NAME]", "", [links.LinkScene]),
     ("[links.NAME.mesh]", "", [links.Meshing]),
     ("[links.NAME.shape]", "", models(shapes.Shape)),
+    ("section of a polyline", "", models(sections.SectionShape)),
     ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
     ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
     ("[joints.NAME]", "", [links.Joint]),
@@ -168,7 +185,9 @@ def limits(quantity: Quantity) -> str:
 
 def unit_sign(unit: str) -> str:
     """A unit as it is printed."""
-    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("*", "·")
+    return (
+        "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
+    )
 
 
 def default(field: FieldInfo) -> str:

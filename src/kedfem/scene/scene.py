@@ -29,6 +29,7 @@ from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
+from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
 
 GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
@@ -154,6 +155,7 @@ def cross_faults(parts: Parts) -> list[str]:
         drive_faults,
         load_faults,
         planar_faults,
+        beam_faults,
         analysis_faults,
         file_faults,
     )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, StrictBool, model_validator
 
 from kedfem.scene.base import Fault, FileName, Record, refuse
 from kedfem.scene.outlines import Profile
-from kedfem.scene.points import XYZ, Point
+from kedfem.scene.points import XYZ, Axis, Point
+from kedfem.scene.sections import RectangleSection, SectionShape
 from kedfem.scene.units import Length, PositiveLength, Quantity, fault
 
 
@@ -37,6 +38,8 @@ def not_upright(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
         raise fault(f"must be two points of different x or y, got ({P[0]:.6g}, {P[1]:.6g}) for both")
     return points
 
+
+UPRIGHT = 1 - 1e-6  # cosine between a line and `up` from which they count as one direction
 
 TwoPoints = Annotated[tuple[Point, Point], AfterValidator(different)]
 
@@ -108,15 +111,55 @@ class Part(Record):
 
 
 class Polyline(Record):
-    """A chain of straight segments of one rectangular section; beam."""
+    """A line through points, straight between them or smooth, of one section; beam."""
 
     kind: Literal["polyline"] = "polyline"
     points: Annotated[tuple[Point, ...], AfterValidator(different)] = Field(min_length=2)
     """its corners, at least two"""
-    width: PositiveLength
-    """across the line, in the xy plane"""
-    thickness: PositiveLength
-    """along z"""
+    smooth: StrictBool = False
+    """whether it is a smooth curve (a cubic spline) through the points, else straight with rigid corners"""
+    width: PositiveLength | None = None
+    """of a rectangular section, across the line, in the xy plane"""
+    thickness: PositiveLength | None = None
+    """of a rectangular section, across line and width: along z if the line is in an xy plane"""
+    section: SectionShape | None = None
+    """another section, instead of width and thickness"""
+    up: Axis | None = None
+    """`"x"`, `"y"`, `"z"` or a vector: the thickness is as near to it as can be (on a smooth curve: at its first point);
+    z if not given, x for a line along z"""
+
+    @model_validator(mode="after")
+    def _one_section(self) -> Self:
+        given = [key for key in ("width", "thickness") if getattr(self, key) is not None]
+        faults: list[Fault] = []
+        if self.section is not None and given:
+            faults.append((("section",), f"must stand without {' and '.join(given)}, got both"))
+        elif self.section is None:
+            other = "a section instead of width and thickness"
+            faults += [
+                ((key,), f"is required [m], or {other}, got nothing")
+                for key in ("width", "thickness")
+                if key not in given
+            ]
+        refuse([*faults, *self._along_up()])
+        return self
+
+    def _along_up(self) -> list[Fault]:
+        """Segments along `up`, to which no direction is nearest."""
+        pairs = list(pairwise(self.points))[: 1 if self.smooth else None]
+        for i, (P, Q) in enumerate(pairs if self.up is not None else ()):
+            length = math.dist(P, Q)
+            along = sum((q - p) * u for p, q, u in zip(P, Q, self.up or (), strict=True)) / length
+            if abs(along) > UPRIGHT:
+                return [(("up",), f"must not be along the line, got that of points[{i}] to points[{i + 1}]")]
+        return []
+
+    @property
+    def of_section(self) -> SectionShape:
+        """Its section, a rectangle if given by width and thickness."""
+        if self.section is not None:
+            return self.section
+        return RectangleSection(width=self.width or math.nan, thickness=self.thickness or math.nan)
 
 
 class MeshFile(Record):

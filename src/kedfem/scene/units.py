@@ -22,6 +22,8 @@ NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s+-
 KINDS = {
     "1": "a number",
     "m": "a length",
+    "m^2": "an area",
+    "m^4": "a second moment of area",
     "rad": "an angle",
     "s": "a time",
     "Hz": "a frequency",

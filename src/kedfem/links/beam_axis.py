@@ -1,0 +1,105 @@
+"""The axis of a beam in space: stations with the section's directions, along straight segments or a smooth curve."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from kedfem.links.beam import line_axes
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Stations of an axis: the nodes, those at corners once for each segment that meets there.
+
+    frame : (s, 4, 3) position [m], tangent, directions of the section's y and z
+    node : (s,) number of the station's node, ascending
+    cells : (e, m) stations of each element, ends first
+    hub : (k,) which nodes carry a full affine field: where segments meet and at the ends
+    """
+
+    frame: Float[np.ndarray, "s 4 3"]
+    node: Int[np.ndarray, " s"]
+    cells: Int[np.ndarray, "e m"]
+    hub: Bool[np.ndarray, " k"]
+
+
+def straight_axis(
+    points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None
+) -> Axis:
+    """Straight segments between points, each with directions of its own.
+
+    Parameters
+    ----------
+    elements : per segment
+    nodes : per element, 2 or 3
+    up : the section's z is as near to it as can be; as `line_axes` chooses if None
+    """
+    steps = elements * (nodes - 1)
+    along = np.linspace(0.0, 1.0, steps + 1)[:, None]
+    segments = []
+    for P, Q in pairwise(points):
+        frame = np.empty((steps + 1, 4, 3))
+        frame[:, 0] = P + along * (Q - P)
+        frame[:, 1:] = directions(Q - P, up)
+        segments.append(frame)
+    count = len(segments)
+    node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
+    first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
+    return Axis(
+        np.concatenate(segments), node, _cells(first, nodes), np.arange(count * steps + 1) % steps == 0
+    )
+
+
+def smooth_axis(
+    points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None
+) -> Axis:
+    """A cubic spline through points; the section's directions are carried along it without turning about it.
+
+    Parameters
+    ----------
+    elements : between neighbouring points
+    nodes : per element, 2 or 3
+    up : the section's z at the first point is as near to it as can be
+    """
+    chord = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
+    from scipy.interpolate import CubicSpline
+
+    curve = CubicSpline(chord, points)
+    steps = elements * (nodes - 1)
+    number = np.arange((len(points) - 1) * steps + 1)
+    s = np.interp(number / steps, np.arange(len(points)), chord)
+    frame = np.empty((len(s), 4, 3))
+    frame[:, 0] = curve(s)
+    tangent = curve(s, 1)
+    frame[:, 1] = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    frame[0, 1:] = directions(frame[0, 1], up)
+    for k in range(1, len(s)):
+        frame[k, 2] = carried(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
+        frame[k, 3] = np.cross(frame[k, 1], frame[k, 2])
+    return Axis(frame, number, _cells(number[: -1 : nodes - 1], nodes), number % steps == 0)
+
+
+def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
+    """Unit vectors as rows: along a line, across it (the section's y) and as near to `up` as can be (its z)."""
+    if up is None:
+        return line_axes(np.zeros(3), along).T
+    x = along / np.linalg.norm(along)
+    y = np.cross(up, x)
+    y /= np.linalg.norm(y)
+    return np.stack([x, y, np.cross(x, y)])
+
+
+def carried(
+    v: Float[np.ndarray, "3"], before: Float[np.ndarray, "3"], after: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3"]:
+    """A direction turned by the smallest rotation that takes one tangent into the next."""
+    turned = v - (v @ after) / (1 + before @ after) * (before + after)
+    turned -= (turned @ after) * after
+    return np.asarray(turned / np.linalg.norm(turned))
+
+
+def _cells(first: Int[np.ndarray, " e"], nodes: int) -> Int[np.ndarray, "e m"]:
+    columns = [first, first + nodes - 1] + ([first + 1] if nodes == 3 else [])
+    return np.stack(columns, axis=1)

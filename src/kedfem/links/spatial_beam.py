@@ -1,0 +1,213 @@
+"""Beams in space: a line element times a linear section, functions N_a(s) {1, y, z} with a vector in R³ at each.
+
+x = Σ N_a (x_a + y n1_a + z n2_a) and u = Σ N_a (u_a + y p_a + z q_a): isoparametric, so that a rigid motion is in the
+space, and a state is rows of vectors as in a solid: mass m ⊗ I3, [KED, eqs. (4)(9)(11)]. Strains are changes of the
+metric of curve and directions, linearised: no rigid motion strains anything.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.links.beam import CELL_TYPES, assembled, line_axes, shape_functions
+from kedfem.links.beam_axis import Axis
+from kedfem.links.record import Link, mass_constants, read_only
+from kedfem.links.section import Section
+from kedfem.scene import Material
+
+LOBATTO = {2: np.array([1.0, 1.0]), 3: np.array([1.0, 1.0, 4.0]) / 3}  # weights at the nodes, ends first
+HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
+HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
+
+
+def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "6 m 3 3"], float]:
+    """Strains (ε, γ1, γ2, κ1, κ2, τ) from an element's (u, p, q), and det J.
+
+    With tangent t, directions n1, n2, ' the derivative by arc length, a = n1·p, b = ½ (n1·q + n2·p), c = n2·q:
+    ε = t·u', γ1 = n1·u' + t·p, γ2 = n2·u' + t·q,
+    κ1 = t·p' + n1'·u' − (n1'·t) (ε + a) − (n1'·n2) γ2 − (n2'·t) b,
+    κ2 = t·q' + n2'·u' − (n2'·t) (ε + c) − (n2'·n1) γ1 − (n1'·t) b,
+    τ = ½ (n2·p' + n1'·q − n1·q' − n2'·p) − (n1'·n2) (a + c).
+    If sections turn by θ(s), and whatever their own strains a, b, c: κ1 = −θ'·n2, κ2 = θ'·n1, τ = θ'·t.
+
+    Parameters
+    ----------
+    x : (m, 3, 3) position and the section's directions n1, n2 at each node
+    r : parent coordinate in [-1, 1]
+
+    Returns
+    -------
+    (6, m, 3, 3) by strain, node, function (u, p, q) and component; det J [m]
+    """
+    N, dN = shape_functions(r, len(x))
+    det_J = float(np.linalg.norm(dN @ x[:, 0]))
+    D = dN / det_J
+    t, n1, n2 = D @ x[:, 0], N @ x[:, 1], N @ x[:, 2]
+    n1_s, n2_s = D @ x[:, 1], D @ x[:, 2]
+    rows = np.zeros((6, len(x), 3, 3))
+    rows[0, :, 0] = np.outer(D, t)
+    rows[1, :, 0], rows[1, :, 1] = np.outer(D, n1), np.outer(N, t)
+    rows[2, :, 0], rows[2, :, 2] = np.outer(D, n2), np.outer(N, t)
+    rows[3, :, 0], rows[3, :, 1] = np.outer(D, n1_s), np.outer(D, t)
+    a, b, c = _within(N, n1, n2)
+    rows[3] -= (n1_s @ t) * (rows[0] + a) + (n1_s @ n2) * rows[2] + (n2_s @ t) * b
+    rows[4, :, 0], rows[4, :, 2] = np.outer(D, n2_s), np.outer(D, t)
+    rows[4] -= (n2_s @ t) * (rows[0] + c) + (n2_s @ n1) * rows[1] + (n1_s @ t) * b
+    rows[5, :, 1] = (np.outer(D, n2) - np.outer(N, n2_s)) / 2
+    rows[5, :, 2] = (np.outer(N, n1_s) - np.outer(D, n1)) / 2
+    rows[5] -= (n1_s @ n2) * (a + c)
+    return rows, det_J
+
+
+def _within(
+    N: Float[np.ndarray, " m"], n1: Float[np.ndarray, "3"], n2: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3 m 3 3"]:
+    """Strains within the section, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, node, function and component."""
+    rows = np.zeros((3, len(N), 3, 3))
+    rows[0, :, 1] = np.outer(N, n1)
+    rows[1, :, 1], rows[1, :, 2] = np.outer(N, n2) / 2, np.outer(N, n1) / 2
+    rows[2, :, 2] = np.outer(N, n2)
+    return rows
+
+
+def section_strains(x: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3 3"]:
+    """Strains within the section at a node, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, function and component."""
+    return np.asarray(_within(np.ones(1), x[1], x[2])[:, 0])
+
+
+def rigidities(section: Section, material: Material) -> Float[np.ndarray, "6"]:
+    """(EA, κ1 GA, κ2 GA, E I_y, E I_z, GJ) [N, N m²]."""
+    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
+    k1, k2 = section.shear_coefficients
+    return np.array([E * A, k1 * G * A, k2 * G * A, E * section.second_moment, E * section.second_moment_z,
+                     G * section.torsion_constant])  # fmt: skip
+
+
+def space_stiffness(
+    x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "6"]
+) -> Float[np.ndarray, "k k"]:
+    """Stiffness of one element, [KED, eq. (13)].
+
+    The strains of the beam by reduced integration (m − 1 Gauss points); those within the section at the nodes, as
+    stiff as the beam is along its axis and without ν: the section stays as it is, and does not lock.
+
+    Parameters
+    ----------
+    rigidity : (EA, κ1 GA, κ2 GA, E I_y, E I_z, GJ) [N, N m²]
+    """
+    m = len(x)
+    K = np.zeros((9 * m, 9 * m))
+    for r, w in zip(*np.polynomial.legendre.leggauss(m - 1), strict=True):
+        rows, det_J = space_strains(x, float(r))
+        B = rows.reshape(6, -1)
+        K += w * det_J * (B.T * rigidity) @ B
+    for a, parent in enumerate([-1.0, 1.0, 0.0][:m]):
+        _, dN = shape_functions(parent, m)
+        S = section_strains(x[a]).reshape(3, 9)
+        here = slice(9 * a, 9 * a + 9)
+        K[here, here] += LOBATTO[m][a] * np.linalg.norm(dN @ x[:, 0]) * rigidity[0] * S.T @ S
+    return K
+
+
+def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndarray, "k k"]:
+    """∫ N_a N_b det J ⊗ diag(A, I_y, I_z) of one element, (3m, 3m), to be multiplied by ρ, [KED, eq. (9)]."""
+    m = np.zeros((len(x), len(x)))
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
+        N, dN = shape_functions(r, len(x))
+        m += w * np.linalg.norm(dN @ x[:, 0]) * np.outer(N, N)
+    return np.kron(m, np.diag([section.area, section.second_moment, section.second_moment_z]))
+
+
+def spatial_beam_link(name: str, axis: Axis, section: Section, material: Material) -> Link:
+    """The record of a beam in space.
+
+    Ends and corners are hubs: four functions {1, x, y, z}, a full affine field, whose gradient each segment reads along
+    its own directions, p = G n1, q = G n2, and whose strain is made stiff: a small rigid cube.
+
+    Parameters
+    ----------
+    axis : stations of its axis in the reference position
+    """
+    X, one, triples = functions(axis)
+    x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
+    rigidity = rigidities(section, material)
+    by_station = _dofs(cells, 3)
+    m = assembled([material.density * space_mass(x[c], section) for c in cells], by_station, 3 * len(x))
+    K = assembled([space_stiffness(x[c], rigidity) for c in cells], _dofs(by_station, 3), 9 * len(x))
+    vectors = sp.csr_array(sp.kron(triples, sp.eye_array(3)))
+    cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
+    hubs = hub_functions(one)
+    m = sp.csr_array(
+        triples.T @ m @ triples + _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
+    )
+    K0 = sp.csr_array(
+        vectors.T @ K @ vectors + hub_stiffness(X, hubs, HUB_STIFFNESS * rigidity[0] * length_of(axis))
+    )
+    mass = (m, m, m)
+    m1, mX = mass_constants(mass, one, X)
+    read_only(X, one, cells, m1, mX)
+    return Link(
+        name=name, kind="spatial_beam", X=X, one=one, cells=cells, cell_type=CELL_TYPES[cells.shape[1]],
+        axes=line_axes(x[0, 0], x[-1, 0]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        E=material.youngs_modulus, lame=material.lame(), section=section, triples=triples,
+    )  # fmt: skip
+
+
+def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"], sp.csr_array]:
+    """Functions of all nodes in turn, (1, y, z) or at a hub (1, x, y, z) in the directions of its first station.
+
+    Returns
+    -------
+    X, one : coefficients of position and of the constant
+    triples : (3s, n) values of (x, n1, n2), and so of (u, p, q), at every station
+    """
+    first = np.searchsorted(axis.node, np.arange(len(axis.hub)))
+    count = np.where(axis.hub, 4, 3)
+    start = np.concatenate([[0], count.cumsum()])
+    X, one = np.empty((start[-1], 3)), np.zeros(start[-1])
+    one[start[:-1]] = 1.0
+    triples = sp.lil_array((3 * len(axis.node), start[-1]))
+    for k, s in enumerate(first):
+        X[start[k] : start[k + 1]] = axis.frame[s] if axis.hub[k] else axis.frame[s, [0, 2, 3]]
+    for s, k in enumerate(axis.node):
+        own = slice(start[k] + 1, start[k + 1])
+        triples[3 * s, start[k]] = 1.0
+        turned = axis.frame[s, 2:] @ X[own].T
+        turned[np.abs(turned) < 1e-15] = 0.0  # rounding
+        triples[3 * s + 1 : 3 * s + 3, own] = turned
+    return X, one, sp.csr_array(triples)
+
+
+def hub_functions(one: Float[np.ndarray, " n"]) -> Int[np.ndarray, "h 3"]:
+    """Numbers of the three gradient functions of every hub."""
+    start = np.append(np.flatnonzero(one), len(one))
+    hub = start[:-1][np.diff(start) == 4]
+    return np.asarray(hub[:, None] + np.arange(1, 4))
+
+
+def hub_stiffness(X: Float[np.ndarray, "n 3"], hubs: Int[np.ndarray, "h 3"], k: float) -> sp.csr_array:
+    """k |sym G|² of every hub's gradient G, (3n, 3n) [N m]; no turn strains it."""
+    blocks = []
+    for hub in hubs:
+        pairs = [(i, j) for i in range(3) for j in range(i, 3)]
+        rows = np.zeros((6, 3, 3))
+        for row, (i, j) in zip(rows, pairs, strict=True):
+            row[i] += X[hub[j]] / (2 if i == j else np.sqrt(2))
+            row[j] += X[hub[i]] / (2 if i == j else np.sqrt(2))
+        B = rows.reshape(6, 9)
+        blocks.append(k * B.T @ B)
+    return assembled(blocks, _dofs(hubs, 3), 3 * len(X))
+
+
+def length_of(axis: Axis) -> float:
+    """Length of the axis by chords [m]."""
+    ends = axis.frame[axis.cells[:, :2], 0]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def _dofs(numbers: Int[np.ndarray, "e m"], per: int) -> Int[np.ndarray, "e k"]:
+    return (per * numbers[:, :, None] + np.arange(per)).reshape(len(numbers), -1)
+
+
+def _diagonal(at: Int[np.ndarray, " k"], value: float, n: int) -> sp.csr_array:
+    return sp.csr_array((np.full(len(at), value), (at, at)), shape=(n, n))

@@ -1,0 +1,112 @@
+"""A spatial beam at points of its section: displacement weights, stresses, and how it is drawn."""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.links.beam import shape_functions
+from kedfem.links.record import Link
+from kedfem.links.section import Section, outline, torsion_stress
+from kedfem.links.spatial_beam import space_strains
+
+PARENT = (-1.0, 1.0, 0.0)  # of an element's nodes
+
+
+def element_frame(link: Link, element: int) -> Float[np.ndarray, "m 3 3"]:
+    """Position and the section's directions at an element's nodes."""
+    return np.asarray((_triples(link, link.cells[element]) @ link.X).reshape(-1, 3, 3))
+
+
+def section_of(link: Link) -> Section:
+    """The section of a beam."""
+    if link.section is None:
+        raise TypeError(f"links.{link.name}: has no section")
+    return link.section
+
+
+def section_value(link: Link, element: int, r: float, y: float, z: float) -> Float[np.ndarray, " n"]:
+    """Weights of the displacement of a point of the section: u + y p + z q."""
+    N, _ = shape_functions(r, link.cells.shape[1])
+    return np.asarray(np.outer(N, [1.0, y, z]).ravel() @ _triples(link, link.cells[element]))
+
+
+def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]:
+    """Rows (6, 3n) of (ε, γ1, γ2, κ1, κ2, τ): those of the reduced Gauss points, extended to r."""
+    x = element_frame(link, element)
+    gauss = np.polynomial.legendre.leggauss(len(x) - 1)[0]
+    weights = [np.prod([(r - q) / (p - q) for q in gauss if q != p]) for p in gauss]
+    rows = sum(w * space_strains(x, float(p))[0] for w, p in zip(weights, gauss, strict=True))
+    triples = _triples(link, link.cells[element])
+    out = np.einsum("smfc,mfn->snc", rows, triples.reshape(len(x), 3, link.n))
+    return np.asarray(out.reshape(6, -1))
+
+
+def section_stress(
+    link: Link, strains: Float[np.ndarray, "6 k"], y: float, z: float
+) -> Float[np.ndarray, "3 k"]:
+    """Rows of σ_xx = E (ε + y κ1 + z κ2) and of the shear stresses of torsion σ_xy, σ_zx, axes (tangent, n1, n2)."""
+    xy, zx = torsion_stress(section_of(link), y, z)
+    twist = link.lame[1] * strains[5]
+    return np.stack([link.E * (strains[0] + y * strains[3] + z * strains[4]), xy * twist, zx * twist])
+
+
+def nearest_on_axis(
+    link: Link, point: Float[np.ndarray, "3"]
+) -> tuple[float, int, float, tuple[float, float]]:
+    """How far a point is outside the beam, and the element, parent coordinate and (y, z) of its section there."""
+    found = []
+    for e in range(len(link.cells)):
+        x = element_frame(link, e)
+        r = 0.0
+        for _ in range(20):
+            N, dN = shape_functions(r, len(x))
+            tangent = dN @ x[:, 0]
+            r = float(np.clip(r + tangent @ (point - N @ x[:, 0]) / (tangent @ tangent), -1, 1))
+        N, dN = shape_functions(r, len(x))
+        d, t = point - N @ x[:, 0], dN @ x[:, 0] / np.linalg.norm(dN @ x[:, 0])
+        y, z = float(d @ (N @ x[:, 1])), float(d @ (N @ x[:, 2]))
+        beyond = float(np.hypot(d @ t, _outside_section(section_of(link), y, z)))
+        found.append((beyond, np.hypot(y, z), e, r, (y, z)))
+    beyond, _, e, r, yz = min(found)
+    return beyond, e, r, yz
+
+
+def drawn(link: Link) -> tuple[sp.csr_array, tuple[sp.csr_array, ...], Int[np.ndarray, "c 8"]]:
+    """The beam as a body: its section's points at every station, and hexahedra between them.
+
+    Returns
+    -------
+    (p, n) values, three (p, 3n) stresses σ_xx, σ_xy, σ_zx, and the hexahedra
+    """
+    points, quads = outline(section_of(link))
+    stations = link.cells.max() + 1
+    count = np.bincount(link.cells.ravel(), minlength=stations)
+    values = np.zeros((stations, len(points), link.n))
+    stress = np.zeros((3, stations, len(points), 3 * link.n))
+    for e, cell in enumerate(link.cells):
+        for s, r in zip(cell, PARENT[: len(cell)], strict=True):
+            strains = beam_strains(link, e, r)
+            for k, (y, z) in enumerate(points):
+                values[s, k] = section_value(link, e, r, y, z)
+                stress[:, s, k] += section_stress(link, strains, y, z) / count[s]
+    pairs = (
+        link.cells
+        if link.cells.shape[1] == 2
+        else np.concatenate([link.cells[:, [0, 2]], link.cells[:, [2, 1]]])
+    )
+    corners = pairs[:, None, :, None] * len(points) + quads[None, :, None, :]
+    matrices = tuple(sp.csr_array(rows.reshape(-1, 3 * link.n)) for rows in stress)
+    return sp.csr_array(values.reshape(-1, link.n)), matrices, corners.reshape(-1, 8)
+
+
+def _triples(link: Link, stations: Int[np.ndarray, " m"]) -> Float[np.ndarray, "k n"]:
+    if link.triples is None:
+        raise TypeError(f"links.{link.name}: is no spatial beam")
+    rows = (3 * stations[:, None] + np.arange(3)).ravel()
+    return np.asarray(link.triples[rows].toarray())
+
+
+def _outside_section(section: Section, y: float, z: float) -> float:
+    if section.kind in {"round", "tube"}:
+        return max(0.0, float(np.hypot(y, z)) - section.height / 2)
+    return float(np.hypot(max(0.0, abs(y) - section.height / 2), max(0.0, abs(z) - section.thickness / 2)))

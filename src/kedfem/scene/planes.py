@@ -1,0 +1,152 @@
+"""Which beams are planar: those that nothing in the scene moves out of a plane z = constant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from kedfem.scene.checks import fidelity, link_names
+from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.points import XYZ
+from kedfem.scene.shapes import Polyline
+
+if TYPE_CHECKING:
+    from kedfem.scene.scene import Scene
+
+FLAT = 1e-9  # how far from the plane, relative to the size of the scene
+WORDS = ("fidelity", "beam", "kind", "link", "links")
+Key = tuple[str, *tuple[str | int, ...]]
+
+
+def spatial_beams(scene: Scene) -> frozenset[str]:
+    """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
+    tables: dict[str, Mapping[str, Any]] = {
+        "links": scene.links, "joints": scene.joints, "loads": scene.loads, "bodies": scene.bodies
+    }  # fmt: skip
+    known = {section: _entries(section, table) for section, table in tables.items()}
+    probes = _entries("probes", scene.output.probes, "output")
+    none = Entry((), {}, None)
+    parts = Parts(
+        **known, probes=probes, drive=none, analysis=none, gravity=scene.gravity, materials=[], folder=scene.folder
+    )  # fmt: skip
+    return spatial_names(parts)
+
+
+def _entries(section: str, records: Mapping[str, Any], *above: str) -> dict[str, Entry]:
+    """Entries of records, with the keys that are looked up here."""
+    return {
+        name: Entry((*above, section, name), {key: getattr(record, key, None) for key in WORDS}, record)
+        for name, record in records.items()
+    }
+
+
+def spatial_names(parts: Parts) -> frozenset[str]:
+    """The same of a scene under validation, as far as its parts are good."""
+    beams = {link.name: link for link in parts.links.values() if fidelity(link) == "beam"}
+    free = {name: link.word("beam") for name, link in beams.items()}
+    found = {
+        name for name, kind in free.items() if kind == "spatial" or (kind is None and any(obstacles(parts, name)))
+    }  # fmt: skip
+    while more := {n for n, kind in free.items() if kind is None and welded(parts, n) & found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def welded(parts: Parts, name: str) -> set[str]:
+    """What is welded to a link."""
+    pairs = [link_names(joint) for joint in parts.joints.values() if joint.word("kind") == "weld"]
+    return {other for pair in pairs if name in pair for other in pair} - {name}
+
+
+def beam_faults(parts: Parts) -> Iterator[str]:
+    """What leaves the plane of beams that are said to be planar."""
+    spatial = spatial_names(parts)
+    for link in parts.links.values():
+        if fidelity(link) != "beam":
+            if link.has("beam"):
+                yield link.fault("beam", f"must be given for a beam only, got a {fidelity(link)}")
+        elif link.word("beam") == "planar":
+            yield from obstacles(parts, link.name)
+            for other in sorted(welded(parts, link.name) & spatial):
+                yield link.fault(
+                    "beam", f"must not be 'planar' beside the spatial beam welded to it, got {other!r}"
+                )
+
+
+def obstacles(parts: Parts, name: str) -> Iterator[str]:
+    """Why a beam cannot be planar, as fault lines."""
+    shape = parts.links[name].record.shape if parts.links[name].record is not None else None
+    if isinstance(shape, Polyline):
+        for key in ("smooth", "up"):
+            if getattr(shape, key):
+                yield parts.links[name].fault("shape", "must be left out for a planar beam, got one", key)
+    whose = f"for the planar beam {name!r}"
+    yield from joint_obstacles(parts, name, whose)
+    if parts.gravity[2] != 0.0:
+        yield f"gravity: must lie in the xy plane {whose} [m/s^2], got {vector(parts.gravity)}"
+    for load in parts.loads.values():
+        if load.record is not None and load.record.vector[2] != 0.0:
+            yield load.fault("vector", f"must lie in the xy plane {whose}, got {vector(load.record.vector)}")
+    yield from plane_obstacles(parts, name)
+
+
+def joint_obstacles(parts: Parts, name: str, whose: str) -> Iterator[str]:
+    """Joints that turn or move something out of the plane, and welds of the beam to what is no beam."""
+    for joint in parts.joints.values():
+        if joint.record is None:
+            continue
+        axis, kind = joint.record.axis, joint.record.kind
+        if kind == "revolute" and axis is not None and math.hypot(*axis[:2]) > FLAT:
+            yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
+        if kind == "prismatic" and axis is not None and abs(axis[2]) > FLAT:
+            yield joint.fault("axis", f"must lie in the xy plane {whose}, got {vector(axis)}")
+        others = [parts.links[x] for x in joint.record.links if x in parts.links and x != name]
+        if kind == "weld" and name in joint.record.links and others:
+            other = fidelity(others[0])
+            if other not in {"beam", "rigid"}:
+                yield joint.fault("kind", f"must be a hinge {whose}, got a weld to a {other}")
+
+
+def vector(parts: tuple[float, ...]) -> str:
+    """A vector as text."""
+    return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
+
+
+def plane_obstacles(parts: Parts, name: str) -> Iterator[str]:
+    """Points of a beam, and of what is on it, that are not in the z plane of its first."""
+    placed = [
+        (entry, key, point)
+        for entry in touching(parts, name)
+        for key, point in points_of(entry.record)
+        if all(math.isfinite(part) for part in point)
+    ]
+    if not placed:
+        return
+    first = placed[0][2]
+    size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
+    for entry, key, point in placed:
+        if abs(point[2] - first[2]) > FLAT * size:
+            wanted = f"must lie in the plane z = {first[2]:.6g} of the planar beam {name!r} [m]"
+            yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
+
+
+def touching(parts: Parts, name: str) -> Iterator[Entry]:
+    """A link, its joints and what acts on it or reads it, as far as they are good."""
+    here = [parts.links[name], *(joint for joint in parts.joints.values() if name in link_names(joint))]
+    for section in (parts.loads, parts.bodies, parts.probes):
+        here += [entry for entry in section.values() if entry.word("link") == name]
+    yield from (entry for entry in here if entry.record is not None)
+
+
+def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:
+    """The points of a link, joint, load, body or probe, with their keys."""
+    shape = getattr(record, "shape", None)
+    for key in ("between", "points"):
+        for i, point in enumerate(getattr(shape, key, ())):
+            yield ("shape", key, i), point
+    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
+        yield ("shape", "outline", i), getattr(item, "to", item)
+    for key in ("at", "centre"):
+        if hasattr(record, key):
+            yield (key,), getattr(record, key)
