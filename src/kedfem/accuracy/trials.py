@@ -57,8 +57,12 @@ class Trials:
         joined, along = self._moving(scene)
         key = scene.model_dump_json(exclude={"analysis"})
         if key not in self.models:
-            bare = {name: self._bare(scene, name) for name in scene.links if scene.links[name].shape is not None}
-            self.models[key] = self._reduced(Prepared(scene, joined, along, elastic_model(scene, joined, bare)))
+            bare = {
+                name: self._bare(scene, name) for name in scene.links if scene.links[name].shape is not None
+            }
+            self.models[key] = self._reduced(
+                Prepared(scene, joined, along, elastic_model(scene, joined, bare))
+            )
         return replace(self.models[key], scene=scene, path=along)
 
     def _moving(self, scene: Scene) -> tuple[Linkage, Path]:

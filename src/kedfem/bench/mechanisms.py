@@ -105,7 +105,8 @@ def _asking(raw: dict[str, Any], accuracy: float, analysis: dict[str, Any], on: 
     probes = {name: usual[name] if isinstance(place, str) else place for name, place in on.items()}
     raw["output"] = {
         "probes": {
-            name: {"link": link, "at": at, "quantity": quantity} for name, (link, at, quantity) in probes.items()
+            name: {"link": link, "at": at, "quantity": quantity}
+            for name, (link, at, quantity) in probes.items()
         }
     }
     raw["analysis"] = {**analysis, "accuracy": accuracy}
