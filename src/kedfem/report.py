@@ -64,10 +64,9 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         angle = np.degrees(p.angle)
         table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), f"{angle:.1f}°")
         table.caption = "links: the highest stress of all animation frames"
-    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=True)
-    for stage in done.seconds:
-        spent.add_column(stage, justify="right")
-    spent.add_row(*(f"{s:.2f}" for s in done.seconds.values()))
+    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
+    for stage, seconds in done.seconds.items():
+        spent.add_row(stage, f"{seconds:.2f}")
     return [*before, table, spent]
 
 

@@ -116,8 +116,8 @@ def _limits(plan: Plan) -> Iterator[str]:
     if not plan.reached:
         limit = max(plan.shares, key=lambda share: share.error / share.allowed)
         yield (
-            f"an accuracy of {plan.asked:.3g} could not be reached: {limit.what} limits it, about "
-            f"{plan.error:.2g} is expected"
+            f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
+            f"{100 * plan.error:.2g} % is expected"
         )
 
 
