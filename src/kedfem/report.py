@@ -7,6 +7,7 @@ from rich.text import Text
 from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
+from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.study import Measured, Study
 from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
@@ -71,11 +72,13 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
-    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion over the range, cost."""
+    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
     first = [] if plan is None else plan_tables(plan)
     second = [] if reduction is None else [reduction_table(reduction)]
     cost = _cost(ready, estimated_cost(ready.scene, ready.model))
-    return [*first, _links(ready.model), *second, _motion(ready), cost]
+    found = resolution(ready)
+    third = [] if found is None else [resolution_table(found)]
+    return [*first, _links(ready.model), *second, _motion(ready), *third, cost]
 
 
 def plan_tables(plan: Plan) -> list[Table]:
@@ -109,6 +112,20 @@ def reduction_table(reduction: Reduction) -> Table:
     for name, error in reduction.estimate.items():
         table.add_row(name, f"{100 * error:.2g} %")
     table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links in full"
+    return table
+
+
+def resolution_table(found: Resolution) -> Table:
+    """First frequency of the linkage against step and drive."""
+    table = Table(title="First frequency (drive held, of what the loads excite)", show_header=False)
+    low, high = found.first.min(), found.first.max()
+    table.add_row(
+        "over the last turn", f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"
+    )
+    table.add_row("steps in a period", f"{found.steps_per_period:.3g} at least")
+    for each in found.meetings:
+        angle = np.degrees(each.angle) % 360
+        table.add_row(f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {angle:.0f}°")
     return table
 
 
