@@ -13,6 +13,7 @@ from kedfem.accuracy.histories import worst
 from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
+from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Steps, steps_of, transient
@@ -83,7 +84,8 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
-    peak, deflection = clock.timed(
+    frequencies = clock.timed("frequencies", lambda: resolution(ready))
+    peak, deflection, error = clock.timed(
         "steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch)
     )
     results = read_results(folder / "results.h5")
@@ -93,6 +95,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         *deflection_warning(deflection),
         *reduction_warning(reduction),
         *plan_warning(plan),
+        *resolution_warnings(frequencies, error),
         *warnings,
     )
     return Run(folder, results, peak, clock.seconds, warnings, reduction, plan)
@@ -178,13 +181,13 @@ def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
 
 
 def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
-             folder: FilePath, watch: Watch) -> tuple[Peak | None, float]:  # fmt: skip
-    """All time steps: rows to the results file, frames to the animation; also the largest deflection of a link."""
+             folder: FilePath, watch: Watch) -> tuple[Peak | None, float, float]:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation; also largest deflection and error of a step."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
-    deflection = 0.0
+    deflection, errors = 0.0, step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     with ResultsWriter(
@@ -197,13 +200,14 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
             for block in transient(scene, ready.linkage, ready.path, model, solver):
                 table.add(block, rows(recorded, block))
                 deflection = max(deflection, _deflection(model, block))
+                errors.add(block)
                 for k in range(len(block)):
                     if block.step + k in wanted:
                         peak = _framed(ready, recoveries, frames, block.at(k), peak)
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
-    return peak, deflection
+    return peak, deflection, errors.relative
 
 
 @dataclass

@@ -148,7 +148,10 @@ def new(
 @app.command()
 def bench(
     what: Annotated[
-        str, typer.Argument(metavar="WHAT", help="One of: steps, growth, solvers, elements, plane, start.")
+        str,
+        typer.Argument(
+            metavar="WHAT", help="One of: steps, growth, solvers, elements, plane, accuracy, start."
+        ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),
     quick: Annotated[bool, typer.Option("--quick", help="Small sizes only, to try it.")] = False,

@@ -7,6 +7,7 @@ from rich.text import Text
 from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
+from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.study import Measured, Study
 from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.cost import Cost, estimated_cost
@@ -25,10 +26,7 @@ ELEMENTS = {
     "line3": "beam3",
     "line": "beam2",
 }
-STUDY_COLUMNS = (
-    "fidelity", "mesh", "steps", "reduction", "unknowns", "prepare", "step", "whole", "error",
-    "worst channel",
-)  # fmt: skip
+STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
@@ -67,19 +65,20 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         angle = np.degrees(p.angle)
         table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), f"{angle:.1f}°")
         table.caption = "links: the highest stress of all animation frames"
-    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=True)
-    for stage in done.seconds:
-        spent.add_column(stage, justify="right")
-    spent.add_row(*(f"{s:.2f}" for s in done.seconds.values()))
+    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
+    for stage, seconds in done.seconds.items():
+        spent.add_row(stage, f"{seconds:.2f}")
     return [*before, table, spent]
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
-    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion over the range, cost."""
+    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
     first = [] if plan is None else plan_tables(plan)
     second = [] if reduction is None else [reduction_table(reduction)]
     cost = _cost(ready, estimated_cost(ready.scene, ready.model))
-    return [*first, _links(ready.model), *second, _motion(ready), cost]
+    found = resolution(ready)
+    third = [] if found is None else [resolution_table(found)]
+    return [*first, _links(ready.model), *second, _motion(ready), *third, cost]
 
 
 def plan_tables(plan: Plan) -> list[Table]:
@@ -113,6 +112,20 @@ def reduction_table(reduction: Reduction) -> Table:
     for name, error in reduction.estimate.items():
         table.add_row(name, f"{100 * error:.2g} %")
     table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links in full"
+    return table
+
+
+def resolution_table(found: Resolution) -> Table:
+    """First frequency of the linkage against step and drive."""
+    table = Table(title="First frequency (drive held, of what the loads excite)", show_header=False)
+    low, high = found.first.min(), found.first.max()
+    table.add_row(
+        "over the last turn", f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"
+    )
+    table.add_row("steps in a period", f"{found.steps_per_period:.3g} at least")
+    for each in found.meetings:
+        angle = np.degrees(each.angle) % 360
+        table.add_row(f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {angle:.0f}°")
     return table
 
 
@@ -200,8 +213,14 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     """Variants by time with their errors, and what the reference's own error is made of."""
     table = Table(title=Text(f"Speed against error: {study.title}"))
     for column in STUDY_COLUMNS:
-        left = column in {"fidelity", "worst channel"}
-        table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
+        left = column == "fidelity"
+        table.add_column(
+            column,
+            justify="left" if left else "right",
+            overflow="fold",
+            no_wrap=not left,
+            min_width=11 if left else None,
+        )
     ran = [row for row in study.rows if row.seconds]
     for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
         table.add_row(*_study_row(row, study), style="bold" if row.front else None)
@@ -210,7 +229,8 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     table.caption = Text(
         f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
         f"{study.reference.variant.name}, whose own is about {_percent(study.floor)} ({shares or 'not known'}{unknown}): "
-        f"≤ is below that. prepare, step, whole: seconds, medians; {machine}"
+        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: "
+        f"seconds, medians; worst channels: see the CSV. {machine}"
     )
     return [table, _not_run(study)] if len(ran) < len(study.rows) else [table]
 
@@ -219,13 +239,16 @@ def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
     if row.seconds is None:
         raise ValueError(f"{row.variant.name} was not run")
     v, s = row.variant, row.seconds
-    model = (v.fidelity.name, f"{v.fineness:g}", f"{v.steps}", f"{v.tolerance:.0e}" if v.tolerance else "-")
-    times = (f"{s.preparation:.2f}", f"{s.stepping:.2f}", f"{s.whole:.2f}")
+    model = (
+        v.fidelity.name,
+        f"{v.fineness:g}",
+        f"{v.steps}",
+        f"{v.tolerance:.0e}".replace("e-0", "e-") if v.tolerance else "-",
+    )
+    times = (f"{s.preparation:.2g}", f"{s.stepping:.2g}", f"{s.whole:.2g}")
     below = row.error <= study.floor
-    found = (f"≤ {_percent(study.floor)}" if below else _percent(row.error), row.worst_channel)
-    if v == study.reference.variant:
-        found = ("reference", "")
-    return (*model, str(row.unknowns), *times, *found)
+    found = f"≤ {_percent(study.floor)}" if below else _percent(row.error)
+    return (*model, str(row.unknowns), *times, "reference" if v == study.reference.variant else found)
 
 
 def _not_run(study: Study) -> Table:

@@ -22,7 +22,7 @@ from kedfem.accuracy.variants import (
     with_links,
     with_steps,
 )
-from kedfem.errors import KedfemError
+from kedfem.errors import KedfemError, SceneError
 from kedfem.scene import LinkScene, Scene, time_grid
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
@@ -31,6 +31,7 @@ MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
 )
 STEP_ORDER = 2.0
+LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
 MOST_STEPS = 200_000  # of the analysis
 TRIES = 6  # steps tried
 
@@ -97,14 +98,14 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
     scene, step = _with_step(search, _opened(scene, left_open))
     stage("plan: mesh")
-    scene, mesh, finer = _with_mesh(search, scene)
+    scene, mesh, finer = _with_mesh(search, scene, MESH * max(asked, step / STEP))
     stage("plan: simpler links")
-    scene, model = _with_simpler_links(search, scene, left_open)
+    scene, model = _with_simpler_links(search, scene, left_open, (MESH + MODEL) * asked - mesh)
     scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy=None)
     reduced = any(link.reduced for link in scene.links.values())
     shares = (
         Share("time step", step, STEP * asked), Share("mesh", mesh, MESH * asked),
-        Share("simpler links", model, MODEL * asked),
+        Share("simpler links", model, max(MODEL, MESH + MODEL - mesh / asked) * asked),
         Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
     )  # fmt: skip
     plan = Plan(scene, asked, finer, shares, ())
@@ -115,8 +116,8 @@ def _limits(plan: Plan) -> Iterator[str]:
     if not plan.reached:
         limit = max(plan.shares, key=lambda share: share.error / share.allowed)
         yield (
-            f"an accuracy of {plan.asked:.3g} could not be reached: {limit.what} limits it, about "
-            f"{plan.error:.2g} is expected"
+            f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
+            f"{100 * plan.error:.2g} % is expected"
         )
 
 
@@ -143,23 +144,26 @@ def _with_step(search: Trials, scene: Scene) -> tuple[Scene, float]:
     """The scene with the largest step whose error is within its share, and that error."""
     allowed = STEP * search.asked
     given = {"step", "steps_per_turn"} & scene.analysis.model_fields_set
-    steps, before = time_grid(scene).steps, math.inf
+    steps, order, before = time_grid(scene).steps, STEP_ORDER, (0, math.inf)
     for _ in range(TRIES):
         now, half = with_steps(scene, steps), with_steps(scene, 2 * steps)
-        error = search.difference(now, half) / (1 - 2**-STEP_ORDER)
+        error = search.difference(now, half) / (1 - 2**-order)
         if given:
             if error > allowed:
                 search.notes.append(f"the scene states its step; its error is about {error:.2g}")
             return scene, error
-        wanted = (error / (0.8 * allowed)) ** (1 / STEP_ORDER)
+        if before[0] and steps > before[0] and error > 0.0:
+            order = min(STEP_ORDER, math.log(before[1] / error) / math.log(steps / before[0]))
+        wanted = (error / (0.8 * allowed)) ** (1 / max(order, LEAST_ORDER))
         if error <= allowed and wanted > 0.5:
             return now, error
-        if error > 0.7 * before or steps * min(wanted, 8.0) > MOST_STEPS:
+        if order < LEAST_ORDER or steps * min(wanted, 8.0) > MOST_STEPS:
             search.notes.append(_unresolved(steps, error))
             return now, error
-        before = error if wanted > 1 else math.inf
+        before = (steps, error)
         steps = max(20, math.ceil(steps * min(max(wanted, 0.25), 8.0)))
-    return with_steps(scene, steps), error
+    search.notes.append(_unresolved(before[0], error))
+    return with_steps(scene, before[0]), error
 
 
 def _unresolved(steps: int, error: float) -> str:
@@ -169,51 +173,67 @@ def _unresolved(steps: int, error: float) -> str:
     )
 
 
-def _with_mesh(search: Trials, scene: Scene) -> tuple[Scene, float, float]:
-    """The scene with the coarsest mesh whose error is within its share, that error, and by what it is finer."""
+def _with_mesh(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float, float]:
+    """The scene with the coarsest mesh whose error is allowed, that error, and by what it is finer.
+
+    Where the step's error is beyond its share the mesh need not be better.
+    """
     open_links = [
         name for name, link in scene.links.items() if "mesh" not in link.model_fields_set and refinable(link)
     ]
     if not open_links:
         search.notes.append("the scene states all meshes; their error was not looked at")
         return scene, 0.0, 1.0
-    meshes = [_finer(scene, open_links, factor) for factor in FINER]
+    meshes = _distinct([(factor, _finer(scene, open_links, factor)) for factor in FINER])
     error = math.inf
-    for k, (now, finer) in enumerate(pairwise(meshes)):
+    for (factor, now), (next_factor, finer) in pairwise(meshes):
         try:
             change = search.difference(now, finer)
         except KedfemError as fault:
             search.notes.append(f"a finer mesh could not be tried: {str(fault).splitlines()[0]}")
-            return now, error, FINER[k]
-        beyond = change / ((FINER[k + 1] / FINER[k]) ** MESH_ORDER - 1)
+            return now, error, factor
+        beyond = change / ((next_factor / factor) ** MESH_ORDER - 1)
         error = change + beyond
-        if error <= MESH * search.asked:
-            return now, error, FINER[k]
-        if beyond <= MESH * search.asked:
-            return finer, beyond, FINER[k + 1]
+        if error <= allowed:
+            return now, error, factor
+        if beyond <= allowed:
+            return finer, beyond, next_factor
         error = beyond
     search.notes.append(f"the finest mesh tried still leaves an error of {error:.2g}")
-    return meshes[-1], error, FINER[-1]
+    return meshes[-1][1], error, meshes[-1][0]
+
+
+def _distinct(meshes: list[tuple[float, Scene]]) -> list[tuple[float, Scene]]:
+    """Without those that are like the one before: few elements become more by whole numbers only."""
+    pairs = zip(meshes, [None, *meshes], strict=False)
+    return [now for now, before in pairs if before is None or now[1].links != before[1].links]
 
 
 def _finer(scene: Scene, names: list[str], factor: float) -> Scene:
     return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
 
 
-def _with_simpler_links(search: Trials, scene: Scene, left_open: list[str]) -> tuple[Scene, float]:
-    """The scene with links made rigid, beams or plane as far as the error stays within its share, and that error."""
+def _with_simpler_links(
+    search: Trials, scene: Scene, left_open: list[str], allowed: float
+) -> tuple[Scene, float]:
+    """The scene with links made rigid, beams or plane as far as that changes little, and by how much it does.
+
+    Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.
+    """
     reference, error = scene, 0.0
     for name in left_open:
         for simpler in _simpler(scene.links[name], search.asked):
             trial = with_links(scene, {name: simpler})
             try:
                 change = search.difference(trial, reference)
+            except SceneError:  # such a model makes no sense, as one without any elastic link
+                continue
             except KedfemError as fault:
                 search.notes.append(f"{name}: not {simpler.fidelity}, {str(fault).splitlines()[0]}")
                 continue
-            verdict = "taken" if change <= MODEL * search.asked else "left out"
+            verdict = "taken" if change <= allowed else "left out"
             search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
-            if change <= MODEL * search.asked:
+            if change <= allowed:
                 scene, error = trial, change
                 break
     return scene, error

@@ -147,12 +147,12 @@ def _settled(
     moments = _moments(full)
     small = replace(full, model=reduced_model(full.model, Q))
     run = histories(small, moments)
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS + 1)):
         more = _enriched(full, parts, small, run.kept)
         richer = replace(full, model=reduced_model(full.model, more))
         better = histories(richer, moments)
         estimate = relative_errors(run, better)
-        if worst(estimate) <= tolerance or set(chosen) <= set(fixed):
+        if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or not left:
             break
         Q = [
             old if link.name in fixed else new

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from kedfem.bench.accuracy import bench_accuracy
 from kedfem.bench.elements import bench_elements
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
@@ -22,4 +23,5 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "elements": bench_elements,
     "suite": bench_suite,
     "reduction": bench_reduction,
+    "accuracy": bench_accuracy,
 }

@@ -44,8 +44,8 @@ def bench_suite(folder: Path, quick: bool, watch: Watch) -> str:
     header = ("scene", "unknowns", "motion [s]", "mesh, matrices [s]", "functions [s]", "factor [s]", "steps [s]",
               "a step [µs]", "whole [s]", "estimated error")  # fmt: skip
     note = (
-        "One turn of 720 steps with recording, quasi-static start; no files, nothing kept from earlier runs. Medians "
-        "of 3 runs. Solids of the usual mesh; functions: static factors, training, trial runs and the error's estimate, "
+        "One turn of 720 steps with recording, quasi-static start; no files, nothing kept from earlier runs. Medians of "
+        "3 runs. Solids of the usual mesh; functions: static factors, training, trial runs and the error's estimate, "
         "asked for: 0.1 %.\n\n![suite](suite.png)"
     )
     text = markdown(

@@ -271,13 +271,12 @@ def mass_matrix(link: Link) -> sp.csr_array:
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
     """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
-    if link.kind == "beam":
-        return np.arange(3) + 3 * (link.n // 2)
-    if (
-        link.full is not None
-    ):  # as functions are mass-orthonormal, those with most of 1 and x move the link most
+    if link.full is not None:
+        # as functions are mass-orthonormal, those with most of 1 and x move the link most
         share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()
         return (link.d * np.argsort(share)[::-1][: link.d + 1, None] + np.arange(link.d)).ravel()
+    if link.kind == "beam":
+        return np.arange(3) + 3 * (link.n // 2)
     if link.kind == "spatial_beam":
         # its nodes may be in line: the turn about it is held by the slopes of one
         values = np.flatnonzero(link.one)

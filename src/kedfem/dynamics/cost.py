@@ -5,6 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
+from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.scene import Scene, time_grid
 
@@ -16,6 +17,7 @@ LINK_BYTES, ASSEMBLY_BYTES = (
 )  # times N: kept for each link; for one link at a time while it is assembled
 PLANE_FILL = 0.1  # of that a plane mesh has, from 18,000 to 240,000 unknowns
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
+LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 
 
@@ -34,12 +36,13 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     N = np.array([float(link.unknowns) for link in model.links])
     fill = N**1.5 * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
     bandwidth, rate = _machine()
-    step = OVERHEAD + float((SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()) / bandwidth
+    small = bool((N <= SMALL).all())
+    step = (LOOP if small else OVERHEAD) + float((SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()) / bandwidth
     return Cost(
         factor=FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=time_grid(scene).steps * step,
         memory=float((FACTOR_BYTES * fill + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
-        frame_bytes=120.0 * sum(link.n for link in model.links),
+        frame_bytes=120.0 * sum((link.full or link).n for link in model.links),
     )
 
 

@@ -94,6 +94,21 @@ def excited(
     return out
 
 
+def frozen_frequencies(
+    model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
+) -> Float[np.ndarray, " f"]:
+    """Lowest circular frequencies of the linkage standing still, drive held, among modes that its loads excite [rad/s].
+
+    1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less.
+    """
+    R = [now.R for now in instant.at]
+    static = _copied(coupled(parts, R, [now.F @ now.R for now in instant.at])[0])
+    if not any(x.any() for x in static):
+        return np.zeros(0)
+    values = np.linalg.eigvalsh(_lanczos(model, parts, R, static, levels)[2])[::-1]
+    return np.asarray(1 / np.sqrt(values[values > REPEATED * values[0]]))
+
+
 def _lanczos(
     model: Model, parts: Sequence[Substructure], R: Sequence[Rotation], start: list[NodalOf], levels: int
 ) -> tuple[list[list[NodalOf]], list[list[NodalOf]], Float[np.ndarray, "l l"]]:

@@ -35,6 +35,17 @@ def bare_links(scene: Scene) -> dict[str, Link]:
     return {name: bare_link(scene, name) for name, link in scene.links.items() if link.shape is not None}
 
 
+def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
+    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
+    match link.shape:
+        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
+            return line_axes(np.asarray(a), np.asarray(b))
+        case Polyline(points=points):
+            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
+        case _:
+            return np.eye(3)
+
+
 def bare_link(scene: Scene, name: str) -> Link:
     """The record of one link that has a shape, without attached bodies.
 
@@ -72,14 +83,3 @@ def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link
 
 def _of_bar(bar: Bar) -> RectangleSection:
     return RectangleSection(width=bar.width, thickness=bar.thickness)
-
-
-def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
-    """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
-    match link.shape:
-        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
-            return line_axes(np.asarray(a), np.asarray(b))
-        case Polyline(points=points):
-            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
-        case _:
-            return np.eye(3)

@@ -40,8 +40,9 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     K0 = projected_stiffness(link, Q)
     m1, mX = Q.T @ link.m1, Q.T @ link.mX
     volume = Q.T @ link.volume
-    read_only(Q, one, X, K0, m1, mX)
-    return replace(link, X=X, one=one, mass=mass, K0=K0, m1=m1, mX=mX, volume=volume, full=link, Q=Q)
+    read_only(Q, one, X, m1, mX)
+    made = replace(link, X=X, one=one, mass=mass, K0=K0, m1=m1, mX=mX, volume=volume, full=link, Q=Q)
+    return replace(made, K0=_unstrained(K0, rigid_modes(made)))
 
 
 def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
@@ -71,6 +72,14 @@ def projected_stiffness(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.nda
             out[:, j, :, i] = out[:, i, :, j].T
     K0 = out.reshape(d * s, d * s)
     return (K0 + K0.T) / 2
+
+
+def _unstrained(K0: Float[np.ndarray, "k k"], modes: Float[np.ndarray, "k r"]) -> Float[np.ndarray, "k k"]:
+    """K0 without what rounding left of it on rigid motions: with stiff functions in it that is not little."""
+    B = np.linalg.qr(modes)[0]
+    K0 = K0 - B @ (B.T @ K0)
+    K0 = K0 - (K0 @ B) @ B.T
+    return np.asarray((K0 + K0.T) / 2)
 
 
 def scalar_block(link: Link, i: int, j: int) -> sp.csr_array:

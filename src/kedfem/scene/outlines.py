@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import PlainValidator, TypeAdapter, field_validator, model_validator
+from pydantic import PlainSerializer, PlainValidator, TypeAdapter, field_validator, model_validator
 
 from kedfem.scene.base import Fault, Record, refuse
 from kedfem.scene.points import XYZ, Point
@@ -42,7 +42,12 @@ def outline_item(value: object) -> XYZ | Arc:
     return Arc.model_validate(value) if isinstance(value, (dict, Arc)) else CORNER.validate_python(value)
 
 
-OutlineItem = Annotated[Point | Arc, PlainValidator(outline_item)]
+def stored_item(item: XYZ | Arc) -> object:
+    """What `outline_item` makes the same item of."""
+    return item.model_dump() if isinstance(item, Arc) else item
+
+
+OutlineItem = Annotated[Point | Arc, PlainValidator(outline_item), PlainSerializer(stored_item)]
 
 
 class Profile(Record):

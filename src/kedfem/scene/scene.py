@@ -100,6 +100,8 @@ class Scene(Record):
             raise SceneError(f"must be a table of keys, got {raw!r}")
         placement = Placement(raw.get("points"), raw.get("joints"))
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
+        if isinstance(analysis := raw.get("analysis"), Mapping) and analysis.get("accuracy") is not None:
+            raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_table(raw, scene_folder.get())
         faults = placement.faults + faults
         with known_points(placement):
@@ -110,16 +112,16 @@ class Scene(Record):
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
-        if scene.analysis.accuracy is not None:
-            scene = scene.fill(links=open_links(scene.links))
         return scene
 
 
-def open_links(links: Mapping[str, LinkScene]) -> dict[str, LinkScene]:
-    """The links of a scene that asks for an accuracy: those with a shape that do not state their fidelity are `auto`."""
+def left_open(links: Any) -> Any:
+    """Raw links of a scene that asks for an accuracy: those with a shape that do not state their fidelity are `auto`."""
+    if not isinstance(links, Mapping):
+        return links
     return {
-        name: link.model_copy(update={"fidelity": "auto"})
-        if "fidelity" not in link.model_fields_set and link.shape is not None and not link.reduced
+        name: {**link, "fidelity": "auto"}
+        if isinstance(link, Mapping) and "shape" in link and not link.keys() & {"fidelity", "reduced"}
         else link
         for name, link in links.items()
     }

@@ -1,0 +1,175 @@
+"""Whether the time step resolves the motion, and whether the drive meets a frequency of the linkage."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.reduction import frozen_frequencies, static_parts
+from kedfem.dynamics.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.transient import instants
+from kedfem.errors import SolveError
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import drive_angle, time_grid, turn_steps
+
+POSES = 8  # of the last turn in which the linkage stands still in thought
+LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
+FEWEST = 10  # steps in a period: the period is then 3 % too long
+COARSE = 0.01  # local error of a step, of the peak displacement
+HARMONICS = 5  # of the drive
+NEAR = 0.03  # of a frequency
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """A harmonic of the drive [Hz] near the first frequency of the linkage at a drive angle [rad]."""
+
+    harmonic: int
+    frequency: float
+    angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """First frequencies of the linkage in some poses, drive held, of what its loads excite.
+
+    step : of the analysis [s]
+    first : (p,) frequency in each pose [Hz]
+    angles : (p,) drive angle there [rad]
+    meetings : with harmonics of the drive
+    """
+
+    step: float
+    first: Float[np.ndarray, " p"]
+    angles: Float[np.ndarray, " p"]
+    meetings: tuple[Meeting, ...]
+
+    @property
+    def steps_per_period(self) -> float:
+        """Fewest steps in a period of the first frequency."""
+        return 1 / (self.step * float(self.first.max()))
+
+
+def resolution(ready: Prepared) -> Resolution | None:
+    """Frequencies of a prepared scene's linkage; None where nothing is excited, or of a large model in full."""
+    if ready.model.unknowns > LARGE:
+        return None
+    scene, grid = ready.scene, time_grid(ready.scene)
+    turn = turn_steps(scene)
+    span = min((turn or grid.steps) * grid.step, grid.end)
+    t = grid.end - span * np.arange(POSES)[::-1] / POSES
+    phi = drive_angle(scene.drive.motion, t)
+    motion = rigid_motion(ready.linkage, ready.path, t, phi)
+    try:
+        parts = static_parts(ready.model)
+        lowest = [frozen_frequencies(ready.model, parts, at)[:1] for at in instants(ready.model, motion)]
+    except SolveError:  # nothing holds a link
+        return None
+    excited = [k for k, found in enumerate(lowest) if len(found)]
+    if not excited:
+        return None
+    first = np.array([lowest[k][0] for k in excited]) / (2 * np.pi)
+    angles = phi[0][excited]
+    speed = 1 / (turn * grid.step) if turn else 0.0
+    return Resolution(grid.step, first, angles, tuple(meetings(first, angles, speed)))
+
+
+def meetings(first: Float[np.ndarray, " p"], angles: Float[np.ndarray, " p"], speed: float) -> list[Meeting]:
+    """Where harmonics of a drive's speed [Hz] come near frequencies that change from pose to pose."""
+    found = []
+    around = [*zip(first, angles, strict=True), (first[0], angles[0])]
+    for k in range(1, HARMONICS + 1):
+        for (f0, at), (f1, _) in pairwise(around):
+            if speed and (1 - NEAR) * min(f0, f1) <= k * speed <= (1 + NEAR) * max(f0, f1):
+                found.append(Meeting(k, k * speed, float(at)))
+                break
+    return found
+
+
+def local_error(scheme: Scheme) -> float:
+    """Constant of the error that one step makes in the displacement: (1 + 3 θ²)/12 · h² |δ1'' − δ0''|, θ = α_m − α_f.
+
+    After Zienkiewicz and Xie (1991), whose (6 β − 1)/6 it is for Newmark's method, 1/12 with average acceleration;
+    δ'' of generalised-α belongs to the time θ h after the step's end.
+    """
+    return (1 + 3 * (scheme.alpha_m - scheme.alpha_f) ** 2) / 12 * scheme.h**2
+
+
+@dataclass
+class StepError:
+    """The largest local error of the steps so far, in the norm of the mass."""
+
+    model: Model
+    constant: float
+    change: float = 0.0
+    peak: float = 0.0
+    _last: Float[np.ndarray, " k"] | None = field(default=None, repr=False)
+
+    def add(self, block: Block) -> None:
+        """Look at the steps of a block."""
+        a = self._weighted(block, "a")
+        before = a[:1] if self._last is None else self._last[None]
+        self.change = max(self.change, _largest(np.diff(np.concatenate([before, a]), axis=0)))
+        self.peak = max(self.peak, _largest(self._weighted(block, "u")))
+        self._last = a[-1]
+
+    @property
+    def relative(self) -> float:
+        """Of the largest displacement."""
+        return self.constant * self.change / self.peak if self.peak else 0.0
+
+    def _weighted(self, block: Block, name: str) -> Float[np.ndarray, "T k"]:
+        """√m times a field of all links; a full mass is taken for its diagonal."""
+        columns = [
+            getattr(history, name)[:, :, c] * np.sqrt(np.abs(m.diagonal()))
+            for link, history in zip(self.model.links, block.links, strict=True)
+            for c, m in enumerate(link.mass)
+        ]
+        return np.concatenate(columns, axis=1)
+
+
+def step_error(ready: Prepared) -> StepError:
+    """A watcher of a prepared scene's steps."""
+    scheme = generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf)
+    return StepError(ready.model, local_error(scheme))
+
+
+def resolution_warnings(found: Resolution | None, error: float) -> list[str]:
+    """What a user should know about the step and the drive's speed."""
+    out = []
+    if found is not None and found.steps_per_period < FEWEST:
+        out.append(
+            f"the step resolves the first frequency of the linkage, {found.first.max():.3g} Hz, by "
+            f"{found.steps_per_period:.2g} steps in a period: vibration is not followed; take {FEWEST} or more, a step "
+            f"of {1 / (FEWEST * found.first.max()):.2g} s"
+        )
+    elif error > COARSE:
+        out.append(
+            f"a step makes an error of up to {100 * error:.2g} % of the largest displacement: the step is too long for "
+            "what moves, or the start or a load too sudden"
+        )
+    if found is not None and found.meetings:
+        numbers, speeds, angles = (
+            ", ".join(texts)
+            for texts in zip(
+                *(
+                    (f"{x.harmonic}", f"{x.frequency:.4g}", f"{np.degrees(x.angle) % 360:.0f}")
+                    for x in found.meetings
+                ),
+                strict=True,
+            )
+        )
+        out.append(
+            f"the drive's harmonic {numbers} ({speeds} Hz) meets the first frequency of the linkage, "
+            f"{found.first.min():.3g} to {found.first.max():.3g} Hz over the turn, near drive angle {angles} deg: "
+            "resonance, as far as damping and the passing lets it"
+        )
+    return out
+
+
+def _largest(x: Float[np.ndarray, "T k"]) -> float:
+    return float(np.sqrt((x**2).sum(axis=1).max(initial=0.0)))

@@ -1,0 +1,176 @@
+"""Plans for an accuracy: what is stated stays, shares add up, what cannot be reached is said; and accuracy kept."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from kedfem.accuracy.plan import MESH, MODEL, REDUCTION, STEP, Plan, planned
+from kedfem.accuracy.trials import Trials
+from kedfem.analysis import plan_warning
+from kedfem.bench.accuracy import kept
+from kedfem.bench.mechanisms import MECHANISMS
+from kedfem.cli import app
+from kedfem.scene import scene_from, time_grid
+
+from .test_dynamics import four_bar, slider_crank
+
+
+@pytest.fixture(autouse=True)
+def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+
+
+def arm(accuracy: float = 0.05, **link: Any) -> dict[str, Any]:
+    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
+    return {
+        "links": {"arm": {"material": "steel", "shape": shape, **link}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.2}},
+        "damping": {"ratio": 0.02, "frequencies": [50, 500]},
+        "analysis": {"end_time": 0.2, "accuracy": accuracy},
+    }
+
+
+def polyline_bar(kind: str, points: list[list[float]]) -> dict[str, Any]:
+    return {"kind": kind, "points": points, "width": 0.02, "thickness": 0.02}
+
+
+def test_what_the_scene_states_stays() -> None:
+    raw = arm(fidelity="solid", mesh={"elements": [8, 2, 1]})
+    raw["analysis"]["step"] = 1e-3
+    plan = planned(scene_from(raw))
+    link = plan.scene.links["arm"]
+    assert (link.fidelity, link.reduced, link.mesh.elements) == ("solid", False, (8, 2, 1))
+    assert time_grid(plan.scene).steps == 200
+    assert "the scene states all meshes; their error was not looked at" in plan.notes
+
+
+def test_a_stated_step_that_is_too_long_is_said() -> None:
+    raw = arm(accuracy=0.002)
+    raw["analysis"]["step"] = 4e-3
+    plan = planned(scene_from(raw))
+    assert time_grid(plan.scene).steps == 50
+    assert not plan.reached
+    assert any(note.startswith("the scene states its step; its error is about") for note in plan.notes)
+    assert plan_warning(plan) == plan.notes[-1:]
+    assert "time step limits it" in plan.notes[-1]
+
+
+def test_an_open_link_becomes_the_simplest_that_is_near_enough_and_shares_add_up() -> None:
+    plan = planned(scene_from(arm()))
+    assert plan.scene.links["arm"].fidelity == "beam"  # slenderness 25: shear and ends change 1 %
+    assert plan.scene.analysis.accuracy is None
+    assert plan.reached
+    assert plan_warning(plan) == ()
+    assert plan.error == pytest.approx(sum(share.error for share in plan.shares))
+    assert sum((STEP, MESH, MODEL, REDUCTION)) == pytest.approx(1.0)
+    assert all(share.error <= share.allowed for share in plan.shares)
+
+
+def test_the_same_scene_has_the_same_plan() -> None:
+    first, second = (planned(scene_from(arm())) for _ in range(2))
+    assert first.scene.model_dump() == second.scene.model_dump()
+    assert first.notes == second.notes
+    assert [x.error for x in first.shares] == [x.error for x in second.shares]
+
+
+def test_a_start_that_no_step_resolves_is_said() -> None:
+    """Undamped from rest at full speed: joint forces hold all frequencies of the mesh."""
+    raw = arm(accuracy=0.01)
+    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 60}
+    raw["analysis"] = {"turns": 0.5, "accuracy": 0.01, "rho_inf": 1.0}
+    del raw["damping"]
+    raw["gravity"] = [0, -9.81, 0]
+    plan = planned(scene_from(raw))
+    assert not plan.reached
+    assert "could not be reached: time step limits it" in plan.notes[-1]
+    assert any("vibration beyond them" in note for note in plan.notes)
+    assert plan_warning(plan) == plan.notes[-1:]
+    assert plan.finer <= 1.5  # no mesh helps then, so that none is tried in vain
+
+
+def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
+    raw = arm()
+    raw["links"]["arm"]["shape"] = polyline_bar("polyline", [[0, 0], [0.3, 0], [0.5, 0.1]])
+    plan = planned(scene_from(raw))
+    assert plan.reached
+    assert plan.scene.links["arm"].fidelity == "beam"
+    raw = slider_crank("rigid")
+    raw["analysis"] = {"turns": 0.25, "accuracy": 0.05, "initial": "quasi-static"}
+    for name in ("crank", "rod"):
+        del raw["links"][name]["fidelity"], raw["links"][name]["mesh"]
+    plan = planned(scene_from(raw))
+    assert plan.scene.links["piston"] == scene_from(raw).links["piston"]
+    raw = arm()
+    raw["gravity"] = [0, 0, -9.81]  # out of the plane
+    plan = planned(scene_from(raw))
+    assert plan.scene.links["arm"].fidelity in {"beam", "solid"}
+    assert plan.reached
+
+
+def test_trials_that_differ_in_the_step_share_their_model() -> None:
+    raw = arm()
+    trials = Trials(0.05, lambda name: None)
+    scene = scene_from({**raw, "analysis": {"end_time": 0.2, "step": 1e-3}})
+    other = scene_from({**raw, "analysis": {"end_time": 0.2, "step": 5e-4}})
+    assert trials.ready(scene).model is trials.ready(other).model
+    assert len(trials.links) == len(trials.models) == 1
+    assert len(trials.run(other).time) == 401
+
+
+def test_functions_of_an_unchanged_link_are_found_once() -> None:
+    raw = four_bar("bar", turns=0.25, initial="quasi-static")
+    for link in raw["links"].values():
+        link["mesh"] = {"elements": [8, 2, 1]}
+    trials = Trials(0.05, lambda name: None)
+    first = trials.ready(scene_from(raw)).model
+    raw["links"]["crank"]["mesh"] = {"elements": [10, 2, 1]}
+    second = trials.ready(scene_from(raw)).model
+    assert len(trials.links) == 4
+    old, new = first.links[1], second.links[1]
+    assert new.full is not None
+    assert second.links[0].n != first.links[0].n or second.links[0].full is not first.links[0].full
+    turned = old.Q.T @ (new.full.mass[0] @ new.Q)  # the same span: one basis is the other, turned
+    np.testing.assert_allclose(turned.T @ turned, np.eye(new.n), rtol=0, atol=1e-10)
+
+
+def test_check_shows_the_plan(tmp_path: Path) -> None:
+    file = tmp_path / "scene.toml"
+    file.write_text(TOML, encoding="utf-8")
+    shown = CliRunner().invoke(app, ["check", str(file)], env={"COLUMNS": "200"})
+    assert shown.exit_code == 0, shown.output
+    for words in ("Accuracy asked for: 5 %", "time step", "simpler links", "reduced beam", "First frequency"):
+        assert words in shown.output
+
+
+TOML = """
+[links.arm]
+material = "steel"
+shape = { kind = "bar", between = [[0, 0], [0.5, 0]], width = 0.02, thickness = 0.02 }
+[joints]
+A = { kind = "revolute", links = ["ground", "arm"], at = [0, 0] }
+[drive]
+joint = "A"
+motion = { kind = "cycloidal", angle = 1, rise = 0.2 }
+[damping]
+ratio = 0.02
+frequencies = [50, 500]
+[analysis]
+end_time = 0.2
+accuracy = 0.05
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["swung arm", "four-bar of bars"])
+def test_accuracy_is_kept(name: str) -> None:
+    """Against solids with finer elements, shorter steps: docs/performance/accuracy.md has more."""
+    done = kept(MECHANISMS[name], (0.05, 0.01))
+    plans: list[Plan] = [each.plan for each in done]
+    assert all(plan.reached for plan in plans)
+    for each in done:
+        assert each.within == 1.0
+        assert max(each.errors.values()) < 1.5 * each.plan.error  # the estimate is no guess
