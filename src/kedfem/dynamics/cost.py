@@ -37,7 +37,9 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     fill = N**1.5 * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
     bandwidth, rate = _machine()
     small = bool((N <= SMALL).all())
-    step = (LOOP if small else OVERHEAD) + float((SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()) / bandwidth
+    step = (LOOP if small else OVERHEAD) + float(
+        (SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()
+    ) / bandwidth
     return Cost(
         factor=FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=time_grid(scene).steps * step,
