@@ -1,9 +1,9 @@
 """Links reduced as far as a tolerance allows, with an estimate of what the reduction costs.
 
 The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
-the full linkage; these are added to the functions, and the run is repeated. What changes, times a factor
-found on full runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the tolerance, the richer functions are
-kept and the same is done again.
+the full linkage; these are added to the functions, and the run is repeated. What changes, times a factor found on full
+runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
+tolerance, the richer functions are kept and the same is done again.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
