@@ -42,7 +42,10 @@ def test_cost_counts_no_error_that_rises_again_and_no_target_that_is_missed() ->
     assert cost(work, [1e-3, 1e-3, 1e-1], 1e-2) is None
 
 
-@pytest.mark.parametrize(("name", "pictures"), [("suite", ["suite.png"])])
+@pytest.mark.parametrize(
+    ("name", "pictures"),
+    [("suite", ["suite.png"]), ("reduction", ["reduction.png", "reduction_field.png", "reduction_loop.png"])],
+)
 def test_a_benchmark_writes_its_page(name: str, pictures: list[str], tmp_path: Path) -> None:
     text = BENCHMARKS[name](tmp_path, True, lambda stage, done, total: None)
     assert (tmp_path / f"{name}.md").read_text(encoding="utf-8") == text

@@ -8,6 +8,7 @@ from kedfem.bench.elements import bench_elements
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
 from kedfem.bench.plane import bench_plane
+from kedfem.bench.reduction import bench_reduction
 from kedfem.bench.solvers import bench_solvers
 from kedfem.bench.start import bench_start
 from kedfem.bench.steps import bench_steps
@@ -21,5 +22,6 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "start": bench_start,
     "elements": bench_elements,
     "suite": bench_suite,
+    "reduction": bench_reduction,
     "accuracy": bench_accuracy,
 }

@@ -41,9 +41,14 @@ def markdown(
 ) -> str:
     """A results page: machine, command that regenerates it, table."""
     lines = [f"# {title}", "", f"Regenerate with `{command}`. Measured on: {machine()}.", ""]
-    lines += ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += table(header, rows)
     return "\n".join([*lines, "", after, ""]) if after else "\n".join([*lines, ""])
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table in Markdown."""
+    first, *others = (f"| {' | '.join(row)} |" for row in (header, *rows))
+    return [first, "|" + "---|" * len(header), *others]
 
 
 def write_page(folder: Path, name: str, text: str) -> None:

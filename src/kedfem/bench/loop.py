@@ -1,0 +1,131 @@
+"""The compiled loop of small links: microseconds a step, with and without numba, and the least that they could be."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import reduced
+from kedfem.bench.machine import seconds
+from kedfem.bench.scenes import mechanisms
+from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.transient import first_states, forcings, load_factors, motions, steps_of
+from kedfem.errors import SolveError
+from kedfem.results.recording import recording, rows
+from kedfem.scene import Scene, scene_from, time_grid
+
+
+def four_bar_with(functions: int) -> tuple[Prepared, Prepared]:
+    """The solid four-bar in full, and with so many functions per link; three probes."""
+    raw = mechanisms()["solid four-bar"]
+    probes = {
+        "stress": {"link": "rocker", "at": "M", "quantity": "stress"},
+        "middle": {"link": "coupler", "at": "N", "quantity": "displacement"},
+        "velocity": {"link": "coupler", "at": "N", "quantity": "velocity"},
+    }
+    scene = scene_from({**raw, "output": {"probes": probes}})
+    full = meshed(scene)
+    return full, with_functions(full, functions)
+
+
+def with_functions(full: Prepared, functions: int) -> Prepared:
+    """All links with so many of kedfem's functions."""
+    counts = {link.name: functions for link in full.model.links}
+    return reduced(full, list(counts), full.scene.analysis.reduction, counts).ready
+
+
+def loop_time(ready: Prepared, repeats: int = 9) -> float:
+    """Seconds of a step in the loop alone: one block of 256 time points, forcing known."""
+    scene, model = ready.scene, ready.model
+    solver: Any = steps_of(scene, model)
+    _, motion = next(motions(scene, ready.linkage, ready.path))
+    forcing = forcings(model, load_factors(model, motion.t), motion)
+    states = first_states(scene, ready.linkage, ready.path, scene.drive.motion, model)
+    solver.advance(solver.begin(states), forcing)  # compiled
+    return seconds(lambda: solver.advance(solver.begin(states), forcing), repeats) / len(motion.t)
+
+
+def recorded_rate(ready: Prepared) -> float:
+    """Steps a second with all probes and joint forces at every step; the rigid motion is known."""
+    scene, model = ready.scene, ready.model
+    known = list(motions(scene, ready.linkage, ready.path))
+    states = first_states(scene, ready.linkage, ready.path, scene.drive.motion, model)
+    recorded = recording(scene, model)
+    solver: Any = steps_of(scene, model)
+
+    def all_steps() -> None:
+        state = solver.begin(states)
+        for first, motion in known:
+            links, state = solver.advance(state, forcings(model, load_factors(model, motion.t), motion))
+            rows(recorded, Block(first, motion, links))
+
+    all_steps()
+    return time_grid(scene).steps / seconds(all_steps, 3)
+
+
+def least_time(ready: Prepared, bandwidth: float, rate: float) -> tuple[float, float]:
+    """Seconds that a step's products need at a machine's speed: by memory (all from RAM), by arithmetic."""
+    solver = DenseSteps(
+        ready.model.links, ready.model.joints,
+        generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf), ready.model.damping,
+    )  # fmt: skip
+    numbers = sum(x.G.size + 2 * x.Y.size + x.S.size + x.W.size for x in solver.parts)  # Y is used twice
+    read = sum(x.G.size + x.Y.size + x.S.size + x.W.size for x in solver.parts)
+    return 8 * read / bandwidth, 2 * numbers / rate
+
+
+def machine_speed() -> tuple[float, float]:
+    """Bytes read and floating point operations per second, one thread's BLAS."""
+    a, b = np.ones(16_000_000), np.ones((800, 800))
+    a @ a
+    b @ b
+    return 8 * len(a) / seconds(a.sum, 5), 2 * 800**3 / seconds(lambda: b @ b, 5)
+
+
+def without_numba(functions: int) -> float:
+    """`loop_time` where numba cannot be imported, in a process of its own."""
+    command = [sys.executable, "-m", "kedfem.bench.loop", str(functions)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        what: Sequence[str] = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
+        raise SolveError(f"bench reduction: must run without numba, got {what[0]}")
+    return float(json.loads(done.stdout))
+
+
+def preparation() -> tuple[int, float, float]:
+    """An arm of 27-node hexahedra as `kedfem bench growth` makes them: unknowns, seconds to factor it, to reduce it."""
+    from kedfem.dynamics.reduction import static_parts
+
+    full = meshed(_thick_arm())
+    factor = seconds(lambda: static_parts(full.model), 3)
+    since = perf_counter()
+    reduced(full, ["arm"], 1e-3)
+    return full.model.unknowns, factor, perf_counter() - since
+
+
+def _thick_arm() -> Scene:
+    shape = {"kind": "bar", "between": ["A", "B"], "width": 0.22, "thickness": 0.02}
+    return scene_from({
+        "points": {"A": [0, 0], "B": [1, 0]},
+        "links": {"arm": {"material": "steel", "shape": shape, "element": "hex27", "mesh": {"elements": [64, 14, 2]}}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A"}},
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": "60 deg", "rise": 0.5}},
+        "analysis": {"end_time": 0.6, "step": 1e-3},
+        "output": {"probes": {"tip": {"link": "arm", "at": "B", "quantity": "displacement"}}},
+    })  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.modules["numba"] = None  # type: ignore[assignment]
+    _, small = four_bar_with(int(sys.argv[1]))
+    if not isinstance(steps_of(small.scene, small.model), CondensedSteps):
+        raise SystemExit("numba is still there")
+    json.dump(loop_time(small, 3), sys.stdout)
