@@ -150,7 +150,8 @@ def bench(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="WHAT", help="One of: steps, growth, solvers, elements, plane, accuracy, start."
+            metavar="WHAT",
+            help="One of: accuracy, elements, growth, plane, reduction, solvers, start, steps, suite.",
         ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),
