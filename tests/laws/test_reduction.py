@@ -1,0 +1,185 @@
+"""Laws of reduced links: the same equation in the span of a few functions, and an estimate that can be trusted."""
+
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.histories import histories, relative_errors, worst
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import _training, reduced
+from kedfem.dynamics.condensed import coupled
+from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.reduction import Basis, bases, static_parts
+from kedfem.dynamics.residual import residual_deflections
+from kedfem.dynamics.transient import instants, snapshots, steps_of
+from kedfem.links.reduced import rigid_modes
+from kedfem.scene import scene_from
+from tests.rooms.test_dynamics import four_bar
+
+KINDS = ["beam", "bar", "plane", "spatial"]
+TURNED = 0.7  # rad
+
+
+@pytest.fixture(autouse=True)
+def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+
+
+def arm(kind: str, **analysis: Any) -> dict[str, Any]:
+    """A cantilever that swings under its weight; spatial: a bent beam under weight across its plane."""
+    shape: dict[str, Any] = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.03}
+    link: dict[str, Any] = {
+        "material": "steel",
+        "shape": shape,
+        "fidelity": "solid",
+        "mesh": {"elements": [10, 2, 1]},
+    }
+    if kind == "plane":
+        link |= {"fidelity": "plane", "mesh": {"elements": [10, 2]}}
+    if kind in {"beam", "spatial"}:
+        link |= {"fidelity": "beam", "mesh": {"elements": 10}}
+    if kind == "spatial":
+        link["shape"] = {
+            "kind": "polyline",
+            "points": [[0, 0], [0.3, 0.1], [0.5, 0]],
+            "width": 0.02,
+            "thickness": 0.03,
+        }
+    return {
+        "gravity": [0, 0, -9.81] if kind == "spatial" else [0, -9.81, 0],
+        "links": {"arm": link},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.1}},
+        "damping": {"beta": 1e-5},
+        "analysis": {"end_time": 0.1, "step": 1e-3, **analysis},
+    }
+
+
+def found_bases(full: Prepared) -> list[Basis]:
+    made = bases(full.model, instants(full.model, _training(full)), static_parts(full.model))
+    return [basis for basis in made if basis is not None]
+
+
+def with_functions(full: Prepared, count: int) -> Model:
+    return reduced_model(full.model, [basis.first(count) for basis in found_bases(full)])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_reduced_link_is_a_link(kind: str) -> None:
+    """Mass 1, 1 and X held exactly, rigid modes strain nothing, K0 symmetric and positive semidefinite."""
+    full = meshed(scene_from(arm(kind)))
+    link = with_functions(full, 12).links[0]
+    whole, Q = link.full, link.Q
+    assert whole is not None
+    assert Q is not None
+    assert_allclose(Q.T @ (whole.mass[0] @ Q), np.eye(link.n), rtol=0, atol=1e-12)
+    assert_allclose(Q @ link.one, whole.one, rtol=0, atol=1e-10)
+    columns = 2 if link.planar else 3
+    assert_allclose((Q @ link.X)[:, :columns], whole.X[:, :columns], rtol=0, atol=1e-10)
+    assert_allclose(link.K0, link.K0.T, rtol=0, atol=0)
+    values = np.linalg.eigvalsh(link.K0)
+    assert values[0] > -1e-12 * values[-1]
+    modes = rigid_modes(link)
+    assert np.abs(link.K0 @ modes).max() < 1e-11 * values[-1] * np.abs(modes).max()
+    assert np.count_nonzero(values > 1e-9 * values[-1]) <= link.unknowns - modes.shape[1]
+
+
+@pytest.mark.parametrize("kind", ["beam", "plane", "bar"])
+def test_all_functions_give_the_full_answer(kind: str) -> None:
+    raw = arm(kind, initial="quasi-static")
+    raw["links"]["arm"]["mesh"] = {
+        "beam": {"elements": 3},
+        "plane": {"elements": [3, 1]},
+        "bar": {"elements": [3, 1, 1]},
+    }[kind]
+    full = meshed(scene_from(raw))
+    rng = np.random.default_rng(1)
+    mixed = [rng.normal(size=(link.n, link.n)) for link in full.model.links]
+    small = replace(full, model=reduced_model(full.model, mixed))
+    # rounding, of stiffnesses 1e6 times as large as that of bending
+    assert worst(relative_errors(histories(small), histories(full))) < 1e-7
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) -> None:
+    """Galerkin: the work of the loads on their static deflection, uᵀ F, rises with the space up to the full."""
+    full = meshed(scene_from(arm(kind)))
+    work = [
+        static_work(reduced_model(full.model, [b.first(n) for b in found_bases(full)]), full)
+        for n in (5, 8, 11, 20)
+    ]
+    exact = static_work(full.model, full)
+    assert np.all(np.diff(work) >= -1e-9 * exact)
+    assert work[-1] <= exact * (1 + 1e-9)
+    assert_allclose(work[-1], exact, rtol=1e-3)
+    assert work[0] < work[-1] * (1 - 1e-7)
+
+
+def static_work(model: Model, full: Prepared) -> float:
+    instant = instants(model, _training(full))[-1]
+    F = [now.F @ now.R for now in instant.at]
+    u = coupled(static_parts(model), [now.R for now in instant.at], F)[0]
+    return sum(float(np.vdot(x, f)) for x, f in zip(u, F, strict=True))
+
+
+def test_a_scene_that_is_turned_has_the_same_forces_turned() -> None:
+    """Q ⊗ R³ is closed under rotation: the same functions do, whatever the directions that they came from."""
+    raw = four_bar("bar", turns=0.1, steps_per_turn=240, initial="quasi-static")
+    for link in raw["links"].values():
+        link["mesh"] = {"elements": [8, 1, 1]}
+    turned = deepcopy(raw)
+    turned["points"]["D"] = [0.9144 * np.cos(TURNED), 0.9144 * np.sin(TURNED)]
+    turned["points"]["B"]["angle"] = np.radians(60) + TURNED
+    here, there = (meshed(scene_from(each)) for each in (raw, turned))
+    Q = [basis.first(14) for basis in found_bases(here)]
+    found = [histories(replace(x, model=reduced_model(x.model, Q))) for x in (here, there)]
+    c, s = np.cos(TURNED), np.sin(TURNED)
+    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    for joint in "ABCD":
+        a, b = (run.channels[f"joints/{joint}/force"][1] for run in found)
+        assert_allclose(b, a @ R.T, rtol=0, atol=1e-7 * np.abs(a).max())  # rounding; z is held more than once
+
+
+@pytest.mark.parametrize("kind", ["beam", "bar"])
+def test_the_full_models_own_state_leaves_no_residual(kind: str) -> None:
+    """With average acceleration the balance holds at the end of each step."""
+    raw = arm(kind, rho_inf=1.0)
+    del raw["damping"]
+    full = meshed(scene_from(raw))
+    parts = static_parts(full.model)
+    states = list(
+        snapshots(full.scene, full.linkage, full.path, full.model, steps_of(full.scene, full.model))
+    )
+    size = max(np.abs(s.states[0].g).max() for s in states)
+    for snapshot in states[1::30]:
+        left = residual_deflections(full.model, parts, full.model, snapshot)[0]
+        assert np.abs(left).max() < 1e-7 * size
+    wrong = states[50]
+    wrong.states[0].a[:] *= 1.01
+    assert np.abs(residual_deflections(full.model, parts, full.model, wrong)[0]).max() > 1e-5 * size
+
+
+def four_bars(speed: str) -> dict[str, Any]:
+    raw = four_bar("bar", turns=0.5, steps_per_turn=240, initial="quasi-static")
+    raw["drive"]["motion"]["speed"] = speed
+    for link in raw["links"].values():
+        link["mesh"] = {"elements": [10, 2, 1]}
+    return raw
+
+
+@pytest.mark.parametrize(
+    ("raw", "count"),
+    [(arm("bar"), 6), (four_bars("150 rpm"), 9), (four_bars("400 rpm"), 9)],
+    ids=["arm", "slow", "fast"],
+)
+def test_the_estimate_is_near_the_error(raw: dict[str, Any], count: int) -> None:
+    full = meshed(scene_from(raw))
+    names = list(raw["links"])
+    found = reduced(full, names, 1e-9, dict.fromkeys(names, count))
+    true = relative_errors(histories(found.ready), histories(full))
+    assert worst(true) > 1e-4  # else there is nothing to estimate
+    assert 1 / 3 < worst(found.estimate) / worst(true) < 3

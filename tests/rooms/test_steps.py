@@ -1,0 +1,173 @@
+"""Dense, condensed and literal steps of one model; the compiled loop without its compiler; runs that end early."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.histories import Histories, relative_errors, worst
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.dynamics import kernel
+from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.transient import Steps, motions, snapshots, steps_of, transient
+from kedfem.errors import SolveError
+from kedfem.motion.rigid import rigid_motion
+from kedfem.results import Channel
+from kedfem.scene import drive_angle, scene_from, time_grid
+
+from .test_dynamics import four_bar, slider_crank
+
+
+def mixed() -> dict[str, Any]:
+    """A beam, a solid and a plane link."""
+    raw = four_bar("bar", turns=0.25, steps_per_turn=120)
+    for link in raw["links"].values():
+        link["mesh"] = {"elements": [3, 1, 1]}
+    raw["links"]["crank"] |= {"fidelity": "beam", "mesh": {"elements": 3}}
+    raw["links"]["coupler"] |= {"fidelity": "plane", "mesh": {"elements": [3, 1]}}
+    return raw
+
+
+def sliding() -> dict[str, Any]:
+    raw = slider_crank("rigid")
+    raw["analysis"] = {"turns": 0.25, "steps_per_turn": 120}
+    return raw
+
+
+def displacements(ready: Prepared, solver: Steps) -> tuple[np.ndarray, np.ndarray]:
+    """All links' displacements and port forces over time."""
+    found = snapshots(ready.scene, ready.linkage, ready.path, ready.model, solver)
+    each = [
+        (np.concatenate([x.u.ravel() for x in s.states]), np.concatenate([x.port_forces for x in s.states]))
+        for s in found
+    ]
+    return np.array([u for u, _ in each]), np.array([f for _, f in each])
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.9, 0.5])
+@pytest.mark.parametrize("made", [mixed, sliding])
+def test_dense_condensed_and_literal_steps_are_one(made: Any, rho_inf: float) -> None:
+    ready = meshed(scene_from(made()))
+    model = ready.model
+    scheme = generalised_alpha(time_grid(ready.scene).step, rho_inf)
+    dense, condensed, literal = (
+        displacements(ready, kind(model.links, model.joints, scheme, model.damping))
+        for kind in (DenseSteps, CondensedSteps, LiteralSteps)
+    )
+    assert model.damping.present
+    for other in (condensed, literal):
+        for got, wanted in zip(dense, other, strict=True):
+            # rounding, amplified by the stiffness of the links along their line
+            assert_allclose(got, wanted, rtol=0, atol=2e-8 * np.abs(wanted).max())
+
+
+def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = mixed()
+    raw["analysis"]["turns"] = 0.05
+    raw["analysis"]["rho_inf"] = 0.8
+    ready = meshed(scene_from(raw))
+    fast = displacements(ready, steps_of(ready.scene, ready.model))
+    counted = []
+
+    def plain(*arguments: Any) -> None:
+        counted.append(1)
+        kernel_plain(*arguments)
+
+    kernel_plain = kernel.advance_block.py_func
+    for name in ("right_hand_side", "end_of_step"):
+        monkeypatch.setattr(kernel, name, getattr(kernel, name).py_func)
+    monkeypatch.setattr(kernel, "advance_block", plain)
+    slow = displacements(ready, steps_of(ready.scene, ready.model))
+    assert counted
+    for got, wanted in zip(slow, fast, strict=True):
+        assert_allclose(got, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())  # sums in another order
+
+
+def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
+    raw = four_bar("beam", turns=3, steps_per_turn=200)
+    ready = meshed(scene_from(raw))
+    law, points = ready.scene.drive.motion, 0
+    for first, motion in motions(ready.scene, ready.linkage, ready.path):
+        t = time_grid(ready.scene).step * np.arange(first, first + len(motion.t))
+        wanted = rigid_motion(ready.linkage, ready.path, t, drive_angle(law, t))
+        points += len(t)
+        for name in ("t", "phi", "R", "omega", "alpha", "p2"):
+            there = getattr(wanted, name)
+            assert_allclose(getattr(motion, name), there, rtol=0, atol=1e-9 * max(np.abs(there).max(), 1.0))
+    assert points == 600
+
+
+class Breaking:
+    """A solver whose displacements are not finite from one step on."""
+
+    def __init__(self, solver: Steps, step: int) -> None:
+        self.solver, self.left = solver, step
+
+    def begin(self, states: Any) -> Any:
+        return self.solver.begin(states)
+
+    def advance(self, state: Any, forcing: Sequence[Forcing]) -> tuple[list[LinkHistory], Any]:
+        links, state = self.solver.advance(state, forcing)
+        if self.left <= len(forcing[0].R):
+            links[1].g[self.left - 1 :] = np.nan
+        self.left -= len(forcing[0].R)
+        return links, state
+
+
+def test_what_was_finite_before_a_blow_up_is_handed_on() -> None:
+    ready = meshed(scene_from(four_bar("beam", turns=1, steps_per_turn=300)))
+    solver: Any = Breaking(steps_of(ready.scene, ready.model), 270)  # in the second block
+    seen = []
+
+    def all_of_it() -> None:
+        for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
+            seen.append((block.step, len(block)))
+            assert all(np.isfinite(link.g).all() for link in block.links)
+
+    with pytest.raises(SolveError, match=r"got none at step 270, t = 0\.09 s, drive angle 324 deg"):
+        all_of_it()
+    assert seen == [(0, 1), (1, 256), (257, 13)]
+
+
+def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
+    t = np.linspace(0, 1, 11)
+    fine = np.linspace(0, 1, 41)
+
+    def run(time: np.ndarray, values: dict[str, np.ndarray]) -> Histories:
+        channels = {
+            name: (Channel(name, ("x", "y")[: v.shape[1]], "N", "world", ""), v) for name, v in values.items()
+        }
+        return Histories(time, channels)
+
+    def vectors(time: np.ndarray, off: float = 0.0) -> np.ndarray:
+        return np.column_stack([3 * time**3, 4 * time**3 + off])
+
+    names = ("joints/A/force", "joints/B/moment", "joints/C/force")
+    reference = run(fine, {
+        names[0]: vectors(fine), names[1]: vectors(fine), names[2]: np.full((41, 1), 1e-9), "drive/torque": fine[:, None]
+    })  # fmt: skip
+    found = run(
+        t,
+        {
+            names[0]: vectors(t, 0.1),
+            names[1]: vectors(t),
+            names[2]: np.ones((11, 1)),
+            "drive/torque": t[:, None],
+        },
+    )
+    errors = relative_errors(found, reference)
+    # √(3² + 4²) = 5 at the end; moments do not count, nor does what is 1e-9 of other forces; a cubic spline is exact
+    assert set(errors) == {names[0], "drive/torque"}
+    assert_allclose([errors[names[0]], errors["drive/torque"]], [0.1 / 5, 0.0], rtol=0, atol=1e-14)
+    assert worst(errors) == pytest.approx(0.02)
+    assert worst({}) == 0.0
+    flat = run(t, {names[0]: vectors(t)[:, :1]})  # of a planar link: what it does not have is zero
+    assert relative_errors(flat, reference)[names[0]] == pytest.approx(4 / 5)
+    half = run(t[:6], {names[0]: vectors(t[:6], 0.1)})
+    assert relative_errors(half, reference)[names[0]] == pytest.approx(0.1 / 5)
