@@ -53,7 +53,7 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
     return link.Q
 
 
-def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
+def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n _"]:
     """Functions of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
     for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
