@@ -14,6 +14,7 @@ from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
+from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Steps, steps_of, transient
@@ -26,7 +27,7 @@ from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
 from kedfem.results.recording import Recorded, recording, rows
-from kedfem.scene import Scene, rayleigh, time_grid, turn_steps
+from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 SMALL_DEFLECTION = (
@@ -91,7 +92,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
-        *marginal_warning(scene),
+        *stability_warning(scene),
         *deflection_warning(deflection),
         *reduction_warning(reduction),
         *plan_warning(plan),
@@ -146,16 +147,6 @@ def deflection_warning(deflection: float) -> tuple[str, ...]:
     return (
         f"links deflect by up to {100 * deflection:.2g} % of their length; equation (20) takes that as small: "
         f"expect the results to be trustworthy below {100 * SMALL_DEFLECTION:.0f} % only",
-    )
-
-
-def marginal_warning(scene: Scene) -> tuple[str, ...]:
-    """A warning where vibration that the step cannot resolve may grow (docs/theory.md)."""
-    if scene.analysis.rho_inf < 1.0 or rayleigh(scene.damping)[1] == 0.0:
-        return ()
-    return (
-        "analysis.rho_inf = 1 with damping in proportion to the stiffness: vibration that the step cannot resolve grows "
-        "slowly in links that turn; take 0.95",
     )
 
 

@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from kedfem.accuracy.cache import kept
+from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
@@ -144,7 +145,8 @@ def _with_step(search: Trials, scene: Scene) -> tuple[Scene, float]:
     """The scene with the largest step whose error is within its share, and that error."""
     allowed = STEP * search.asked
     given = {"step", "steps_per_turn"} & scene.analysis.model_fields_set
-    steps, order, before = time_grid(scene).steps, STEP_ORDER, (0, math.inf)
+    fewest = max(20, math.ceil(steady if (steady := fewest_steps(scene)) < math.inf else 0.0))
+    steps, order, before = max(time_grid(scene).steps, 0 if given else fewest), STEP_ORDER, (0, math.inf)
     for _ in range(TRIES):
         now, half = with_steps(scene, steps), with_steps(scene, 2 * steps)
         error = search.difference(now, half) / (1 - 2**-order)
@@ -155,13 +157,13 @@ def _with_step(search: Trials, scene: Scene) -> tuple[Scene, float]:
         if before[0] and steps > before[0] and error > 0.0:
             order = min(STEP_ORDER, math.log(before[1] / error) / math.log(steps / before[0]))
         wanted = (error / (0.8 * allowed)) ** (1 / max(order, LEAST_ORDER))
-        if error <= allowed and wanted > 0.5:
+        if error <= allowed and (wanted > 0.5 or steps == fewest):
             return now, error
         if order < LEAST_ORDER or steps * min(wanted, 8.0) > MOST_STEPS:
             search.notes.append(_unresolved(steps, error))
             return now, error
         before = (steps, error)
-        steps = max(20, math.ceil(steps * min(max(wanted, 0.25), 8.0)))
+        steps = max(fewest, math.ceil(steps * min(max(wanted, 0.25), 8.0)))
     search.notes.append(_unresolved(before[0], error))
     return with_steps(scene, before[0]), error
 

@@ -1,0 +1,36 @@
+"""Steps that damped links need as they turn, so that vibration which no step resolves dies away."""
+
+import math
+
+import numpy as np
+
+from kedfem.scene import Scene, drive_angle, rayleigh, time_grid
+
+MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration neither grows nor dies (measured)
+
+
+def fewest_steps(scene: Scene) -> float:
+    """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
+    rho_inf = scene.analysis.rho_inf
+    if rayleigh(scene.damping)[1] == 0.0:
+        return 0.0
+    if rho_inf == 1.0:
+        return math.inf
+    end = time_grid(scene).end
+    t = np.linspace(0.0, end, 2001)
+    fastest = float(np.abs(drive_angle(scene.drive.motion, t)[1]).max())
+    return fastest * end / (MARGIN * (1 - rho_inf))
+
+
+def stability_warning(scene: Scene) -> tuple[str, ...]:
+    """A warning where vibration that the step cannot resolve may grow (docs/theory.md)."""
+    fewest, steps = fewest_steps(scene), time_grid(scene).steps
+    if steps >= fewest:
+        return ()
+    what = "with damping in proportion to the stiffness vibration that the step cannot resolve grows in links that turn"
+    if fewest == math.inf:
+        return (f"analysis.rho_inf = 1: {what}; take 0.95",)
+    return (
+        f"the step is too long for rho_inf = {scene.analysis.rho_inf:g}: {what} by more than 1 - rho_inf in a step; "
+        f"take {math.ceil(fewest)} steps instead of {steps}, or a smaller rho_inf",
+    )
