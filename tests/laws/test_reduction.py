@@ -16,7 +16,7 @@ from kedfem.dynamics.model import Model, reduced_model
 from kedfem.dynamics.reduction import Basis, bases, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants, snapshots, steps_of
-from kedfem.links.reduced import rigid_modes
+from kedfem.links.reduced import rigid, rigid_modes
 from kedfem.scene import scene_from
 from tests.rooms.test_dynamics import four_bar
 
@@ -183,3 +183,45 @@ def test_the_estimate_is_near_the_error(raw: dict[str, Any], count: int) -> None
     true = relative_errors(histories(found.ready), histories(full))
     assert worst(true) > 1e-4  # else there is nothing to estimate
     assert 1 / 3 < worst(found.estimate) / worst(true) < 3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_statics_do_not_depend_on_how_the_functions_are_mixed(kind: str, seed: int) -> None:
+    """A reduced link is held where it moves, not at one function of many: any basis of the span gives one answer."""
+    full = meshed(scene_from(arm(kind)))
+    Q = (
+        with_functions(full, 12).links[0].Q
+    )  # mass-orthonormal: none is lost in the others when they are mixed
+    assert Q is not None
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(Q.shape[1], Q.shape[1])))[0]
+    work = [static_work(reduced_model(full.model, [each]), full) for each in (Q, Q @ turn)]
+    assert_allclose(work[1], work[0], rtol=1e-6)  # rounding, of sections 1e6 times as stiff as the beam
+
+
+def test_a_rigid_coupler_of_beams_can_be_held() -> None:
+    """Two functions, 1 and the place along it: the second alone does not see the link move as a whole."""
+    work = [rigid_coupler_work(angle) for angle in np.linspace(0, 6, 5)]
+    assert_allclose(work, work[0], rtol=1e-6)  # the direction of the drawing does not matter
+
+
+def rigid_coupler_work(angle: float) -> float:
+    raw = four_bar("beam")
+    raw["points"]["D"] = [0.9144 * np.cos(angle), 0.9144 * np.sin(angle)]
+    raw["points"]["B"]["angle"] = np.radians(60) + angle
+    shape = {"kind": "polyline", "points": ["B", "C"], "width": 0.0254, "thickness": 0.0254}
+    raw["links"]["coupler"] = {"material": "alloy", "fidelity": "rigid", "shape": shape}
+    full = meshed(scene_from(raw))
+    assert full.model.links[1].kind == "beam"
+    return static_work(full.model, full)
+
+
+@pytest.mark.parametrize("angle", np.linspace(0, np.pi, 7))
+def test_a_rigid_straight_beam_has_two_functions_whatever_its_direction(angle: float) -> None:
+    raw = arm("beam")
+    raw["links"]["arm"]["shape"]["between"] = [[0, 0], [0.5 * np.cos(angle), 0.5 * np.sin(angle)]]
+    link = rigid(meshed(scene_from(raw)).model.links[0])
+    assert link.n == 2  # 1 and the place along it; rows (u, v, ψ) of both hold all rigid motion
+    stiff = np.abs(link.K0).max()
+    assert np.abs(link.K0 @ rigid_modes(link)).max() < 1e-12 * stiff
+    assert np.count_nonzero(np.linalg.eigvalsh(link.K0) > 1e-9 * stiff) >= 1

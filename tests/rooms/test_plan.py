@@ -1,5 +1,6 @@
 """Plans for an accuracy: what is stated stays, shares add up, what cannot be reached is said; and accuracy kept."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -174,3 +175,9 @@ def test_accuracy_is_kept(name: str) -> None:
     for each in done:
         assert each.within == 1.0
         assert max(each.errors.values()) < 1.5 * each.plan.error  # the estimate is no guess
+
+
+def test_an_extrusion_is_written_and_read_again_without_a_warning() -> None:
+    """Warnings are errors here: those of the library that writes scenes too."""
+    scene = MECHANISMS["arm cut from plate"](0.05)
+    assert scene_from(json.loads(scene.model_dump_json())).links == scene.links

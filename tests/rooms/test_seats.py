@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError
-from kedfem.links.build import bare_links
+from kedfem.links.build import bare_link, bare_links
 from kedfem.links.seats import face_seat, joint_seat, surface_weights
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
@@ -107,3 +107,22 @@ def test_a_node_of_a_domed_face_stands_for_the_whole_face(fidelity: str) -> None
     area = surface_weights(link, face_seat(link, "loads.push.at", top)).sum()
     # an arc of chord 0.06 and height 0.005: r = 0.0925, half angle arcsin(0.03 / r)
     assert_allclose(area, 2 * 0.0925 * np.arcsin(0.03 / 0.0925) * 0.02, rtol=1e-6)
+
+
+@pytest.mark.parametrize("across", [1, 2, 3, 4, 5, 7])
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.2, 2.5, 4.0])
+def test_a_bars_end_is_held_as_a_whole_however_many_elements_it_has(across: int, angle: float) -> None:
+    """The corners of the middle one of an odd number of facets are as far from the axis; it is no bore all the same."""
+    end = np.array([0.76 * np.cos(angle), 0.76 * np.sin(angle), 0.0])
+    raw = {
+        "links": {"bar": {"material": "steel", "mesh": {"elements": [4, across, 1]}, "shape": {
+            "kind": "bar", "between": [[0, 0], list(end[:2])], "width": 0.0254, "thickness": 0.0254}}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "bar"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
+        "analysis": {"turns": 1},
+    }  # fmt: skip
+    link = bare_link(scene_from(raw), "bar")
+    for point in (np.zeros(3), end):
+        seat = joint_seat(link, "joints.A", point, np.array([0.0, 0.0, 1.0]))
+        assert seat.facets is not None
+        assert len(seat.facets) == across
