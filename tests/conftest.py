@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
@@ -15,7 +16,13 @@ settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
 IN_CI = bool(os.environ.get("CI"))
 settings.load_profile("ci" if IN_CI else "here")
-CHECKED = ["kedfem"] if IN_CI else [f"kedfem.{room}" for room in ("mesh", "links", "output", "scene.laws")]
+PACKAGE = Path(__file__).parents[1] / "src" / "kedfem"
+ALL = [
+    ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts)
+    for file in PACKAGE.rglob("*.py")
+    if file.stem not in {"__init__", "kernel"}  # numba compiles the kernel itself
+]
+CHECKED = ALL if IN_CI else [f"kedfem.{room}" for room in ("mesh", "links", "output", "scene.laws")]
 
 
 def shapes_checked(function: Callable[..., Any]) -> Callable[..., Any]:
