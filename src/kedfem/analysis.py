@@ -33,7 +33,7 @@ STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 SMALL_DEFLECTION = (
     0.01  # of a link's length: above, the linear equation is off by several percent (docs/theory.md)
 )
-ROWS = 256  # steps kept before they go to the results file
+ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
 T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
@@ -209,6 +209,7 @@ class _Table:
     channels: list[Channel]
     folder: FilePath
     waiting: int = 0
+    since: float = field(default_factory=perf_counter)
     when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list)
     values: list[dict[str, Float[np.ndarray, "T c"]]] = field(default_factory=list)
 
@@ -217,7 +218,7 @@ class _Table:
         self.when.append(np.stack([block.motion.t, block.motion.phi]))
         self.values.append(values)
         self.waiting += len(block)
-        if self.waiting >= ROWS:
+        if self.waiting >= ROWS or perf_counter() - self.since >= SECONDS:
             self.flush()
 
     def flush(self) -> None:
@@ -225,7 +226,7 @@ class _Table:
         if self.when:
             time, angle = np.concatenate(self.when, axis=1)
             block = {c.name: np.concatenate([each[c.name] for each in self.values]) for c in self.channels}
-            self.when, self.values, self.waiting = [], [], 0
+            self.when, self.values, self.waiting, self.since = [], [], 0, perf_counter()
             first = self.writer.rows == 0
             self.writer.append(time, angle, block)
             if first:
