@@ -6,7 +6,6 @@ read is made again.
 """
 
 import json
-import os
 import warnings
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -15,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
+from kedfem.folders import cache_folder
 from kedfem.scene import MeshFile, Part, Scene
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")
@@ -58,21 +58,6 @@ def kept(what: str, scene: Scene, made: Callable[[], T], packed: Callable[[T], P
 def _made(what: str, key: str, made: Callable[[], Any]) -> Any:
     del what, key
     return made()
-
-
-def cache_folder() -> Path | None:
-    """Where entries are kept; None if nowhere, or if the folder cannot be made."""
-    given = os.environ.get("KEDFEM_CACHE")
-    if given in {"", "off"}:
-        return None
-    from platformdirs import user_cache_path
-
-    folder = Path(given) if given else user_cache_path("kedfem")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    return folder
 
 
 def key(scene: Scene) -> str:

@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import minimize
 
 from kedfem.mesh.hexahedra import QUAD9, shape_gradients
 from kedfem.mesh.plane import PlaneQuads, Quads, quadratic_quads
@@ -36,6 +35,8 @@ def relaxed(mesh: PlaneQuads, iterations: int) -> Quads:
     def cost(x: Float[np.ndarray, " v"]) -> tuple[float, Float[np.ndarray, " v"]]:
         value, slope = distortion(fixed + start.follow @ x.reshape(-1, 2), start.cells, floor)
         return value, (start.follow.T @ slope).ravel()
+
+    from scipy.optimize import minimize
 
     options = {"maxiter": iterations, "maxcor": 20}
     least = minimize(cost, start.points[start.free].ravel(), jac=True, method="L-BFGS-B", options=options)

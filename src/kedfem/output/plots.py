@@ -197,9 +197,9 @@ def _saved(path: Path, title: str) -> Iterator[Any]:
 
 def remove_plots(folder: Path) -> None:
     """Delete the plots that kedfem wrote into a folder earlier, and nothing else."""
-    from PIL import Image, UnidentifiedImageError
-
     for path in folder.glob("*.png"):
+        from PIL import Image, UnidentifiedImageError
+
         try:
             with Image.open(path) as image:
                 own = image.info.get("Software") == MARK
