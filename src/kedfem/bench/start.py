@@ -31,8 +31,8 @@ def bench_start(folder: Path, quick: bool, watch: Watch) -> str:
     rows += _ten_turns(1 if quick else 5)
     note = (
         "Ten turns: the four-bar of plates, three links of hexahedra reduced to 1 %, 10,000 steps, probes and joint "
-        "forces written at every step; mesh, reduction with its estimate, and the start of Python included. Cold: nothing "
-        "kept from earlier runs but compiled code; warm: the reduced links."
+        "forces written at every step; mesh, reduction with its estimate, and the start of Python included. Cold: "
+        "nothing kept from earlier runs but compiled code; warm: the reduced links."
     )
     text = markdown("Start of the command line", "kedfem bench start", ("command", "seconds"), rows, note)
     write_page(folder, "start", text)
