@@ -42,9 +42,15 @@ def test_cost_counts_no_error_that_rises_again_and_no_target_that_is_missed() ->
     assert cost(work, [1e-3, 1e-3, 1e-1], 1e-2) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "pictures"),
-    [("suite", ["suite.png"]), ("reduction", ["reduction.png", "reduction_field.png", "reduction_loop.png"])],
+    [
+        ("start", []),
+        ("accuracy", []),
+        ("suite", ["suite.png"]),
+        ("reduction", ["reduction.png", "reduction_field.png", "reduction_loop.png"]),
+    ],
 )
 def test_a_benchmark_writes_its_page(name: str, pictures: list[str], tmp_path: Path) -> None:
     text = BENCHMARKS[name](tmp_path, True, lambda stage, done, total: None)
