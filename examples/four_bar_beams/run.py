@@ -5,14 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from kedfem.analysis import analyse, prepared
+from kedfem.accuracy.prepared import meshed
+from kedfem.analysis import analyse
 from kedfem.scene import read_scene, scene_from
 
 SCENE = Path(__file__).with_name("scene.toml")
 
 
 def main() -> None:
-    ready = prepared(read_scene(SCENE))
+    ready = meshed(read_scene(SCENE))
     assert ready.model.coordinates == 18  # [KED]: 27 − 2·2 at B, C − 3 at the driven root − 2 at D
 
     coarse, fine, finer = stress(720, 4), stress(720, 8), stress(1440, 8)
