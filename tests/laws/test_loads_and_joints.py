@@ -66,7 +66,7 @@ def test_inertia_load_of_a_solid_is_literally_minus_M_R0(
 ) -> None:
     """m·1 and m·X serve in place of M R0'' at the nodes, [KED, eq. (17)]."""
     link = solid(mesh)
-    got = applied(link, (), np.zeros((0, 1)), at_one_instant(motion, alpha, p2), 1)[0]
+    got = applied(link, (), at_one_instant(motion, alpha, p2), 1)[0]
     wanted = -dense_mass(link) @ point_acceleration(motion, alpha, p2, link.X).ravel()
     np.testing.assert_allclose(got.ravel(), wanted, atol=1e-12 * np.abs(wanted).max())
 
@@ -79,7 +79,7 @@ def test_inertia_load_of_a_beam_is_literally_minus_M_R0(
     """R0'' = (x'', y'', θ'') at the nodes, [KED, eq. (22)]."""
     link = beam.link()
     motion, alpha, p2 = planar(motion), alpha * [0, 0, 1], p2 * [1, 1, 0]
-    got = applied(link, (), np.zeros((0, 1)), at_one_instant(motion, alpha, p2), 1)[0]
+    got = applied(link, (), at_one_instant(motion, alpha, p2), 1)[0]
     R02 = point_acceleration(motion, alpha, p2, link.X * [1, 1, 0])
     R02[:, 2] = alpha[2]
     wanted = -dense_mass(link) @ R02.ravel()

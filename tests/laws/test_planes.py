@@ -240,7 +240,7 @@ def test_inertia_load_is_literally_minus_M_R0(
 ) -> None:
     """m·1 and m·X serve in place of M R0'' at the nodes, [KED, eq. (17)]."""
     link, alpha, p2 = plane(mesh), alpha * [0, 0, 1], p2 * [1, 1, 0]
-    got = applied(link, (), np.zeros((0, 1)), at_one_instant(motion, alpha, p2), 1)[0]
+    got = applied(link, (), at_one_instant(motion, alpha, p2), 1)[0]
     wanted = -link.mass[0] @ point_acceleration(motion, alpha, p2, link.X * [1, 1, 0])[:, :2]
     np.testing.assert_allclose(got, wanted, atol=1e-12 * max(np.abs(wanted).max(), 1e-300))
 

@@ -17,7 +17,7 @@ from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.transient import first_states, forcings, load_factors, motions, steps_of
+from kedfem.dynamics.transient import first_states, forcings, motions, steps_of
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
@@ -47,7 +47,7 @@ def loop_time(ready: Prepared, repeats: int = 9) -> float:
     scene, model = ready.scene, ready.model
     solver: Any = steps_of(scene, model)
     _, motion = next(motions(scene, ready.linkage, ready.path))
-    forcing = forcings(model, load_factors(model, motion.t), motion)
+    forcing = forcings(model, motion)
     states = first_states(scene, ready.linkage, ready.path, scene.drive.motion, model)
     solver.advance(solver.begin(states), forcing)  # compiled
     return seconds(lambda: solver.advance(solver.begin(states), forcing), repeats) / len(motion.t)
@@ -64,7 +64,7 @@ def recorded_rate(ready: Prepared) -> float:
     def all_steps() -> None:
         state = solver.begin(states)
         for first, motion in known:
-            links, state = solver.advance(state, forcings(model, load_factors(model, motion.t), motion))
+            links, state = solver.advance(state, forcings(model, motion))
             rows(recorded, Block(first, motion, links))
 
     all_steps()

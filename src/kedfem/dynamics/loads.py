@@ -87,7 +87,6 @@ def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np
 def applied(
     link: Link,
     loads: tuple[Pattern, ...],
-    factors: Float[np.ndarray, "l T"],
     motion: RigidMotion,
     body: int,
 ) -> Float[np.ndarray, "T n d"]:
@@ -95,13 +94,13 @@ def applied(
 
     Parameters
     ----------
-    factors : of each load at each time point
     body : the link's number in the motion
     """
     F = link.mX @ -motion.R2[:, body, : link.d].transpose(0, 2, 1)
     F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
     R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
-    for load, factor in zip(loads, factors, strict=True):
+    for load in loads:
+        factor = load.factor(motion.t)
         if factor.any():
             F += factor[:, None, None] * (load.forces @ R if load.follows else load.forces)
     return np.asarray(F)

@@ -10,7 +10,7 @@ from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.start import damping_times
 from kedfem.dynamics.state import NodalOf, Rayleigh
-from kedfem.dynamics.transient import forcings, load_factors
+from kedfem.dynamics.transient import forcings
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix
 
@@ -31,7 +31,7 @@ def residual_deflections(
     k = snapshot.k
     motion = snapshot.motion.part(k, k + 1)
     W = cross_matrix(motion.omega[0])
-    forcing = forcings(full, load_factors(full, motion.t), motion)
+    forcing = forcings(full, motion)
     rhs = [
         _residual(link, full.damping, small, state, each.F[0], W[body, : link.d, : link.d])
         for link, small, state, each, body in zip(

@@ -6,7 +6,6 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
@@ -71,7 +70,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     for first, motion in motions(scene, linkage, along):
         for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
-            forcing = forcings(model, load_factors(model, part.t), part)
+            forcing = forcings(model, part)
             links, state = solver.advance(state, forcing)
             block = Block(first + k, part, links)
             yield from _finite(block)
@@ -112,16 +111,11 @@ def block_length(model: Model) -> int:
     return max(1, min(POINTS, BLOCK_BYTES // (6 * 8 * model.unknowns)))
 
 
-def load_factors(model: Model, t: Float[np.ndarray, " T"]) -> list[Float[np.ndarray, "_ T"]]:
-    """Factors of all loads at given times, per link."""
-    return [np.array([load.factor(t) for load in loads]).reshape(len(loads), len(t)) for loads in model.loads]
-
-
-def forcings(model: Model, factors: list[Float[np.ndarray, "_ T"]], motion: RigidMotion) -> list[Forcing]:
+def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
     """Orientation and P − M R0'' of all links over time."""
     return [
-        Forcing(motion.R[:, body, : link.d, : link.d], applied(link, loads, factor, motion, body))
-        for link, loads, factor, body in zip(model.links, model.loads, factors, model.bodies, strict=True)
+        Forcing(motion.R[:, body, : link.d, : link.d], applied(link, loads, motion, body))
+        for link, loads, body in zip(model.links, model.loads, model.bodies, strict=True)
     ]
 
 
@@ -147,7 +141,7 @@ def first_states(
 
 def instants(model: Model, motion: RigidMotion) -> list[Instant]:
     """Orientation, load and spin of all links at each time point."""
-    forcing = forcings(model, load_factors(model, motion.t), motion)
+    forcing = forcings(model, motion)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     return [

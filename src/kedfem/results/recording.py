@@ -174,9 +174,7 @@ def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, l
 
 def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
     """P − M R0'' of a carried link."""
-    t = block.motion.t
-    factors = np.array([load.factor(t) for load in carried.loads]).reshape(len(carried.loads), len(t))
-    return applied(carried.link, carried.loads, factors, block.motion, carried.body)
+    return applied(carried.link, carried.loads, block.motion, carried.body)
 
 
 def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wrench:
