@@ -156,10 +156,7 @@ class CondensedSteps:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
     ) -> None:
         self.links, self.scheme, self.damping = links, scheme, damping
-        c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
-        # A = c_M M + c_K K0 = c_m a0 M + c_f (K0 + a1 C0)
-        self.c_M = c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha
-        self.c_K = c_f * (1 + scheme.a1 * damping.beta)
+        self.c_M, self.c_K = effective_coefficients(scheme, damping)
         self.parts = [
             factored(link, joint, self.c_M, self.c_K) for link, joint in zip(links, joints, strict=True)
         ]
@@ -254,6 +251,12 @@ def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Floa
     full = np.zeros((len(attachment.weights), attachment.components))
     full.ravel()[attachment.keep] = force
     return full
+
+
+def effective_coefficients(scheme: Scheme, damping: Rayleigh) -> tuple[float, float]:
+    """c_M [1/s²] and c_K [-] of A = c_M M + c_K K0 = (1 − α_m) a0 M + (1 − α_f) (K0 + a1 C0)."""
+    c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+    return c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha, c_f * (1 + scheme.a1 * damping.beta)
 
 
 def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:

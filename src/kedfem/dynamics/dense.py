@@ -9,7 +9,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import port_columns, port_vectors
+from kedfem.dynamics.condensed import effective_coefficients, port_columns, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
@@ -43,8 +43,7 @@ class DenseSteps:
     ) -> None:
         self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
         c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
-        c_M = c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha
-        c_K = c_f * (1 + scheme.a1 * damping.beta)
+        c_M, c_K = effective_coefficients(scheme, damping)
         b = c_m * scheme.acceleration
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, b[0], b[1], b[2] - scheme.alpha_m, c_f, *scheme.acceleration,
