@@ -146,12 +146,10 @@ def _settled(
 ) -> tuple[Functions, dict[str, float]]:  # fmt: skip
     """Functions whose estimated error is below the tolerance, or the last ones, and the estimate."""
     moments = _moments(full)
-    small = replace(full, model=reduced_model(full.model, Q))
-    run = histories(small, moments)
+    small, run = _run(full, Q, moments)
     for left in reversed(range(ROUNDS + 1)):
         more = _enriched(full, parts, small, run.kept)
-        richer = replace(full, model=reduced_model(full.model, more))
-        better = histories(richer, moments)
+        richer, better = _run(full, more, moments)
         estimate = {name: CAUTION * error for name, error in relative_errors(run, better).items()}
         if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or not left:
             break
@@ -164,6 +162,7 @@ def _settled(
 
 
 def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:
+    """The model on given functions, and its run."""
     small = replace(full, model=reduced_model(full.model, Q))
     return small, histories(small, moments)
 
