@@ -18,7 +18,13 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block
+from kedfem.links.reduced import (
+    mass_orthonormal,
+    on_functions,
+    rigid_functions,
+    scalar_block,
+    stiffness_blocks,
+)
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: functions below repeat others
@@ -80,8 +86,7 @@ def excited(
     model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
 ) -> list[list[NodalOf]]:
     """Static deflection at an instant, and its shares in the modes of the frozen linkage that it excites; per link."""
-    R = [now.R for now in instant.at]
-    static = _copied(coupled(parts, R, [now.F @ now.R for now in instant.at])[0])
+    R, static = _static(parts, instant)
     out = [[x] for x in static]
     if not any(x.any() for x in static):
         return out
@@ -101,12 +106,17 @@ def frozen_frequencies(
 
     1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less.
     """
-    R = [now.R for now in instant.at]
-    static = _copied(coupled(parts, R, [now.F @ now.R for now in instant.at])[0])
+    R, static = _static(parts, instant)
     if not any(x.any() for x in static):
         return np.zeros(0)
     values = np.linalg.eigvalsh(_lanczos(model, parts, R, static, levels)[2])[::-1]
     return np.asarray(1 / np.sqrt(values[values > REPEATED * values[0]]))
+
+
+def _static(parts: Sequence[Substructure], instant: Instant) -> tuple[list[Rotation], list[NodalOf]]:
+    """Orientations at an instant, and the linkage's static deflection under P − M R0'' there, link frames."""
+    R = [now.R for now in instant.at]
+    return R, _copied(coupled(parts, R, [now.F @ now.R for now in instant.at])[0])
 
 
 def _lanczos(
@@ -178,7 +188,8 @@ def enriched(
 
 def energy_product(link: Link) -> sp.csr_array:
     """H = Σ_k K0_kk, of a solid (λ + 4 μ) ∫ ∇N_a · ∇N_b: a scalar product that sees shear, unlike the mass's."""
-    return sp.csr_array(sum(scalar_block(link, k, k) for k in range(link.d)))
+    blocks = stiffness_blocks(link)
+    return sp.csr_array(sum(scalar_block(blocks, k, k) for k in range(link.d)))
 
 
 def port_functions(link: Link, joint: Attachment, part: Substructure) -> Float[np.ndarray, "n p"]:

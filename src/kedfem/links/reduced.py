@@ -65,10 +65,11 @@ def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarra
 def projected_stiffness(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "k k"]:
     """(Q ⊗ I)ᵀ K0 (Q ⊗ I), scalar block by scalar block, (ds, ds) [KED, eq. (14)]."""
     d, s = link.d, Q.shape[1]
+    blocks = stiffness_blocks(link)
     out = np.empty((s, d, s, d))
     for i, j in product(range(d), range(d)):
         if i <= j:
-            out[:, i, :, j] = Q.T @ (scalar_block(link, i, j) @ Q)
+            out[:, i, :, j] = Q.T @ (scalar_block(blocks, i, j) @ Q)
             out[:, j, :, i] = out[:, i, :, j].T
     K0 = out.reshape(d * s, d * s)
     return (K0 + K0.T) / 2
@@ -82,10 +83,15 @@ def _unstrained(K0: Float[np.ndarray, "k k"], modes: Float[np.ndarray, "k r"]) -
     return np.asarray((K0 + K0.T) / 2)
 
 
-def scalar_block(link: Link, i: int, j: int) -> sp.csr_array:
-    """Block (i, j) of the stiffness: the scalar matrix between components i and j, (n, n)."""
-    blocks = sp.bsr_array(link.K0, blocksize=(link.d, link.d))
-    return sp.csr_array((blocks.data[:, i, j].copy(), blocks.indices, blocks.indptr), shape=(link.n, link.n))
+def stiffness_blocks(link: Link) -> sp.bsr_array:
+    """K0 of a full link, a (d, d) block for each pair of functions."""
+    return sp.bsr_array(link.K0, blocksize=(link.d, link.d))
+
+
+def scalar_block(blocks: sp.bsr_array, i: int, j: int) -> sp.csr_array:
+    """The scalar matrix between components i and j, (n, n), of `stiffness_blocks`."""
+    n = len(blocks.indptr) - 1
+    return sp.csr_array((blocks.data[:, i, j].copy(), blocks.indices, blocks.indptr), shape=(n, n))
 
 
 def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s s"]:
