@@ -10,7 +10,7 @@ from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import FLAT, points_of, vector
+from kedfem.scene.planes import FLAT, off_plane, vector
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
@@ -55,22 +55,13 @@ def mixed_faults(parts: Parts) -> Iterator[str]:
 def plane_faults(parts: Parts, here: str) -> Iterator[str]:
     """Points of joints and plane links that are not in the z plane of the first; those of other links may be."""
     others = {link.name for link in parts.links.values() if fidelity(link) in {"solid", "beam"}}
-    placed = [
-        (entry, key, point)
+    entries = [
+        entry
         for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes)
         for entry in section.values()
         if entry.record is not None and link_of(entry) not in others
-        for key, point in points_of(entry.record)
-        if all(math.isfinite(part) for part in point)
     ]
-    if not placed:
-        return
-    first = placed[0][2]
-    size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
-    for entry, key, point in placed:
-        if abs(point[2] - first[2]) > FLAT * size:
-            wanted = f"must lie in the plane z = {first[2]:.6g} of the other points of {here} [m]"
-            yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
+    yield from off_plane(entries, f"the other points of {here}")
 
 
 def link_of(entry: Entry) -> str | None:

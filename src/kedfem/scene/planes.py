@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from kedfem.scene.checks import fidelity, link_names
@@ -115,9 +115,14 @@ def vector(parts: tuple[float, ...]) -> str:
 
 def plane_obstacles(parts: Parts, name: str) -> Iterator[str]:
     """Points of a beam, and of what is on it, that are not in the z plane of its first."""
+    yield from off_plane(touching(parts, name), f"the planar beam {name!r}")
+
+
+def off_plane(entries: Iterable[Entry], of: str) -> Iterator[str]:
+    """Points of good entries that are not in the z plane of the first; `of` says what lies in it."""
     placed = [
         (entry, key, point)
-        for entry in touching(parts, name)
+        for entry in entries
         for key, point in points_of(entry.record)
         if all(math.isfinite(part) for part in point)
     ]
@@ -127,7 +132,7 @@ def plane_obstacles(parts: Parts, name: str) -> Iterator[str]:
     size = max(math.dist(point[:2], first[:2]) for _, _, point in placed) or 1.0
     for entry, key, point in placed:
         if abs(point[2] - first[2]) > FLAT * size:
-            wanted = f"must lie in the plane z = {first[2]:.6g} of the planar beam {name!r} [m]"
+            wanted = f"must lie in the plane z = {first[2]:.6g} of {of} [m]"
             yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
 
 
