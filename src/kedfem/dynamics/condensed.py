@@ -45,6 +45,10 @@ class Substructure:
     S: Float[np.ndarray, "c c"]
     anchors: Int[np.ndarray, " e"]
 
+    def seen(self, y: Nodal) -> Float[np.ndarray, " c"]:
+        """Cᵀ y: values at ports and anchors."""
+        return np.concatenate([port_values(self.attachment, y), y.ravel()[self.anchors]])
+
 
 def substructure(
     attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
@@ -117,7 +121,7 @@ def coupled(
     forces : per link (q,) λ on the link at its ports, link frame
     """
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
-    v = [_held(part, x) for part, x in zip(parts, y, strict=True)]
+    v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
     RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
     z = np.zeros(parts[0].attachment.B.shape[1])
     if len(z):
@@ -131,11 +135,6 @@ def coupled(
     forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
-
-
-def _held(part: Substructure, y: Nodal) -> Float[np.ndarray, " c"]:
-    """Cᵀ y: values at ports and anchors."""
-    return np.concatenate([port_values(part.attachment, y), y.ravel()[part.anchors]])
 
 
 def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:
