@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .cases import CASES, Case
-from .solve import motion
+from .solve import Stepping, motion
 
 FOLDER = Path(__file__).parents[1] / "verification" / "data"
 
@@ -17,8 +17,8 @@ FOLDER = Path(__file__).parents[1] / "verification" / "data"
 def history(case: Case, h: float, elements: int) -> tuple[np.ndarray, np.ndarray]:
     """t (T,) and values (T, c) with one step and mesh."""
     this = case.build(elements, case.nodes)
-    steps, every = round(case.end / h), round(case.spacing / h)
-    t, values, _ = motion(this.problem, this.first, h, steps, this.observed, case.rho_inf, every)
+    stepping = Stepping(h, round(case.end / h), round(case.spacing / h), case.rho_inf)
+    t, values, _ = motion(this.problem, this.first, stepping, this.observed)
     return t, values
 
 
@@ -43,7 +43,7 @@ def write(name: str) -> None:
     peak = np.abs(values).max(axis=0)
     lines = [
         f"python -m tests.exact {name}",
-        f"steps {case.h:.6g} s and {2 * case.h:.6g} s extrapolated; {case.elements} elements of {case.nodes} nodes a link",
+        f"extrapolated from steps {2 * case.h:.6g} s and {case.h:.6g} s; a link has {case.elements} elements, {case.nodes} nodes each",
         "largest values: " + ", ".join(f"{x:.4g}" for x in peak),
         "their errors by the step: " + ", ".join(f"{x:.1e}" for x in by_step / peak),
         "their errors by the mesh: " + ", ".join(f"{x:.1e}" for x in by_mesh / peak),

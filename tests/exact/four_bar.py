@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .beams import Lump, Rod, Strains, joined, station, strains
-from .solve import Problem, RigidMotions, State, motion, start
+from .solve import Problem, RigidMotions, State, Stepping, motion, start
 
 CRANK, COUPLER, ROCKER, FRAME = 0.3048, 0.9144, 0.762, 0.9144  # m
 RHO, E, G, SIDE = 2796.0, 7.031e10, 2.712e10, 0.0254  # kg/m³, Pa, Pa, m
@@ -77,13 +77,15 @@ def four_bar(rpm: float, ratio: float, elements: int, nodes: int = 3) -> tuple[P
     at_D = beams.end(2, 1)[:2]
     held = {x: 0.0, y: 0.0, theta: lambda t: (speed * t, speed, 0.0), at_D[0]: FRAME, at_D[1]: 0.0}
     alpha, beta = rayleigh(ratio)
-    problem = Problem(
-        beams, held, None, alpha, beta, lambda t: rigid(pose(speed * t, speed))
-    )
+    problem = Problem(beams, held, None, alpha, beta, lambda t: rigid(pose(speed * t, speed)))
     motions, v = rigid(first), np.zeros(beams.size)
     for k, dof in enumerate(beams.dof):
         X, w = beams.q0[dof[:, :2]], motions.omega[k]
-        v[dof[:, 0]], v[dof[:, 1]], v[dof[:, 2]] = motions.v[k, 0] - w * X[:, 1], motions.v[k, 1] + w * X[:, 0], w
+        v[dof[:, 0]], v[dof[:, 1]], v[dof[:, 2]] = (
+            motions.v[k, 0] - w * X[:, 1],
+            motions.v[k, 1] + w * X[:, 0],
+            w,
+        )
     return problem, start(problem, beams.q0, v)
 
 
@@ -100,11 +102,9 @@ def outer_stress(problem: Problem) -> Callable[[State], np.ndarray]:
 
 
 def stress_history(
-    rpm: float, ratio: float, elements: int, h: float, end: float = 0.3, rho_inf: float = 0.9, nodes: int = 3,
-    spacing: float = 5e-4,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """t [s] every `spacing` seconds and the rocker's outer stress [Pa]."""
+    rpm: float, ratio: float, stepping: Stepping, elements: int, nodes: int = 3
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and the rocker's outer stress [Pa]."""
     problem, first = four_bar(rpm, ratio, elements, nodes)
-    steps, every = round(end / h), round(spacing / h)
-    t, stress, _ = motion(problem, first, h, steps, outer_stress(problem), rho_inf, every)
+    t, stress, _ = motion(problem, first, stepping, outer_stress(problem))
     return t, stress

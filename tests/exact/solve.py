@@ -87,7 +87,11 @@ class Banded:
     def solution(self, Ke: np.ndarray, diagonal: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The free part of the solution, (N,) with zeros at what is held."""
         *_, x, failed = lapack.dgbsv(
-            self.width, self.width, np.asfortranarray(self.band(Ke, diagonal)), rhs[self.order], overwrite_ab=1
+            self.width,
+            self.width,
+            np.asfortranarray(self.band(Ke, diagonal)),
+            rhs[self.order],
+            overwrite_ab=1,
         )
         if failed:
             raise NoConvergenceError(f"singular matrix, dgbsv says {failed}")
@@ -185,22 +189,35 @@ def start(problem: Problem, q: np.ndarray, v: np.ndarray, t: float = 0.0) -> Sta
 Observed = Callable[[State], np.ndarray]
 
 
+@dataclass(frozen=True, slots=True)
+class Stepping:
+    """Generalised-α with a constant step (Chung and Hulbert 1993).
+
+    h, steps : step [s] and their number
+    every : steps from one kept state to the next
+    rho_inf : spectral radius at infinite frequency; 1 is the average acceleration
+    """
+
+    h: float
+    steps: int
+    every: int = 1
+    rho_inf: float = 0.9
+
+
 def motion(
-    problem: Problem, first: State, h: float, steps: int, observed: Observed, rho_inf: float = 0.9, every: int = 1
+    problem: Problem, first: State, stepping: Stepping, observed: Observed
 ) -> tuple[np.ndarray, np.ndarray, State]:
-    """Generalised-α with constant step (Chung and Hulbert 1993), its forces mixed at both ends of a step.
+    """The motion from a first state on, forces and inertia each mixed from both ends of a step.
 
     Parameters
     ----------
-    h : step [s]
     observed : what is kept of a state
-    rho_inf : spectral radius at infinite frequency; 1 is the average acceleration
-    every : kept steps
 
     Returns
     -------
     t (T,), kept values (T, ...) and the last state
     """
+    h, rho_inf = stepping.h, stepping.rho_inf
     beams, band = problem.beams, Banded(problem.beams, problem.held)
     am, af = ((2 * rho_inf - 1) / (rho_inf + 1), rho_inf / (rho_inf + 1)) if rho_inf < 1 else (0.0, 0.0)
     gamma = 0.5 - am + af
@@ -209,7 +226,7 @@ def motion(
     times, kept = [first.t], [observed(first)]
     inertia, lumped = (1 - am) / (beta * h**2) * beams.Me, (1 - am) / (beta * h**2) * beams.lumps
     scale = np.ptp(beams.q0)
-    for step in range(1, steps + 1):
+    for step in range(1, stepping.steps + 1):
         t = first.t + step * h
         at, values = held_values(problem, t)
         q = now.q + h * now.v + h * h / 2 * now.a
@@ -229,7 +246,7 @@ def motion(
         else:
             raise NoConvergenceError(f"no solution at t = {t:.6g} s, corrections of {size:.3g}")
         now, f0 = State(t, q, v, a), f
-        if step % every == 0:
+        if step % stepping.every == 0:
             times.append(t)
             kept.append(observed(now))
     return np.array(times), np.array(kept), now
@@ -249,7 +266,8 @@ def spinning_frequencies(problem: Problem, q: np.ndarray, spin: float, coriolis:
     Ke = forces(problem, State(1.0, q, zero, zero))[1] - spin**2 * beams.Me * np.tile([1.0, 1.0, 0.0], k)
     J = np.kron(np.eye(k), np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 0]]))
     K, M, G = (
-        assembled(x, beams.edof, beams.size)[free][:, free].toarray() for x in (Ke, beams.Me, 2 * spin * beams.Me @ J)
+        assembled(x, beams.edof, beams.size)[free][:, free].toarray()
+        for x in (Ke, beams.Me, 2 * spin * beams.Me @ J)
     )
     M += np.diag(beams.lumps[free])
     n = len(free)
