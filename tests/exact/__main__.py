@@ -43,7 +43,8 @@ def write(name: str) -> None:
     peak = np.abs(values).max(axis=0)
     lines = [
         f"python -m tests.exact {name}",
-        f"extrapolated from steps {2 * case.h:.6g} s and {case.h:.6g} s; a link has {case.elements} elements, {case.nodes} nodes each",
+        f"extrapolated from steps {2 * case.h:.6g} s and {case.h:.6g} s; "
+        f"{case.elements} elements of {case.nodes} nodes a link",
         "largest values: " + ", ".join(f"{x:.4g}" for x in peak),
         "their errors by the step: " + ", ".join(f"{x:.1e}" for x in by_step / peak),
         "their errors by the mesh: " + ", ".join(f"{x:.1e}" for x in by_mesh / peak),
