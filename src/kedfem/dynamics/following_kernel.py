@@ -23,8 +23,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from kedfem.dynamics.kernel import add_transposed, times
-
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 SPACE, PLANE, BEAM = 0, 1, 2
@@ -47,85 +45,108 @@ def follow_block(  # type: ignore[no-untyped-def]
     h, tolerance = coefficients[7], coefficients[12]
     u1, v1, a1, f1 = np.zeros((L, D, n)), np.zeros((L, D, n)), np.zeros((L, D, n)), np.zeros((L, D, n))
     C1, Q1, angle1, g1 = np.zeros_like(C), Q0.copy(), angle0.copy(), np.zeros_like(g0)
-    Rp, rhs, dg = np.zeros((L, D, D)), np.zeros((L, D * n)), np.zeros(D * n)
+    end = (u1, v1, a1, f1, C1, Q1, angle1, g1)
+    Rp, rhs, change = np.zeros((L, D, D)), np.zeros((L, D * n)), np.zeros((L, D, n))
     RB, SRB = np.zeros((L, Qn, c)), np.zeros((L, Qn, c))
-    reaction, w, force = np.zeros((L, Qn)), np.zeros(Qn), np.zeros((L, Qn))
-    H, z, strain = np.zeros((k, k)), np.zeros(k), np.zeros(L)
-    work, change = np.zeros((4, D, n)), np.zeros((L, D, n))
-    worst = -1
+    reaction, force = np.zeros((L, Qn)), np.zeros((L, Qn))
+    H, z = np.zeros((k, k)), np.zeros(k)
+    work = (np.zeros((D, n)), np.zeros((D, n)), np.zeros((D, n)), np.zeros(D * n), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    parts = (G, Yt, RB, SRB, columns, count)
     for t in range(T):
         for i in range(L):
             for b in range(D):
                 for j in range(n):
                     u1[i, b, j] = u[i, b, j] + h * v[i, b, j] + 0.5 * h * h * a[i, b, j]
-            Q1[i], angle1[i] = Q0[i], angle0[i]
-            strain[i] = end_of_step(
-                coefficients, i, shapes, frames, kinds[i], Rs[t, i], state, (u1, v1, a1, f1, C1, Q1, angle1, g1), work
-            )
-            mean_frame(i, shapes, frames, kinds[i], Rs[t, i], u1, Q1, angle1, work)
-            oriented(kinds[i], Rs[t, i], Q1[i, -1], Rp[i])
+        Q1[:] = Q0
+        angle1[:] = angle0
+        end_of_step(coefficients, shapes, frames, kinds, Rs[t], state, end, work)
+        mean_frames(shapes, frames, kinds, Rs[t], u1, Q1, angle1, work)
+        oriented(kinds, Rs[t], Q1, Rp)
         for row in range(k):
             H[row, first[row] : row + 1] = 0.0
-        for i in range(L):
-            turned_ports(Rp[i], B[i], count[i], RB[i])
-            gathered(S[i], RB[i], columns[i], count[i], SRB[i], H)
+        turned_ports(Rp, B, count, RB)
+        gathered(S, RB, columns, count, SRB, H)
         factored(H, first)
-        settled = False
+        settled, worst = False, -1
         for sweep in range(SWEEPS):
             counts[0] += 1
-            z[:] = 0.0
-            for i in range(L):
-                residual(coefficients, i, Fs[t, i], Rp[i], state, (u1, a1, f1), rhs[i])
-                times(Yt[i], rhs[i], reaction[i])
-                for q in range(Qn):
-                    for m in range(count[i]):
-                        z[columns[i, m]] += RB[i, q, m] * reaction[i, q]
-            solved(H, first, z)
-            moved, size, most = 0.0, 0.0, -1.0
-            for i in range(L):
-                for q in range(Qn):
-                    force[i, q], w[q] = -reaction[i, q], 0.0
-                    for m in range(count[i]):
-                        force[i, q] += SRB[i, q, m] * z[columns[i, m]]
-                        w[q] += RB[i, q, m] * z[columns[i, m]]
-                times(G[i], rhs[i], dg)
-                add_transposed(Yt[i], w, dg)
-                own = 0.0
-                for b in range(D):
-                    for j in range(n):
-                        x = 0.0
-                        for m in range(D):
-                            x += Rp[i, b, m] * dg[m * n + j]
-                        change[i, b, j] = x
-                        own += x * x
-                moved += own
-                if not own <= most:
-                    most, worst = own, i
+            residuals(coefficients, Fs[t], Rp, state, end, rhs)
+            worst = swept(parts, Rp, rhs, H, first, z, reaction, force, change)
+            moved = squares(change)
             mixed(memory, counts, sweep, change.ravel())
             for i in range(L):
                 for b in range(D):
                     for j in range(n):
                         u1[i, b, j] += change[i, b, j]
-                        size += u1[i, b, j] * u1[i, b, j]
-                strain[i] = end_of_step(
-                    coefficients, i, shapes, frames, kinds[i], Rs[t, i], state,
-                    (u1, v1, a1, f1, C1, Q1, angle1, g1), work,
-                )  # fmt: skip
+            end_of_step(coefficients, shapes, frames, kinds, Rs[t], state, end, work)
             if not np.isfinite(moved):
                 break
-            counts[1] = max(counts[1], size)
+            counts[1] = max(counts[1], squares(u1))
             if moved <= tolerance * tolerance * counts[1]:
                 settled = True
                 break
         if not settled:
             return t, worst
-        for i in range(L):
-            mean_frame(i, shapes, frames, kinds[i], Rs[t, i], u1, Q1, angle1, work)
-            recorded(
-                coefficients, t, i, frames, kinds[i], Rs[t, i], Fs[t, i], Rp[i], force[i], strain[i], state,
-                (u1, v1, a1, f1, C1, Q1, angle1, g1), history,
-            )  # fmt: skip
+        mean_frames(shapes, frames, kinds, Rs[t], u1, Q1, angle1, work)
+        recorded(coefficients, t, frames, kinds, Rs[t], Fs[t], Rp, force, state, end, history)
     return T, -1
+
+
+@compiled
+def squares(x):  # type: ignore[no-untyped-def]
+    """Sum of squares of (L, D, S)."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for b in range(x.shape[1]):
+            for j in range(x.shape[2]):
+                total += x[i, b, j] * x[i, b, j]
+    return total
+
+
+@compiled
+def swept(parts, Rp, rhs, H, first, z, reaction, force, change):  # type: ignore[no-untyped-def]
+    """The change that the residuals ask for, world components, and port forces; the segment that it moves most."""
+    G, Yt, RB, SRB, columns, count = parts
+    L, D, n = change.shape
+    N, Q = D * n, reaction.shape[1]
+    z[:] = 0.0
+    for i in range(L):
+        for q in range(Q):
+            x = 0.0
+            for r in range(N):
+                x += Yt[i, q, r] * rhs[i, r]
+            reaction[i, q] = x
+        for q in range(Q):
+            for m in range(count[i]):
+                z[columns[i, m]] += RB[i, q, m] * reaction[i, q]
+    solved(H, first, z)
+    dg, most, worst = np.empty(N), -1.0, -1
+    for i in range(L):
+        for r in range(N):
+            x = 0.0
+            for m in range(N):
+                x += G[i, r, m] * rhs[i, m]
+            dg[r] = x
+        for q in range(Q):
+            x, w = -reaction[i, q], 0.0
+            for m in range(count[i]):
+                x += SRB[i, q, m] * z[columns[i, m]]
+                w += RB[i, q, m] * z[columns[i, m]]
+            force[i, q] = x
+            if w != 0.0:
+                for r in range(N):
+                    dg[r] += Yt[i, q, r] * w
+        own = 0.0
+        for b in range(D):
+            for j in range(n):
+                x = 0.0
+                for m in range(D):
+                    x += Rp[i, b, m] * dg[m * n + j]
+                change[i, b, j] = x
+                own += x * x
+        if not own <= most:
+            most, worst = own, i
+    return worst
 
 
 @compiled
@@ -165,58 +186,82 @@ def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def end_of_step(coefficients, i, shapes, frames, kind, R, state, end, work):  # type: ignore[no-untyped-def]
-    """Rates, frames and internal force of segment i at the end of the step, from its displacement; its strain energy."""
+def end_of_step(coefficients, shapes, frames, kinds, R, state, end, work):  # type: ignore[no-untyped-def]
+    """Rates, frames and internal force of all segments at the end of the step, from their displacement."""
     n0, n1, n2, _, h1, h0, alpha, beta = coefficients[4:12]
     u, v, a, _, _, C, _, _, _, g0 = state
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     X, one, _ = shapes
     number, fit, K, _ = frames
-    y, f, g, turned = work
-    D, n = u.shape[1:]
-    for b in range(D):
-        for j in range(n):
-            x = n0 * (u1[i, b, j] - u[i, b, j]) - n1 * v[i, b, j] - n2 * a[i, b, j]
-            a1[i, b, j] = x
-            v1[i, b, j] = v[i, b, j] + h1 * x + h0 * a[i, b, j]
-            f[b, j] = 0.0
-    for b in range(D):
-        for j in range(n):
-            x = 0.0
-            for m in range(D):
-                x += R[m, b] * u1[i, m, j]
-            y[b, j] = X[i, b, j] + x
-            if alpha != 0.0:
-                x *= alpha
-                x2 = n0 * (x - C[0, i, b, j]) - n1 * C[1, i, b, j] - n2 * C[2, i, b, j]
-                x1 = C[1, i, b, j] + h1 * x2 + h0 * C[2, i, b, j]
-                C1[0, i, b, j], C1[1, i, b, j], C1[2, i, b, j] = x, x1, x2
-                f[b, j] = x1
-    energy = 0.0
-    if number[i] == 0:  # the nominal frame
-        for b in range(D):
+    y, f, turned, strained, A, U, change = work
+    L, D, n = u.shape
+    for i in range(L):
+        kind = kinds[i]
+        d = 2 if kind == PLANE else D
+        for b in range(d):
             for j in range(n):
-                g[b, j] = y[b, j] - X[i, b, j]
-        energy += frame_force(coefficients, i, 0, K[i, 0], g, g0, g1, turned)
-        for b in range(D):
+                x = n0 * (u1[i, b, j] - u[i, b, j]) - n1 * v[i, b, j] - n2 * a[i, b, j]
+                a1[i, b, j] = x
+                v1[i, b, j] = v[i, b, j] + h1 * x + h0 * a[i, b, j]
+                f[b, j] = 0.0
+        for b in range(d):
             for j in range(n):
-                f[b, j] += turned[b, j]
-    for e in range(number[i]):
-        rotation(kind, fit[i, e], y, Q1[i, e], angle1[i], e)
-        deformation(kind, y, X[i], one[i], Q1[i, e], angle1[i, e], g)
-        energy += frame_force(coefficients, i, e, K[i, e], g, g0, g1, turned)
-        balanced(kind, fit[i, e], y, Q1[i, e], g, turned)
-        for b in range(D):
+                x = 0.0
+                for m in range(d):
+                    x += R[i, m, b] * u1[i, m, j]
+                y[b, j] = X[i, b, j] + x
+                if alpha != 0.0:
+                    x *= alpha
+                    x2 = n0 * (x - C[0, i, b, j]) - n1 * C[1, i, b, j] - n2 * C[2, i, b, j]
+                    x1 = C[1, i, b, j] + h1 * x2 + h0 * C[2, i, b, j]
+                    C1[0, i, b, j], C1[1, i, b, j], C1[2, i, b, j] = x, x1, x2
+                    f[b, j] = x1
+        for e in range(max(1, number[i])):
+            if number[i]:
+                rotation(kind, fit[i, e], y, Q1[i, e], angle1[i], e, A, U, change)
+            deformation(kind, y, X[i], one[i], Q1[i, e], angle1[i, e], g1[0, i, e], number[i] > 0)
+            g = g1[0, i, e]
+            if beta == 0.0:
+                for r in range(D * n):
+                    strained[r] = g[r]
+            else:
+                for r in range(D * n):
+                    x2 = n0 * (g[r] - g0[0, i, e, r]) - n1 * g0[1, i, e, r] - n2 * g0[2, i, e, r]
+                    x1 = g0[1, i, e, r] + h1 * x2 + h0 * g0[2, i, e, r]
+                    g1[1, i, e, r], g1[2, i, e, r] = x1, x2
+                    strained[r] = g[r] + beta * x1
+            for b in range(d):
+                for j in range(n):
+                    x = 0.0
+                    for r in range(D * n):
+                        x += K[i, e, b * n + j, r] * strained[r]
+                    turned[b, j] = x
+            if number[i] == 0:
+                for b in range(d):
+                    for j in range(n):
+                        f[b, j] += turned[b, j]
+            elif kind == SPACE:
+                balanced_space(fit[i, e], y, Q1[i, e], g, turned, U, change)
+                for b in range(3):
+                    for j in range(n):
+                        f[b, j] += (
+                            Q1[i, e, b, 0] * turned[0, j] + Q1[i, e, b, 1] * turned[1, j] + Q1[i, e, b, 2] * turned[2, j]
+                        )
+            else:
+                balanced_plane(fit[i, e], y, Q1[i, e], g, turned)
+                c, s = Q1[i, e, 0, 0], Q1[i, e, 1, 0]
+                for j in range(n):
+                    f[0, j] += c * turned[0, j] - s * turned[1, j]
+                    f[1, j] += s * turned[0, j] + c * turned[1, j]
+                if kind == BEAM:
+                    for j in range(n):
+                        f[2, j] += turned[2, j]
+        for b in range(d):
             for j in range(n):
-                for m in range(D):
-                    f[b, j] += element(kind, Q1[i, e], b, m) * turned[m, j]
-    for b in range(D):
-        for j in range(n):
-            x = 0.0
-            for m in range(D):
-                x += R[b, m] * f[m, j]
-            f1[i, b, j] = x
-    return energy
+                x = 0.0
+                for m in range(d):
+                    x += R[i, b, m] * f[m, j]
+                f1[i, b, j] = x
 
 
 @compiled
@@ -228,10 +273,10 @@ def element(kind, Q, b, m):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def rotation(kind, fit, y, Q, angles, e):  # type: ignore[no-untyped-def]
+def rotation(kind, fit, y, Q, angles, e, A, U, change):  # type: ignore[no-untyped-def]
     """Q of Σ y_a ⊗ fit_a in place, from an earlier one; of a planar segment its angle, which counts turns."""
     n = y.shape[1]
-    if kind != 0:
+    if kind != SPACE:
         c, s = 0.0, 0.0
         for j in range(n):
             c += y[0, j] * fit[0, j] + y[1, j] * fit[1, j]
@@ -240,21 +285,24 @@ def rotation(kind, fit, y, Q, angles, e):  # type: ignore[no-untyped-def]
         turn += 2 * np.pi * np.round((angles[e] - turn) / (2 * np.pi))
         angles[e] = turn
         size = np.sqrt(c * c + s * s)
-        Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c / size, -s / size, s / size, c / size
+        c, s = c / size, s / size
+        Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c, -s, s, c
         return
-    A, U, change, W = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
     for b in range(3):
         for m in range(3):
+            x = 0.0
             for j in range(n):
-                A[b, m] += y[b, j] * fit[m, j]
+                x += y[b, j] * fit[m, j]
+            A[b, m] = x
     for _ in range(TURNS):
         for b in range(3):
             for m in range(3):
                 U[b, m] = Q[0, b] * A[0, m] + Q[1, b] * A[1, m] + Q[2, b] * A[2, m]
         change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
         turn_of(U, change)
-        rodrigues(change, Q, W)
-        if max(abs(change[0]), abs(change[1]), abs(change[2])) <= 1e-15:
+        size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+        rodrigues(change, Q, U)
+        if size <= 1e-8:  # the next, quadratically smaller, is rounding
             break
 
 
@@ -291,72 +339,58 @@ def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def deformation(kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def]
-    """g = Qᵀ y − X without its mean; ψ less the frame's angle."""
+def deformation(kind, y, X, one, Q, angle, g, follows):  # type: ignore[no-untyped-def]
+    """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle. In the nominal frame y − X."""
     D, n = y.shape
-    k = 3 if kind == 0 else 2
+    if not follows:
+        for b in range(D):
+            for j in range(n):
+                g[b * n + j] = y[b, j] - X[b, j]
+        return
+    k = 3 if kind == SPACE else 2
     for b in range(k):
         mean, total = 0.0, 0.0
         for j in range(n):
             x = -X[b, j]
             for m in range(k):
                 x += Q[m, b] * y[m, j]
-            g[b, j] = x
+            g[b * n + j] = x
             mean += x * one[b, j]
             total += one[b, j] * one[b, j]
         mean /= total
         for j in range(n):
-            g[b, j] -= mean * one[b, j]
-    for b in range(k, D):
+            g[b * n + j] -= mean * one[b, j]
+    if kind == BEAM:
         for j in range(n):
-            g[b, j] = y[b, j] - angle * one[b, j] if kind == 2 else 0.0
+            g[2 * n + j] = y[2, j] - angle * one[2, j]
 
 
 @compiled
-def frame_force(coefficients, i, e, K, g, g0, g1, f):  # type: ignore[no-untyped-def]
-    """f = K (g + β g') of frame e of segment i, g' by the scheme's own formulas; its strain energy."""
-    n0, n1, n2, _, h1, h0, _, beta = coefficients[4:12]
-    D, n = g.shape
-    energy = 0.0
-    for m in range(D * n):
-        x = g[m // n, m % n]
-        g1[0, i, e, m] = x
-        if beta != 0.0:
-            x2 = n0 * (x - g0[0, i, e, m]) - n1 * g0[1, i, e, m] - n2 * g0[2, i, e, m]
-            g1[1, i, e, m] = g0[1, i, e, m] + h1 * x2 + h0 * g0[2, i, e, m]
-            g1[2, i, e, m] = x2
-    for r in range(D * n):
-        s, d = 0.0, 0.0
-        for m in range(D * n):
-            s += K[r, m] * g1[0, i, e, m]
-        if beta != 0.0:
-            for m in range(D * n):
-                d += K[r, m] * g1[1, i, e, m]
-        energy += 0.5 * g1[0, i, e, r] * s
-        f[r // n, r % n] = s + beta * d
-    return energy
+def balanced_plane(fit, y, Q, g, f):  # type: ignore[no-untyped-def]
+    """f becomes the gradient of the energy in a plane: F_a = f_a − (τ / tr U) e_z × fit_a, τ = Σ g_a × f_a."""
+    n = y.shape[1]
+    torque, trace = 0.0, 0.0
+    for j in range(n):
+        torque += g[j] * f[1, j] - g[n + j] * f[0, j]
+        trace += (Q[0, 0] * y[0, j] + Q[1, 0] * y[1, j]) * fit[0, j]
+        trace += (Q[0, 1] * y[0, j] + Q[1, 1] * y[1, j]) * fit[1, j]
+    torque /= trace
+    for j in range(n):
+        f[0, j] += torque * fit[1, j]
+        f[1, j] -= torque * fit[0, j]
 
 
 @compiled
-def balanced(kind, fit, y, Q, g, f):  # type: ignore[no-untyped-def]
+def balanced_space(fit, y, Q, g, f, U, w):  # type: ignore[no-untyped-def]
     """f becomes the gradient of the energy: F_a = f_a − (G⁻¹ τ) × fit_a, τ = Σ g_a × f_a."""
     n = y.shape[1]
-    if kind != 0:
-        torque, trace = 0.0, 0.0
-        for j in range(n):
-            torque += g[0, j] * f[1, j] - g[1, j] * f[0, j]
-            for b in range(2):
-                trace += (Q[0, b] * y[0, j] + Q[1, b] * y[1, j]) * fit[b, j]
-        torque /= trace
-        for j in range(n):
-            f[0, j] += torque * fit[1, j]
-            f[1, j] -= torque * fit[0, j]
-        return
-    U, w = np.zeros((3, 3)), np.zeros(3)
+    U[:] = 0.0
+    w[:] = 0.0
     for j in range(n):
-        w[0] += g[1, j] * f[2, j] - g[2, j] * f[1, j]
-        w[1] += g[2, j] * f[0, j] - g[0, j] * f[2, j]
-        w[2] += g[0, j] * f[1, j] - g[1, j] * f[0, j]
+        gx, gy, gz = g[j], g[n + j], g[2 * n + j]
+        w[0] += gy * f[2, j] - gz * f[1, j]
+        w[1] += gz * f[0, j] - gx * f[2, j]
+        w[2] += gx * f[1, j] - gy * f[0, j]
         for b in range(3):
             x = Q[0, b] * y[0, j] + Q[1, b] * y[1, j] + Q[2, b] * y[2, j]
             for m in range(3):
@@ -369,80 +403,92 @@ def balanced(kind, fit, y, Q, g, f):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def mean_frame(i, shapes, frames, kind, R, u1, Q1, angle1, work):  # type: ignore[no-untyped-def]
-    """The segment's mean rotation, kept behind those of its frames."""
+def mean_frames(shapes, frames, kinds, R, u1, Q1, angle1, work):  # type: ignore[no-untyped-def]
+    """The segments' mean rotations, kept behind those of their frames."""
     X, _, mean = shapes
-    number = frames[0][i]
-    if number == 1:
-        Q1[i, -1], angle1[i, -1] = Q1[i, 0], angle1[i, 0]
-    elif number > 1:
-        y = work[0]
-        D, n = y.shape
+    y, _, _, _, A, U, change = work
+    L, D, n = u1.shape
+    last = Q1.shape[1] - 1
+    for i in range(L):
+        number = frames[0][i]
+        if number == 1:
+            for b in range(3):
+                for m in range(3):
+                    Q1[i, last, b, m] = Q1[i, 0, b, m]
+            angle1[i, last] = angle1[i, 0]
+        elif number > 1:
+            for b in range(D):
+                for j in range(n):
+                    x = X[i, b, j]
+                    for m in range(D):
+                        x += R[i, m, b] * u1[i, m, j]
+                    y[b, j] = x
+            rotation(kinds[i], mean[i], y, Q1[i, last], angle1[i], last, A, U, change)
+
+
+@compiled
+def oriented(kinds, R, Q1, out):  # type: ignore[no-untyped-def]
+    """R Q of each segment's mean frame: link to world."""
+    L, D = R.shape[:2]
+    last = Q1.shape[1] - 1
+    for i in range(L):
+        for b in range(D):
+            for m in range(D):
+                x = 0.0
+                for k in range(D):
+                    x += R[i, b, k] * element(kinds[i], Q1[i, last], k, m)
+                out[i, b, m] = x
+
+
+@compiled
+def residuals(coefficients, F, Rp, state, end, out):  # type: ignore[no-untyped-def]
+    """What is missing to balance at the end of the step, in the predicted frames."""
+    alpha_f, alpha_m = coefficients[2:4]
+    a, F0, f0, a1, f1 = state[2], state[3], state[4], end[2], end[3]
+    L, D, n = F.shape
+    for i in range(L):
+        for m in range(D * n):
+            out[i, m] = 0.0
         for b in range(D):
             for j in range(n):
-                y[b, j] = X[i, b, j]
+                x = (1 - alpha_f) * (F[i, b, j] - f1[i, b, j]) - (1 - alpha_m) * a1[i, b, j] - alpha_m * a[i, b, j]
+                x += alpha_f * (F0[i, b, j] - f0[i, b, j])
                 for m in range(D):
-                    y[b, j] += R[m, b] * u1[i, m, j]
-        rotation(kind, mean[i], y, Q1[i, -1], angle1[i], Q1.shape[1] - 1)
-
-
-@compiled
-def oriented(kind, R, Q, out):  # type: ignore[no-untyped-def]
-    """R Q: link to world."""
-    D = len(R)
-    for b in range(D):
-        for m in range(D):
-            out[b, m] = 0.0
-            for k in range(D):
-                out[b, m] += R[b, k] * element(kind, Q, k, m)
-
-
-@compiled
-def residual(coefficients, i, F, Rp, state, end, out):  # type: ignore[no-untyped-def]
-    """What is missing to balance at the end of the step, in the predicted frame."""
-    alpha_f, alpha_m = coefficients[2:4]
-    _, _, a, F0, f0 = state[:5]
-    _, a1, f1 = end
-    D, n = F.shape
-    out[:] = 0.0
-    for b in range(D):
-        for j in range(n):
-            x = (1 - alpha_f) * (F[b, j] - f1[i, b, j]) - (1 - alpha_m) * a1[i, b, j] - alpha_m * a[i, b, j]
-            x += alpha_f * (F0[i, b, j] - f0[i, b, j])
-            for m in range(D):
-                out[m * n + j] += Rp[b, m] * x
+                    out[i, m * n + j] += Rp[i, b, m] * x
 
 
 @compiled
 def turned_ports(R, B, count, out):  # type: ignore[no-untyped-def]
     """Rᵀ B, port by port."""
-    D = len(R)
-    for p in range(len(B) // D):
-        for a in range(D):
-            for c in range(count):
-                x = 0.0
-                for b in range(D):
-                    x += R[b, a] * B[p * D + b, c]
-                out[p * D + a, c] = x
+    L, D = R.shape[:2]
+    for i in range(L):
+        for p in range(B.shape[1] // D):
+            for a in range(D):
+                for c in range(count[i]):
+                    x = 0.0
+                    for b in range(D):
+                        x += R[i, b, a] * B[i, p * D + b, c]
+                    out[i, p * D + a, c] = x
 
 
 @compiled
 def gathered(S, RB, columns, count, SRB, H):  # type: ignore[no-untyped-def]
-    """S Rᵀ B of a segment, and its share in H, of which the lower half is kept."""
-    for q in range(len(S)):
-        for c in range(count):
-            SRB[q, c] = 0.0
-        for p in range(len(S)):
-            s = S[q, p]
-            for c in range(count):
-                SRB[q, c] += s * RB[p, c]
-    for c in range(count):
-        for d in range(count):
-            if columns[d] <= columns[c]:
+    """S Rᵀ B of each segment, and its share in H, of which the lower half is kept."""
+    L, Q = S.shape[:2]
+    for i in range(L):
+        for q in range(Q):
+            for c in range(count[i]):
                 x = 0.0
-                for q in range(len(S)):
-                    x += RB[q, c] * SRB[q, d]
-                H[columns[c], columns[d]] += x
+                for p in range(Q):
+                    x += S[i, q, p] * RB[i, p, c]
+                SRB[i, q, c] = x
+        for c in range(count[i]):
+            for d in range(count[i]):
+                if columns[i, d] <= columns[i, c]:
+                    x = 0.0
+                    for q in range(Q):
+                        x += RB[i, q, c] * SRB[i, q, d]
+                    H[columns[i, c], columns[i, d]] += x
 
 
 @compiled
@@ -471,37 +517,46 @@ def solved(H, first, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def recorded(coefficients, t, i, frames, kind, R, F, Rp, force, strain, state, end, history):  # type: ignore[no-untyped-def]
+def recorded(coefficients, t, frames, kinds, R, F, Rp, force, state, end, history):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and a row of the history."""
     alpha_f = coefficients[2]
     u, v, a, F0, f0, C, force0, Q0, angle0, g0 = state
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     us, vs, as_, gs, Rs, forces, energies = history
-    number, _, _, share = frames
-    D, n = F.shape
-    u[i], v[i], a[i], F0[i], f0[i], Q0[i], angle0[i] = u1[i], v1[i], a1[i], F, f1[i], Q1[i], angle1[i]
-    for m in range(3):
-        C[m, i], g0[m, i] = C1[m, i], g1[m, i]
-    oriented(kind, R, Q1[i, -1], Rs[t, i])
-    for p in range(len(force) // D):  # λ of the balance is (1 − α_f) λ1 + α_f λ0, in world components
+    number, _, K, share = frames
+    L, D, n = F.shape
+    N = D * n
+    u[:], v[:], a[:], F0[:], f0[:], Q0[:], angle0[:] = u1, v1, a1, F, f1, Q1, angle1
+    C[:], g0[:] = C1, g1
+    us[t], vs[t], as_[t] = u1, v1, a1
+    oriented(kinds, R, Q1, Rs[t])
+    for i in range(L):
+        for p in range(force.shape[1] // D):  # λ of the balance is (1 − α_f) λ1 + α_f λ0, in world components
+            for b in range(D):
+                x = 0.0
+                for m in range(D):
+                    x += Rp[i, b, m] * force[i, p * D + m]
+                force0[i, p * D + b] = (x - alpha_f * force0[i, p * D + b]) / (1.0 - alpha_f)
+            for b in range(D):
+                x = 0.0
+                for m in range(D):
+                    x += Rs[t, i, m, b] * force0[i, p * D + m]
+                forces[t, i, p * D + b] = x
+        energy = 0.0
+        for e in range(max(1, number[i])):
+            for r in range(N):
+                x = 0.0
+                for m in range(N):
+                    x += K[i, e, r, m] * g1[0, i, e, m]
+                energy += 0.5 * x * g1[0, i, e, r]
+        energies[t, i] = energy
         for b in range(D):
-            x = 0.0
-            for m in range(D):
-                x += Rp[b, m] * force[p * D + m]
-            force0[i, p * D + b] = (x - alpha_f * force0[i, p * D + b]) / (1.0 - alpha_f)
-        for b in range(D):
-            x = 0.0
-            for m in range(D):
-                x += Rs[t, i, m, b] * force0[i, p * D + m]
-            forces[t, i, p * D + b] = x
-    us[t, i], vs[t, i], as_[t, i] = u1[i], v1[i], a1[i]
-    energies[t, i] = strain
-    for r in range(D * n):
-        x = 0.0
-        if number[i] < 2:
-            x = g1[0, i, 0, r]
-        else:
-            for e in range(number[i]):
-                for m in range(D * n):
-                    x += share[i, e, r, m] * g1[0, i, e, m]
-        gs[t, i, r // n, r % n] = x
+            for j in range(n):
+                x = 0.0
+                if number[i] < 2:
+                    x = g1[0, i, 0, b * n + j]
+                else:
+                    for e in range(number[i]):
+                        for m in range(N):
+                            x += share[i, e, b * n + j, m] * g1[0, i, e, m]
+                gs[t, i, b, j] = x
