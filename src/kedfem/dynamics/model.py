@@ -104,7 +104,7 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
         if body.link in links:
             links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])
     carried = tuple(
-        Carried(rigid(links.pop(name)), linkage.bodies.index(name), scene.drive.joint, ())
+        Carried(rigid(links.pop(name)), linkage.bodies.index(name), str(scene.driven), ())
         for name in list(links) if moves_with_drive(scene, name)
     )  # fmt: skip
     if not links:
@@ -134,7 +134,8 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
 
 def moves_with_drive(scene: Scene, name: str) -> bool:
     """Whether a link is rigid and turns on the ground with the drive."""
-    return scene.links[name].fidelity == "rigid" and name in scene.joints[scene.drive.joint].links
+    driven = scene.joints[scene.driven].links if scene.driven else ()
+    return scene.links[name].fidelity == "rigid" and name in driven
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:

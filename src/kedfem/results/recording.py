@@ -46,7 +46,8 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), _energy(model)]
+    drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
+    return [*probes, *joints, *drive, _energy(model)]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -268,15 +269,15 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
-def _torque(scene: Scene, model: Model) -> list[Recorded]:
+def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
-    joint = scene.joints[scene.drive.joint]
+    joint = scene.joints[driven]
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
     channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
-        wrench = _wrench(model, _number(model, name), scene.drive.joint, at)
+        wrench = _wrench(model, _number(model, name), driven, at)
     else:
         wrench, others = _hub_wrench(scene, model, carried)
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
