@@ -26,7 +26,8 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
-from kedfem.results.recording import Recorded, recording, rows
+from kedfem.results.recorded import Recorded
+from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, following, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"

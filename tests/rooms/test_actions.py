@@ -26,10 +26,13 @@ from kedfem.dynamics.action import (
 )
 from kedfem.dynamics.actions import actions, hinges
 from kedfem.dynamics.actions_kernel import evaluate, evaluate_all
+from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
+from kedfem.motion.rigid import resting
 from kedfem.motion.rows import perpendiculars
+from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -374,3 +377,62 @@ def test_ends_must_be_on_their_links() -> None:
     scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
     with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
         actions(scene, model)
+
+
+# -- recorded -----------------------------------------------------------------------------------------------
+
+
+def blocks(model: Model, t: np.ndarray, angle: np.ndarray, length: int) -> list[Block]:
+    """An arm that turns about the origin by an angle over time, nominally at rest, block by block."""
+    link, out = model.links[0], []
+    rate = np.gradient(angle, t)
+    for k in range(0, len(t), length):
+        here = range(k, min(k + length, len(t)))
+        u = np.array([turning(model, angle[i] * Z)(0, link.X) for i in here])
+        x = u + link.X[:, : link.d] if link.kind != "beam" else u + link.X * [1.0, 1.0, 0.0]
+        v = np.zeros_like(u)
+        v[..., 0], v[..., 1] = -rate[here, None] * x[..., 1], rate[here, None] * x[..., 0]
+        if link.kind == "beam":
+            v[..., 2] = rate[here, None] * link.one
+        none, R = np.zeros((len(u), 0)), np.tile(np.eye(link.d), (len(u), 1, 1))
+        history = LinkHistory(u, v, 0 * u, 0 * u, R, 0 * u, none, np.zeros(len(u)))
+        out.append(Block(k, resting(2, t[here]), [history]))
+    return out
+
+
+@pytest.mark.parametrize("kind", ["beam", "plane", "solid"])
+@pytest.mark.parametrize("length", [1, 7, 100])
+def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> None:
+    """Over a turn, in blocks; the joint's axis is −z, a motor over speed, a spring from the tip to the ground."""
+    motor = {"joint": "A", "torque": {"over": "speed", "at": [-20, 20], "value": [10, -10]}}
+    torsion = {"kind": "torsion", "joint": "A", "stiffness": 2, "damping": 0.5, "free_angle": 1}
+    tip = [1, 0] if kind == "beam" else [0.98, 0]
+    raw = arm(kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)})
+    scene, model = built(raw)
+    t = np.linspace(0, 2, 61)
+    angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
+    recorded = recording(scene, model)
+    assert not any(each.channel.name.startswith("drive") for each in recorded)
+    parts = [rows([x for x in recorded if x.channel.name.split("/")[0] in ("motors", "springs") or "angle" in x.channel.name], b)
+             for b in blocks(model, t, angle, length)]  # fmt: skip
+    got = {name: np.concatenate([part[name][:, 0] for part in parts]) for name in parts[0]}
+    rate = np.gradient(angle, t)
+    place = np.linalg.norm(tip) * np.array([np.cos(angle), np.sin(angle)])
+    length_now = np.hypot(place[0], place[1] - 2)
+    stretch = rate * (place[0] * (place[1] - 2) - place[1] * place[0]) / length_now
+    pull = 10 * (length_now - np.hypot(tip[0], 2)) + 3 * stretch
+    expected = {
+        "motors/m/angle": -angle, "motors/m/speed": -rate, "motors/m/torque": np.interp(-rate, [-20, 20], [10, -10]),
+        "springs/t/angle": -angle, "springs/t/torque": -2 * (-angle - 1) + 0.5 * rate,
+        "springs/s/length": length_now, "springs/s/force": pull, "joints/A/angle": -angle,
+    }  # fmt: skip
+    assert list(got) == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_allclose(got[name], values, atol=1e-8, err_msg=name)
+    again = rows(
+        recorded[:0] + [x for x in recorded if x.channel.name == "joints/A/angle"],
+        blocks(model, t, angle, 5)[0],
+    )
+    np.testing.assert_allclose(
+        again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9
+    )  # a new run counts from zero

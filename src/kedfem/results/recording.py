@@ -1,7 +1,6 @@
 """From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,22 +17,15 @@ from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
+from kedfem.results.acting import acting
+from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
-Rows = Float[np.ndarray, "T c"]
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
-
-
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A channel, and its rows over a block of time points."""
-
-    channel: Channel
-    rows: Callable[[Block], Rows]
 
 
 def recording(scene: Scene, model: Model) -> list[Recorded]:
@@ -47,7 +39,7 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
     drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
-    return [*probes, *joints, *drive, _energy(model)]
+    return [*probes, *joints, *drive, *acting(scene, model), _energy(model)]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
