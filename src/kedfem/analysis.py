@@ -26,8 +26,9 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
-from kedfem.results.recording import Recorded, recording, rows
-from kedfem.scene import Scene, time_grid, turn_steps
+from kedfem.results.recorded import Recorded
+from kedfem.results.recording import recording, rows
+from kedfem.scene import Scene, following, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 SMALL_DEFLECTION = (
@@ -93,7 +94,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
         *stability_warning(scene),
-        *deflection_warning(deflection),
+        *(() if following(scene) else deflection_warning(deflection)),
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
@@ -273,7 +274,8 @@ def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath
         write_plots(results, folder / PLOTS)
     if not (scene.output.picture and peak):
         return ()
-    title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s, drive {np.degrees(peak.angle):.1f}°"
+    title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s"
+    title += "" if scene.driven is None else f", drive {np.degrees(peak.angle):.1f}°"
     animation = scene.output.animation
     if animation and animation.exaggeration != 1.0:
         title += f", deformation × {animation.exaggeration:g}"

@@ -107,7 +107,7 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
             on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     carried = tuple(
-        Carried(rigid(links.pop(name)), linkage.bodies.index(name), scene.drive.joint, ())
+        Carried(rigid(links.pop(name)), linkage.bodies.index(name), str(scene.driven), ())
         for name in list(cut) if moves_with_drive(scene, name)
     )  # fmt: skip
     if not links:
@@ -147,7 +147,8 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
 
 def moves_with_drive(scene: Scene, name: str) -> bool:
     """Whether a link is rigid and turns on the ground with the drive."""
-    return scene.links[name].fidelity == "rigid" and name in scene.joints[scene.drive.joint].links
+    driven = scene.joints[scene.driven].links if scene.driven else ()
+    return scene.links[name].fidelity == "rigid" and name in driven
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:

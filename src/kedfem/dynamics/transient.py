@@ -22,7 +22,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, time_grid, turn_steps
+from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
 
 POINTS = 256  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
@@ -40,6 +40,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     SolveError
         If an effective matrix is not positive definite.
     """
+    if following(scene):
+        raise SolveError("analysis.frames: must be 'nominal' so far, got frames that follow")
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
@@ -61,7 +63,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    law = scene.drive.motion
+    law = scene.motion
     states = first_states(scene, linkage, along, law, model)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])
@@ -87,7 +89,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
 
     A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
     """
-    grid, law = time_grid(scene), scene.drive.motion
+    grid, law = time_grid(scene), scene.motion
     turn = turn_steps(scene) or 0.0
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
     kept: list[RigidMotion] = []
@@ -120,7 +122,7 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
 
 
 def first_states(
-    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw, model: Model
+    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model
 ) -> list[LinkState]:
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
     at_rest = scene.analysis.initial == "rest"
@@ -157,7 +159,7 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     """Least and greatest drive angle of the analysis [rad]."""
     grid = time_grid(scene)
     t = grid.step * np.arange(grid.steps + 1)
-    phi = drive_angle(scene.drive.motion, t)[0]
+    phi = drive_angle(scene.motion, t)[0]
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 

@@ -1,7 +1,6 @@
 """From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,22 +17,15 @@ from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
+from kedfem.results.acting import acting
+from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
-Rows = Float[np.ndarray, "T c"]
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
-
-
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A channel, and its rows over a block of time points."""
-
-    channel: Channel
-    rows: Callable[[Block], Rows]
 
 
 def recording(scene: Scene, model: Model) -> list[Recorded]:
@@ -46,7 +38,8 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), _energy(model)]
+    drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
+    return [*probes, *joints, *drive, *acting(scene, model), _energy(model)]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -268,15 +261,15 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
-def _torque(scene: Scene, model: Model) -> list[Recorded]:
+def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
-    joint = scene.joints[scene.drive.joint]
+    joint = scene.joints[driven]
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
     channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
-        wrench = _wrench(model, _number(model, name), scene.drive.joint, at)
+        wrench = _wrench(model, _number(model, name), driven, at)
     else:
         wrench, others = _hub_wrench(scene, model, carried)
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
