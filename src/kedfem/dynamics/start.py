@@ -1,6 +1,6 @@
 """Initial states that satisfy the equation: at rest, or quasi-static."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,11 +24,15 @@ CONVERGED = 1e-9  # change of a sweep, of the deflection
 
 @dataclass(frozen=True, slots=True)
 class Deflected:
-    """A link's given start: u, v (n, d) δ and δ' in world components, g_rate (n, d) rate of δ in the link frame."""
+    """A link's given start: u, v (n, d) δ and δ' in world components, g_rate (n, d) rate of δ in the link frame.
+
+    stressed : (n, d) force k g P of its stress stiffness, link frame [N]
+    """
 
     u: Nodal
     v: Nodal
     g_rate: Nodal
+    stressed: Nodal | float = 0.0
 
 
 def initial_states(
@@ -46,7 +50,7 @@ def initial_states(
     g = [x.u @ now.R for x, now in zip(deflected, at, strict=True)]
     Kg = [_stiffness_times(link, x) for link, x in zip(links, g, strict=True)]
     Cg1 = [damping_times(link, damping, x.g_rate) for link, x in zip(links, deflected, strict=True)]
-    f = [a + b for a, b in zip(Kg, Cg1, strict=True)]
+    f = [a + b + x.stressed for a, b, x in zip(Kg, Cg1, deflected, strict=True)]
     # the mass is the same in every frame, so the accelerations can be found in the link frames
     a_link, forces = coupled(
         parts, [now.R for now in at], [now.F @ now.R - x for now, x in zip(at, f, strict=True)]
@@ -68,10 +72,14 @@ def initial_states(
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×²."""
+    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×².
+
+    turnings : g → k g P of the links' stress stiffness, if it counts
+    """
 
     at: Sequence[Nominal]
     spin: Sequence[Rotation]
+    turnings: Sequence[Callable[[Nodal], Nodal]] | None = None
 
 
 def quasi_static(
@@ -80,7 +88,7 @@ def quasi_static(
     """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
 
     The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
-    frequency).
+    frequency), and so is stress stiffness, K_σ δ.
 
     Returns
     -------
@@ -99,6 +107,8 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     before = np.inf
     for _ in range(TURNING_SWEEPS):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
+        if instant.turnings is not None:
+            inertia = [m + k(x) for m, k, x in zip(inertia, instant.turnings, g, strict=True)]
         new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)])
         change, size = _change(new, g)
         if change > 0.5 * before:

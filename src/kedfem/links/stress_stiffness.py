@@ -102,7 +102,7 @@ def _rigid(link: Link, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n n"]:
     X = link.X[:, :space]
     gradients = np.linalg.pinv(np.column_stack([link.one, X]), rcond=1e-9)[1:].T
     virial = f.T @ X
-    return gradients @ _symmetric(virial) @ gradients.T
+    return np.asarray(gradients @ _symmetric(virial) @ gradients.T)
 
 
 def _symmetric(k: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
