@@ -5,7 +5,6 @@ Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -101,17 +100,6 @@ def turned_ports(
     return np.asarray(turned.reshape(len(force), -1)[:, attachment.keep])
 
 
-def turned_interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
-    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns."""
-    joint = part.attachment
-    B = np.zeros((len(joint.weights), joint.components, joint.B.shape[1]))
-    B.reshape(-1, joint.B.shape[1])[joint.keep] = joint.B
-    turned = np.einsum("tba,pbk->tpak", R, B).reshape(len(R), -1, joint.B.shape[1])
-    out = np.zeros((len(R), len(part.S), joint.B.shape[1]))
-    out[:, : len(joint.keep)] = turned[:, joint.keep]
-    return out
-
-
 def coupled(
     parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf]
 ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
@@ -163,8 +151,6 @@ class CondensedSteps:
 
     Everything but one mass product and one pair of triangular solves per link follows by recurrence.
     """
-
-    stiffening: Any = None  # of those that have it
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh

@@ -38,8 +38,6 @@ class _Part:
 class DenseSteps:
     """Advances all links by generalised-α steps, block by block; everything constant is made here, once."""
 
-    stiffening: Any = None  # of those that have it
-
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
     ) -> None:

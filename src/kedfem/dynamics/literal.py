@@ -4,7 +4,6 @@ It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the co
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -69,8 +68,6 @@ def shared_nodes(
 
 class LiteralSteps:
     """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
-
-    stiffening: Any = None  # of those that have it
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.condensed import (
@@ -16,9 +17,11 @@ from kedfem.dynamics.condensed import (
 )
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
+from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
 TURNING_SWEEPS = 20
+KRYLOV = 50  # vectors
 CONVERGED = 1e-9  # change of a sweep, of the deflection
 
 
@@ -88,7 +91,7 @@ def quasi_static(
     """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
 
     The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
-    frequency), and so is stress stiffness, K_σ δ.
+    frequency); with stress stiffness, K_σ δ, by GMRES.
 
     Returns
     -------
@@ -104,11 +107,12 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
     g, _ = coupled(parts, R, load)
+    if instant.turnings is not None:
+        g = _stiffened(links, parts, R, g, spin, instant.turnings)
+        return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
     before = np.inf
     for _ in range(TURNING_SWEEPS):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
-        if instant.turnings is not None:
-            inertia = [m + k(x) for m, k, x in zip(inertia, instant.turnings, g, strict=True)]
         new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)])
         change, size = _change(new, g)
         if change > 0.5 * before:
@@ -117,6 +121,31 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
         if change <= CONVERGED * size:
             break
     return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
+
+
+def _stiffened(
+    links: Sequence[Link], parts: Sequence[Substructure], R: Sequence[Rotation], g: Sequence[NodalOf],
+    spin: Sequence[Rotation], turnings: Sequence[Callable[[Nodal], Nodal]],
+) -> list[NodalOf]:  # fmt: skip
+    """The deflection with stress stiffness, which need not be small beside K0: (1 + K0⁻¹ (M spin + k P)) g = g0."""
+    ends = np.cumsum([x.size for x in g])[:-1]
+
+    def applied(x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        each = [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
+        forces = [
+            mass_times(link.mass, y @ S.T) + k(y)
+            for link, y, S, k in zip(links, each, spin, turnings, strict=True)
+        ]
+        return np.asarray(x + np.concatenate([y.ravel() for y in coupled(parts, R, forces)[0]]))
+
+    start = np.concatenate([x.ravel() for x in g])
+    operator = LinearOperator((len(start),) * 2, applied, dtype=float)
+    x, left = gmres(operator, start, rtol=CONVERGED, restart=KRYLOV, maxiter=4)
+    if left:
+        raise SolveError(
+            'analysis.initial: must be a deflection that can be found, got none: take initial = "rest"'
+        )
+    return [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
 
 
 def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, float]:

@@ -20,7 +20,6 @@ from kedfem.dynamics.condensed import (
     factored,
     mass_matrix,
     port_columns,
-    turned_interface,
 )
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing
@@ -183,7 +182,7 @@ def port_forces(
 ) -> list[Float[np.ndarray, "T _"]]:
     """`coupled` for many times at once, port forces only: λ of all links, link frame."""
     v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
-    RB = [turned_interface(part, each) for part, each in zip(parts, R, strict=True)]
+    RB = [_interface(part, each) for part, each in zip(parts, R, strict=True)]
     if RB[0].shape[2]:
         SRB = [part.S @ b for part, b in zip(parts, RB, strict=True)]
         H = np.sum([b.transpose(0, 2, 1) @ x for b, x in zip(RB, SRB, strict=True)], axis=0)
@@ -191,6 +190,18 @@ def port_forces(
         z = np.linalg.solve(H, f[..., None])
         v = [x - (b @ z)[..., 0] for x, b in zip(v, RB, strict=True)]
     return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
+
+
+def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
+    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns."""
+    joint = part.attachment
+    (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
+    B = np.zeros((p * d, k))
+    B[joint.keep] = joint.B
+    turned = np.einsum("tba,pbk->tpak", R, B.reshape(p, d, k)).reshape(len(R), p * d, k)
+    out = np.zeros((len(R), len(part.S), k))
+    out[:, : len(joint.keep)] = turned[:, joint.keep]
+    return out
 
 
 def swept(

@@ -81,7 +81,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         If a displacement is not finite: with step, time and drive angle.
     """
     law = scene.drive.motion
-    stresses = solver.stiffening
+    stresses = solver.stiffening if isinstance(solver, StiffenedSteps) else None
     states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])
