@@ -16,10 +16,16 @@ class Forcing:
 
     R : (T, d, d) orientation, link to world
     F : (T, n, d) P − M R0'', world components [N]
+    stress : (T, m) factors of the link's stress modes; None without stiffening
     """
 
     R: Float[np.ndarray, "T d d"]
     F: Float[np.ndarray, "T n d"]
+    stress: Float[np.ndarray, "T m"] | None = None
+
+    def at(self, k: int) -> Nominal:
+        """At the k-th of the times."""
+        return Nominal(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +136,6 @@ def stepwise(
     """All time points of a block by a solver that takes one step at a time."""
     taken = []
     for k in range(len(forcing[0].R)):
-        states = step(states, [Nominal(each.R[k], each.F[k]) for each in forcing])
+        states = step(states, [each.at(k) for each in forcing])
         taken.append(states)
     return [history([states[i] for states in taken]) for i in range(len(forcing))], states
