@@ -26,6 +26,7 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recording import Recorded, recording, rows
 from kedfem.scene import Scene, time_grid, turn_steps
 
@@ -53,7 +54,7 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user, choices made."""
+    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user, choices made, balance."""
 
     folder: FilePath
     results: Results
@@ -62,6 +63,7 @@ class Run:
     warnings: tuple[str, ...] = ()
     reduction: Reduction | None = None
     plan: Plan | None = None
+    balance: Balance = Balance()
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -83,7 +85,8 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
-    recorded = clock.timed("probes", lambda: recording(scene, ready.model))
+    account = Account(ready.model)
+    recorded = clock.timed("probes", lambda: recording(scene, ready.model, account))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
     peak, deflection, error = clock.timed(
@@ -97,9 +100,10 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
+        *balance_warning(account.balance),
         *warnings,
     )
-    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan)
+    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance)
 
 
 @dataclass

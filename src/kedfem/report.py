@@ -15,6 +15,7 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.path import Path
+from kedfem.results.audit import Balance
 from kedfem.scene import LinkScene, Scene, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
@@ -68,7 +69,20 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    return [*before, table, spent]
+    return [*before, table, balance_table(done.balance), spent]
+
+
+def balance_table(found: Balance) -> Table:
+    """What is left over of energy and momentum: of the integration, and of the equation's nominal frames."""
+    table = Table(title="Balance: left over, of the largest that is exchanged", show_header=False)
+    for what, share in (
+        ("energy, by the steps", found.energy),
+        ("momentum, by the steps", found.linear),
+        ("angular momentum, by the steps", found.angular),
+        ("energy, by stiffness that turns with the rigid motion", found.neglected),
+    ):
+        table.add_row(what, f"{100 * share:.2g} %")
+    return table
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:

@@ -34,9 +34,10 @@ from kedfem.results.balance import (
 from kedfem.results.records import Channel
 
 Rows = Float[np.ndarray, "T c"]
+UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
-    ("strain", ("strain",), "strain energy of all links"),
+    ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
     ("work", ("loads", "supports"), "work done by the loads; by the drive and the other supports"),
     ("dissipated", ("dissipated",), "energy that damping took"),
     ("neglected", ("neglected",), "work of the elastic forces' moment on bent links, which the equation neglects"),
@@ -170,7 +171,7 @@ class Account:
         self._largest = np.maximum(self._largest, [float(np.abs(x).max()) for x in sizes])
 
 
-def channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
+def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
     """Energies over time, and what the integration leaves over."""
 
     def rows(name: str) -> Callable[[Block], Rows]:
@@ -181,9 +182,16 @@ def channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
     ]
 
 
-def audit_warning(found: Balance) -> tuple[str, ...]:
-    """A warning where a run's own energy or momentum does not balance."""
-    raise NotImplementedError
+def balance_warning(found: Balance) -> tuple[str, ...]:
+    """A warning where the integration loses or makes energy or momentum."""
+    left = {"energy": found.energy, "momentum": found.linear, "angular momentum": found.angular}
+    said = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
+    if not said:
+        return ()
+    return (
+        f"the balance leaves over {said}: the steps are too long for what moves, or numerical damping takes what they "
+        "do not resolve; take shorter ones",
+    )
 
 
 def _size(x: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:

@@ -142,8 +142,8 @@ def carried_flow(of: Constants, F: Field, motion: RigidMotion) -> Flow:
     force, moment = _wrench(of.link, inertia, at)
     none = np.zeros_like(force)
     return Flow(
-        _power(at, 0.5 * rigid), momentum, cross(at.p, momentum) + about, _power(at, load + inertia),
-        -_power(at, load), force, cross(at.p, force) + moment, none, none[:, 0],
+        _power(of.link, 0.5 * rigid, at), momentum, cross(at.p, momentum) + about, _power(of.link, load + inertia, at),
+        -_power(of.link, load, at), force, cross(at.p, force) + moment, none, none[:, 0],
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
+from kedfem.results.audit import Account, energy_channels
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
@@ -36,8 +37,12 @@ class Recorded:
     rows: Callable[[Block], Rows]
 
 
-def recording(scene: Scene, model: Model) -> list[Recorded]:
+def recording(scene: Scene, model: Model, account: Account | None = None) -> list[Recorded]:
     """All channels that a scene asks for.
+
+    Parameters
+    ----------
+    account : of energy and momentum, if one is kept already
 
     Raises
     ------
@@ -46,7 +51,8 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), _energy(model)]
+    energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
+    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), *energies]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -304,12 +310,6 @@ def _rigid_torque(model: Model) -> Recorded:
         return -work[:, None]
 
     return Recorded(channel, torque)
-
-
-def _energy(model: Model) -> Recorded:
-    """Strain energy ½ gᵀ K0 g of all links, [KED, eq. (13)]."""
-    channel = Channel("energy/strain", ("strain",), "J", "", "strain energy of all links")
-    return Recorded(channel, lambda block: np.sum([link.strain for link in block.links], axis=0)[:, None])
 
 
 def _number(model: Model, name: str) -> int:
