@@ -66,22 +66,24 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         angle = np.degrees(p.angle)
         table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), f"{angle:.1f}°")
         table.caption = "links: the highest stress of all animation frames"
+    balance = [] if done.balance is None else [balance_table(done.balance, done.geometric)]
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    return [*before, table, balance_table(done.balance), spent]
+    return [*before, table, *balance, spent]
 
 
-def balance_table(found: Balance) -> Table:
-    """What is left over of energy and momentum: of the integration, and of the equation's nominal frames."""
-    table = Table(title="Balance: left over, of the largest that is exchanged", show_header=False)
+def balance_table(found: Balance, geometric: float) -> Table:
+    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
+    table = Table(title="Balance and geometric error", show_header=False)
     for what, share in (
-        ("energy, by the steps", found.energy),
-        ("momentum, by the steps", found.linear),
-        ("angular momentum, by the steps", found.angular),
-        ("energy, by stiffness that turns with the rigid motion", found.neglected),
+        ("energy left over by the steps", found.energy),
+        ("momentum", found.linear),
+        ("angular momentum", found.angular),
     ):
-        table.add_row(what, f"{100 * share:.2g} %")
+        table.add_row(what, f"{_percent(share)} of the largest exchanged")
+    table.add_row("work that nominal frames neglect", f"{_percent(found.neglected)} of it")
+    table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 
 

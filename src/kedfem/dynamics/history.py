@@ -1,7 +1,7 @@
 """What the time integration hands on: all links over a block of time points."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -64,8 +64,13 @@ class LinkHistory:
 
     def part(self, first: int, end: int) -> "LinkHistory":
         """The time points from one number up to another."""
-        arrays = (getattr(self, each.name)[first:end] for each in fields(self) if each.name != "products")
-        return LinkHistory(*arrays, None if self.products is None else self.products.part(first, end))
+        products = None if self.products is None else self.products.part(first, end)
+        return replace(self.every(slice(first, end)), products=products)
+
+    def every(self, which: slice) -> "LinkHistory":
+        """Some of the time points, without products."""
+        names = [each.name for each in fields(self) if each.name != "products"]
+        return LinkHistory(**{name: getattr(self, name)[which] for name in names})
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +109,11 @@ class Block:
             return self
         links = [each.part(first, end) for each in self.links]
         return Block(self.step + first, self.motion.part(first, end), links)
+
+    def every(self, stride: int) -> "Block":
+        """Some of its time points, the first and each so many further on; without products."""
+        which = slice(None, None, stride)
+        return Block(self.step, self.motion.at(which), [link.every(which) for link in self.links])
 
     def at(self, k: int) -> "Snapshot":
         """The k-th of its time points."""

@@ -22,16 +22,10 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
-from kedfem.results.balance import (
-    Flow,
-    Last,
-    carried_flow,
-    constants,
-    link_flow,
-    products,
-    resistance,
-)
+from kedfem.results.balance import Flow, carried_flow, link_flow
+from kedfem.results.moments import constants
 from kedfem.results.records import Channel
+from kedfem.results.resistance import Last, products, resistance
 
 Rows = Float[np.ndarray, "T c"]
 UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
@@ -40,7 +34,11 @@ ENERGIES = (
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
     ("work", ("loads", "supports"), "work done by the loads; by the drive and the other supports"),
     ("dissipated", ("dissipated",), "energy that damping took"),
-    ("neglected", ("neglected",), "work of the elastic forces' moment on bent links, which the equation neglects"),
+    (
+        "neglected",
+        ("neglected",),
+        "work of the elastic forces' moment on bent links, which the equation neglects",
+    ),
     ("residual", ("residual",), "energy that the integration leaves over"),
 )
 NO_PORTS = Attachment(
@@ -136,7 +134,9 @@ class Account:
         work, total = self._sums.add(block.motion.t, rates, taken)
         change = state - self._start
         left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
-        left += np.column_stack([total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]])
+        left += np.column_stack(
+            [total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]]
+        )
         self._watch(flows, np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]), left, work)
         return {
             "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
@@ -157,9 +157,7 @@ class Account:
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
         return flows, taken
 
-    def _watch(
-        self, flows: list[Flow], exchanged: Rows, left: Rows, work: Float[np.ndarray, "T 12"]
-    ) -> None:
+    def _watch(self, flows: list[Flow], exchanged: Rows, left: Rows, work: Float[np.ndarray, "T 12"]) -> None:
         """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
         planar = any(of.link.planar for of in self.of)
         linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
@@ -195,7 +193,7 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
 
 
 def _size(x: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:
-    return np.sqrt((x**2).sum(axis=1))
+    return np.asarray(np.sqrt((x**2).sum(axis=1)))
 
 
 def _share(x: float, of: float) -> float:
