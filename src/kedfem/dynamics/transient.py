@@ -130,7 +130,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
 
 def block_length(model: Model) -> int:
     """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
-    return max(1, min(POINTS, BLOCK_BYTES // (6 * 8 * model.unknowns)))
+    return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
 
 
 def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
