@@ -160,6 +160,10 @@ class FollowingSteps:
             for link, joint, s in zip(self.links, self.joints, states, strict=True)
         ]
 
+    def copied(self, state: list[SegmentState]) -> list[SegmentState]:
+        """A state that a solver may use up."""
+        return list(state)
+
     def advance(
         self, state: list[SegmentState], forcing: Sequence[Forcing]
     ) -> tuple[list[LinkHistory], list[SegmentState]]:

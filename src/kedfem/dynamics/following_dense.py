@@ -74,6 +74,10 @@ class FollowingDense:
                 Q[i, -1], angle[i, -1] = Q[i, 0], angle[i, 0]
         return u, v, a, F, f, C, force, Q, angle, g
 
+    def copied(self, state: State) -> State:
+        """A state that a solver may use up."""
+        return tuple(x.copy() for x in state)
+
     def advance(self, state: State, forcing: Sequence[Forcing]) -> tuple[list[LinkHistory], State]:
         """All time points of a block, one step after the other, [KED, eq. (20)]; see `DenseSteps.advance`.
 
