@@ -10,7 +10,6 @@ from jaxtyping import Float
 from kedfem.dynamics.following import FollowingSteps, NotConverged
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import LinkHistory
-from kedfem.dynamics.model import Model
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.motion.rigid import RigidMotion
 
@@ -41,7 +40,6 @@ class Bridge:
     bridged : steps taken in parts so far
     """
 
-    model: Model
     h: float
     rho_inf: float
     motion_at: Callable[[Float[np.ndarray, " T"]], RigidMotion]
@@ -93,7 +91,9 @@ class Bridge:
     def _finer(self, solver: Followers, level: int) -> Followers:
         if level not in self.finer:
             scheme = generalised_alpha(self.h / 2**level, self.rho_inf)
-            self.finer[level] = type(solver)(self.model.links, self.model.joints, scheme, self.model.damping)
+            self.finer[level] = type(solver)(
+                solver.links, solver.joints, scheme, solver.damping, solver.acting
+            )
         return self.finer[level]
 
 

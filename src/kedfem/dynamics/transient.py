@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acting import acting_on
+from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
@@ -55,7 +57,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
-        return follower(model.links, model.joints, scheme, model.damping)
+        return follower(model.links, model.joints, scheme, model.damping, acting_on(actions(scene, model)))
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -114,9 +116,9 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
 def _bridge(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
     """Smaller steps for where those of the analysis do not settle."""
     return Bridge(
-        model, time_grid(scene).step, scene.analysis.rho_inf,
+        time_grid(scene).step, scene.analysis.rho_inf,
         lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
-        lambda solver, state, motion: solver.advance(state, forcings(model, motion)),
+        lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
     )  # fmt: skip
 
 
