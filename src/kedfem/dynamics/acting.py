@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -10,7 +11,6 @@ from kedfem.dynamics.action import Action, Table, kernel_table, nominal_vectors
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
-Ends = Float[np.ndarray, "A 2 2 3"]
 Rows = Float[np.ndarray, "n d"]
 
 
@@ -61,3 +61,19 @@ def weights(
                     own = on(end.k, np.outer(row, end.mask[:d]))
                     out[i, e, m, : own.shape[0], : own.shape[1]] = own
     return out
+
+
+def for_kernel(
+    acting: Acting, weight: Float[np.ndarray, "A 2 2 D n"], motion: RigidMotion
+) -> tuple[Any, ...] | None:
+    """What `acting_kernel.external` takes over a block of time points; None without actions.
+
+    Parameters
+    ----------
+    weight : of `weights`
+    """
+    A = len(acting.every)
+    if not A:
+        return None
+    return (acting.segment, weight, acting.table, motion.t, *nominal_ends(acting, motion),
+            *np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))  # fmt: skip

@@ -11,28 +11,20 @@ compiled: Any = njit(cache=True, error_model="numpy")
 
 
 @compiled
-def external(t, segment, weight, table, nominal, moving, turned, F, out, scratch):  # type: ignore[no-untyped-def]
-    """out = F and the forces of all actions.
+def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
+    """Add the forces of all actions to F; their coordinates.
 
     Parameters
     ----------
-    segment : (A, 2) of each end
-    weight : (A, 2, 2, D, S) of the ends' vectors on the coordinates
-    nominal : x, v (A, 2, 2, 3) of the nominal motion
-    moving : u, v (L, D, S)
+    acting : segment (A, 2) of each end; weight (A, 2, 2, D, S) of its vectors on the coordinates; table; times (T,);
+        x0, v0 (T, A, 2, 2, 3) of the nominal motion; scratch: x, v, forces (A, 2, 2, 3), values (A, 4)
+    t : number of the time point
+    u, v, F : (L, D, S)
     turned : (A,) coordinate of each action at the time point before
-    F, out : (L, D, S)
-    scratch : x, v, forces (A, 2, 2, 3), values (A, 4)
     """
-    x, v, forces, values = scratch
-    x0, v0 = nominal
-    u, u1 = moving
-    out[:] = F
-    A = len(segment)
-    if A == 0:
-        return
-    D, n = F.shape[1:]
-    x[:], v[:] = x0, v0
+    segment, weight, table, times, x0, v0, x, x1, forces, values = acting
+    A, (_, D, n) = len(segment), F.shape
+    x[:], x1[:] = x0[t], v0[t]
     for i in range(A):
         for e in range(2):
             s = segment[i, e]
@@ -42,8 +34,8 @@ def external(t, segment, weight, table, nominal, moving, turned, F, out, scratch
                         for j in range(n):
                             w = weight[i, e, m, c, j]
                             x[i, e, m, c] += w * u[s, c, j]
-                            v[i, e, m, c] += w * u1[s, c, j]
-    evaluate(t, x, v, turned, table, forces, values)
+                            x1[i, e, m, c] += w * v[s, c, j]
+    evaluate(times[t], x, x1, turned, table, forces, values)
     for i in range(A):
         for e in range(2):
             s = segment[i, e]
@@ -51,4 +43,5 @@ def external(t, segment, weight, table, nominal, moving, turned, F, out, scratch
                 for m in range(2):
                     for c in range(D):
                         for j in range(n):
-                            out[s, c, j] += weight[i, e, m, c, j] * forces[i, e, m, c]
+                            F[s, c, j] += weight[i, e, m, c, j] * forces[i, e, m, c]
+    return values[:, 0]

@@ -10,12 +10,13 @@ constant and factored once, in the segment's frame as predicted: [KED, eqs. (12)
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.acting import Acting, Ends, nominal_ends, weights
+from kedfem.dynamics.acting import Acting, for_kernel, weights
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.coupling import Attachment
@@ -29,7 +30,6 @@ from kedfem.motion.rigid import RigidMotion
 DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 SWEEPS = 15  # in a step, of which it takes 2 to 4
-NominalEnds = tuple[float, Ends, Ends]
 CONVERGED = 1e-8  # change of a sweep, of the largest displacement
 
 
@@ -159,8 +159,6 @@ class FollowingSteps:
         self._shape = max(link.d for link in links), max(link.n for link in links)
         self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
         self._turned = np.zeros(len(acting.every))
-        A = len(acting.every)
-        self._scratch = (*np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))
 
     def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
         """The state of the first time point."""
@@ -184,10 +182,9 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[list[SegmentState]] = []
-        nominal = nominal_ends(self.acting, motion)
+        acting = for_kernel(self.acting, self._weights, motion)
         for t in range(len(forcing[0].R)):
-            ends = motion.t[t], nominal[0][t], nominal[1][t]
-            now = self.step(state, [each.at(t) for each in forcing], ends)
+            now = self.step(state, [each.at(t) for each in forcing], acting, t)
             if isinstance(now, str):
                 raise NotConverged(t, self._histories(taken), state, now)
             state = now
@@ -195,7 +192,7 @@ class FollowingSteps:
         return self._histories(taken), state
 
     def step(
-        self, states: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
+        self, states: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
     ) -> list[SegmentState] | str:
         """States of all segments one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle."""
         now = [self._predicted(k, s, nominal) for k, (s, nominal) in enumerate(zip(states, at, strict=True))]
@@ -205,7 +202,7 @@ class FollowingSteps:
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
         for _ in range(SWEEPS):
-            now = self._acted(now, at, ends)
+            now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = self._solved(rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
@@ -221,8 +218,7 @@ class FollowingSteps:
             if not np.isfinite(sizes).all():
                 break
             if sum(sizes) <= CONVERGED**2 * self.scale:
-                now = self._acted(now, at, ends)
-                self._turned = self._scratch[3][:, 0].copy()
+                now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)
                     for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
@@ -230,22 +226,19 @@ class FollowingSteps:
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
 
     def _acted(
-        self, now: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
-    ) -> list[SegmentState]:
-        """States with the forces of motors and springs where they are now."""
-        if not self.acting.every:
-            return list(now)
+        self, now: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
+    ) -> tuple[list[SegmentState], Float[np.ndarray, " A"]]:
+        """States with the forces of motors and springs where they are now, and the coordinates of these."""
+        if acting is None:
+            return list(now), self._turned
         from kedfem.dynamics.acting_kernel import external
 
-        t, x0, v0 = ends
-        u, v, F, out = np.zeros((4, len(self.links), *self._shape))
+        u, v, F = np.zeros((3, len(self.links), *self._shape))
         for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
             for each, x in zip(padded, rows, strict=True):
                 each[: x.shape[1], : len(x)] = x.T
-        external(
-            t, self.acting.segment, self._weights, self.acting.table, (x0, v0), (u, v), self._turned, F, out, self._scratch
-        )
-        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, out, strict=True)]
+        turned = external(acting, t, u, v, self._turned, F).copy()
+        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, F, strict=True)], turned
 
     def _predicted(self, k: int, s: SegmentState, at: Nominal) -> SegmentState:
         """The end of the step with an acceleration that stays, seen from frames there."""

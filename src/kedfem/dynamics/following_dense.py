@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from kedfem.dynamics.acting import Acting, nominal_ends, weights
+from kedfem.dynamics.acting import Acting, for_kernel, weights
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
@@ -45,9 +45,7 @@ class FollowingDense:
         self._memory = np.zeros((2, DEPTH, size)), np.zeros((2, size))
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
-        self._acting = acting.segment, weights(
-            acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2]
-        ), acting.table
+        self._weights = weights(acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
     @property
@@ -107,7 +105,7 @@ class FollowingDense:
         history = (u, v, a, g, np.empty((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
             self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F),
-            (*self._acting, motion.t, *nominal_ends(self.acting, motion)), state, history, self._memory, self._counts,
+            for_kernel(self.acting, self._weights, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
         histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
         if taken < T:

@@ -12,8 +12,7 @@ H = Σ Bᵀ R S Rᵀ B has its entries near the diagonal: from column `first` of
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components, Q (L, E + 1, 3, 3), angle (L, E + 1),
         g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one;
         turned (A,) coordinates of the actions
-    acting : segment (A, 2), weight (A, 2, 2, D, S), table, times (T,), nominal x and v (T, A, 2, 2, 3) of
-        `dynamics.acting_kernel`
+    acting : of `dynamics.acting_kernel`; None without motors and springs, whose code is then not compiled
     history : u, v, a, g (T, L, D, S), R (T, L, D, D), port forces (T, L, Q) in that frame, strain energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed; last step and change (2, L·D·S)
     counts : sweeps, scale², pairs that are known
@@ -44,9 +43,7 @@ def follow_block(  # type: ignore[no-untyped-def]
     G, Yt, S, B = matrices
     columns, count, first = unknowns
     Rs, Fs = forcing
-    segment, weight, table, times, x0, v0 = acting
     F = np.zeros(Fs.shape[1:])
-    scratch = (np.zeros(x0.shape[1:]), np.zeros(x0.shape[1:]), np.zeros(x0.shape[1:]), np.zeros((len(segment), 4)))
     u, v, a, F0, f0, C, force0, Q0, angle0, g0, turned = state
     T, L, D, n = Fs.shape
     Qn, c, k = B.shape[1], B.shape[2], len(first)
@@ -78,7 +75,9 @@ def follow_block(  # type: ignore[no-untyped-def]
         settled, worst = False, -1
         for sweep in range(SWEEPS):
             counts[0] += 1
-            external(times[t], segment, weight, table, (x0[t], v0[t]), (u1, v1), turned, Fs[t], F, scratch)
+            F[:] = Fs[t]
+            if acting is not None:
+                external(acting, t, u1, v1, turned, F)
             residuals(coefficients, F, Rp, state, end, rhs)
             worst = swept(parts, Rp, rhs, H, first, z, reaction, force, change)
             moved = squares(change)
@@ -97,8 +96,9 @@ def follow_block(  # type: ignore[no-untyped-def]
         if not settled:
             return t, worst
         mean_frames(shapes, frames, kinds, Rs[t], u1, Q1, angle1, work)
-        external(times[t], segment, weight, table, (x0[t], v0[t]), (u1, v1), turned, Fs[t], F, scratch)
-        turned[:] = scratch[3][:, 0]
+        F[:] = Fs[t]
+        if acting is not None:
+            turned[:] = external(acting, t, u1, v1, turned, F)
         recorded(coefficients, t, frames, kinds, Rs[t], F, Rp, force, state, end, history)
     return T, -1
 
