@@ -29,8 +29,9 @@ from kedfem.motion.rigid import RigidMotion
 
 DEBUG=0
 DEPTH = 4  # sweeps that are remembered
+LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
-CONVERGED = 1e-8  # change of a sweep, of the largest displacement
+CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made; what is left of each step adds up
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +155,8 @@ class FollowingSteps:
         self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
-        self.factorisations, self.sweeps, self.scale = len(self.parts), 0, 0.0
+        self.factorisations, self.sweeps = len(self.parts), 0
+        self.scale = rounding(links)
         self.mixing = Mixing()
         self._shape = max(link.d for link in links), max(link.n for link in links)
         self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
@@ -214,7 +216,7 @@ class FollowingSteps:
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
                 for k, (s, n, x, nominal) in enumerate(zip(states, now, np.split(taken, ends), at, strict=True))
             ]
-            self.scale = max(self.scale, sum(float(np.vdot(n.u, n.Mu)) for n in now))
+            self.scale = max(self.scale, sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)))
             if not np.isfinite(sizes).all():
                 break
             if sum(sizes) <= CONVERGED**2 * self.scale:
@@ -320,6 +322,12 @@ def position(link: Link, u: Nodal) -> Nodal:
     """Position of a segment displaced by u, both in the nominal frame; of a planar beam (x, y, ψ)."""
     X = link.X[:, : link.d]
     return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
+
+
+def rounding(links: Sequence[Link]) -> float:
+    """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
+    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    return float(LEAST**2 * sum(sizes))
 
 
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:

@@ -15,7 +15,7 @@ H = Σ Bᵀ R S Rᵀ B has its entries near the diagonal: from column `first` of
     acting : of `dynamics.acting_kernel`; None without motors and springs, whose code is then not compiled
     history : u, v, a, g (T, L, D, S), R (T, L, D, D), port forces (T, L, Q) in that frame, strain energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed; last step and change (2, L·D·S)
-    counts : sweeps, scale², pairs that are known
+    counts : sweeps, square of what counts as a step, pairs that are known
 
 Imported when it is first needed. Plain loops, so that nothing is allocated in a step.
 """
@@ -89,7 +89,7 @@ def follow_block(  # type: ignore[no-untyped-def]
             end_of_step(coefficients, shapes, frames, kinds, Rs[t], state, end, work)
             if not np.isfinite(moved):
                 break
-            counts[1] = max(counts[1], squares(u1))
+            counts[1] = max(counts[1], difference(u1, u))
             if moved <= tolerance * tolerance * counts[1]:
                 settled = True
                 break
@@ -111,6 +111,17 @@ def squares(x):  # type: ignore[no-untyped-def]
         for b in range(x.shape[1]):
             for j in range(x.shape[2]):
                 total += x[i, b, j] * x[i, b, j]
+    return total
+
+
+@compiled
+def difference(x, y):  # type: ignore[no-untyped-def]
+    """Sum of squares of x − y, (L, D, S)."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for b in range(x.shape[1]):
+            for j in range(x.shape[2]):
+                total += (x[i, b, j] - y[i, b, j]) ** 2
     return total
 
 
