@@ -99,7 +99,9 @@ def test_a_link_that_the_drive_carries_is_counted_too() -> None:
     for energies in found.values():
         assert_allclose(energies["work"][-1, 0], weights, rtol=2e-3)  # links sag a little
     for name in ("kinetic", "work"):
-        assert_allclose(found["rigid"][name], found["beam"][name], atol=5e-3 * np.abs(found["beam"][name]).max())
+        assert_allclose(
+            found["rigid"][name], found["beam"][name], atol=5e-3 * np.abs(found["beam"][name]).max()
+        )
 
 
 def test_sliders_and_gravity_balance() -> None:

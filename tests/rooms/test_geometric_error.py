@@ -152,9 +152,7 @@ def test_axial_force_and_slope_are_those_of_a_turning_arm() -> None:
         model, block = ready.model, blocks(ready)[-1]
         of = slices(model.links[0], model.joints[0])
         cuts = (of.means @ model.links[0].X[:, 0] + np.roll(of.means @ model.links[0].X[:, 0], -1))[:-1] / 2
-        N = axial_forces(
-            model.links[0], model.joints[0], of, block.links[0], block.motion, model.bodies[0]
-        )
+        N = axial_forces(model.links[0], model.joints[0], of, block.links[0], block.motion, model.bodies[0])
         # slices hold whole nodes: the mass between two nodes belongs to either
         assert_allclose(N[-1], LINE * speed**2 * (L**2 - cuts**2) / 2, atol=0.04 * N.max())
         psi = slopes(model.links[0], of, block.links[0], block.motion.R[:, model.bodies[0]])
