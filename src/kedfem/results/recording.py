@@ -19,7 +19,7 @@ from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
 from kedfem.results.records import Channel
-from kedfem.scene import Probe, Scene
+from kedfem.scene import ForceLoad, Probe, Scene
 
 Rows = Float[np.ndarray, "T c"]
 XYZ = ("x", "y", "z")
@@ -57,7 +57,7 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
     k = _number(model, probe.link)
     link = model.links[k]
-    at = point_rows(link, f"output.probes.{name}.at", np.asarray(probe.at))
+    at = point_rows(link, f"output.probes.{name}.at", np.asarray(probe.at), _kinks(scene, probe.link))
     key = f"probes/{name}/{probe.quantity}"
     place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
     if probe.quantity == "stress":
@@ -89,6 +89,14 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
 
     description = f"elastic {probe.quantity} {place}"
     return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
+
+
+def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
+    """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
+    joints = [joint.at for joint in scene.joints.values() if link in joint.links]
+    bodies = [body.at for body in scene.bodies.values() if body.link == link]
+    forces = [load.at for load in scene.loads.values() if isinstance(load, ForceLoad) and load.link == link]
+    return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
 
 
 def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
