@@ -254,7 +254,7 @@ def _four_bar(rpm: float, ratio: float, end: float, h: float, elements: int = 8)
 TIP = ("x [m]", "y [m]")
 CASES: dict[str, Case] = {
     "four_bar_600_damped": _four_bar(600, 0.02, 0.3, 1.25e-5),
-    "four_bar_600_undamped": _four_bar(600, 0.0, 0.3, 3.125e-6, 16),
+    "four_bar_600_undamped": _four_bar(600, 0.0, 0.3, 1.5625e-6, 16),
     "four_bar_400_damped": _four_bar(400, 0.02, 0.45, 2.5e-5),
     "four_bar_300_damped": _four_bar(300, 0.02, 0.6, 2.5e-5),
     "four_bar_150_damped": _four_bar(150, 0.02, 1.2, 5e-5),
