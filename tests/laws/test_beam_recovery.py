@@ -51,7 +51,10 @@ def sine_load(link: Link, k: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("at", "order"), [(0.0, 2.7), (0.13, 1.7), (0.77, 3.0), (0.25, 3.8), (0.5, 3.8)])
 def test_stress_on_a_straight_run_converges_at_nodes_with_the_fourth_power(at: float, order: float) -> None:
-    """Elsewhere with the third, where the error has one sign. Cantilever under q = sin(kx): M = (sin kL − sin kx)/k² − (L − x) cos(kL)/k, σ = −M y/I."""
+    """Elsewhere with the third, where the error has one sign.
+
+    Cantilever under q = sin(kx): M = (sin kL − sin kx)/k² − (L − x) cos(kL)/k, σ = −M y/I.
+    """
     k, x, y = 2.0, at * LENGTH, 0.4 * HEIGHT
     M = (np.sin(k * LENGTH) - np.sin(k * x)) / k**2 - (LENGTH - x) * np.cos(k * LENGTH) / k
     exact = -M * y / SECTION.second_moment
