@@ -22,6 +22,7 @@ MODULES = (
     "rotation",
     "kinematics",
     "mechanisms",
+    "nominal_frames",
 )
 
 
