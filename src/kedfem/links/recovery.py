@@ -12,7 +12,7 @@ import skfem
 from jaxtyping import Float, Int
 
 from kedfem.errors import SceneError
-from kedfem.links.beam import shape_functions, strain_rows
+from kedfem.links.beam import line_pairs, parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 from kedfem.links.spatial_recovery import (
     beam_strains,
@@ -149,7 +149,9 @@ def stress_recovery(link: Link) -> StressRecovery:
         return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
     fibres = (_beam_fibre(link, half), _beam_fibre(link, -half))
-    return StressRecovery(link, fibres, link.cells, link.cell_type)
+    if link.cells.shape[1] <= 3:
+        return StressRecovery(link, fibres, link.cells, link.cell_type)
+    return StressRecovery(link, fibres, line_pairs(link.cells), "line")
 
 
 def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p 6"]:
@@ -321,10 +323,9 @@ def _fibre_row(link: Link, element: int, r: float, offset: float) -> Float[np.nd
 def _beam_fibre(link: Link, offset: float) -> sp.csr_array:
     """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
     nodes = link.cells.shape[1]
-    parent = [-1.0, 1.0, 0.0][:nodes]
     total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
     for e, cell in enumerate(link.cells):
-        for a, r in zip(cell, parent, strict=True):
+        for a, r in zip(cell, parent_nodes(nodes), strict=True):
             total[a] += _fibre_row(link, e, r, offset)
             count[a] += 1
     return sp.csr_array(total / count[:, None])
