@@ -18,19 +18,20 @@ Z = (0.0, 0.0, 1.0)
 
 def linkage_scene(
     joints: JointTable,
-    drive: str = "A",
+    drive: str | None = "A",
     motion: Mapping[str, Any] | None = None,
     sliders: tuple[str, ...] = (),
+    **analysis: Any,
 ) -> Scene:
-    """A scene of joints alone; every link is a small bar at its first joint, sliders are rigid."""
+    """A scene of joints alone; every link is a small bar at its first joint, sliders are rigid; drive may be None."""
     names = dict.fromkeys(link for joint in joints.values() for link in joint[1:3] if link != "ground")
     first = {link: np.asarray(j[3], float) for j in reversed(joints.values()) for link in j[1:3]}
     return scene_from(
         {
             "links": {name: {"fidelity": "rigid"} if name in sliders else bar(first[name]) for name in names},
             "joints": {name: joint(*fields) for name, fields in joints.items()},
-            "drive": {"joint": drive, "motion": dict(motion or UNIT_SPEED)},
-            "analysis": {"end_time": 1.0, "step": 0.01},
+            "analysis": {"end_time": 1.0, "step": 0.01, **analysis},
+            **({} if drive is None else {"drive": {"joint": drive, "motion": dict(motion or UNIT_SPEED)}}),
         }
     )
 
@@ -58,7 +59,7 @@ def moved_scene(joints: JointTable, R: np.ndarray, p: np.ndarray) -> dict[str, t
 
 def motion_at(scene: Scene, t: np.ndarray) -> RigidMotion:
     """The rigid motion of a scene at given times."""
-    drive = drive_angle(scene.drive.motion, t)
+    drive = drive_angle(scene.motion, t)
     link = linkage(scene)
     return rigid_motion(link, path(link, min(drive[0].min(), 0.0), max(drive[0].max(), 0.0)), t, drive)
 

@@ -14,7 +14,9 @@ from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.path import Path
+from kedfem.results.audit import Balance
 from kedfem.scene import LinkScene, Scene, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
@@ -46,7 +48,8 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
     before = [] if done.plan is None else plan_tables(done.plan)
     table = Table(title=Text(scene.title or "Largest values"))
-    for column in ("channel", "component", "largest", "drive angle"):
+    when = "time" if scene.driven is None else "drive angle"
+    for column in ("channel", "component", "largest", when):
         left = column in ("channel", "component")
         table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
     channels = done.results.channels.values()
@@ -59,17 +62,37 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         if abs(value) <= NOTHING * highest[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue
-        angle = np.degrees(done.results.angle[k])
-        table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), f"{angle:.1f}°")
+        at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
+        table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), at)
     if done.peak:
         p = done.peak
-        angle = np.degrees(p.angle)
-        table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), f"{angle:.1f}°")
+        at = moment(scene, p.time, p.angle)
+        table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), at)
         table.caption = "links: the highest stress of all animation frames"
+    balance = [] if done.balance is None else [balance_table(done.balance, done.geometric)]
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    return [*before, table, spent]
+    return [*before, table, *balance, spent]
+
+
+def balance_table(found: Balance, geometric: float) -> Table:
+    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
+    table = Table(title="Balance and geometric error", show_header=False)
+    for what, share in (
+        ("energy left over by the steps", found.energy),
+        ("momentum", found.linear),
+        ("angular momentum", found.angular),
+    ):
+        table.add_row(what, f"{_percent(share)} of the largest exchanged")
+    table.add_row("work that nominal frames neglect", f"{_percent(found.neglected)} of it")
+    table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
+    return table
+
+
+def moment(scene: Scene, time: float, angle: float) -> str:
+    """A drive angle [rad] in degrees; without a drive the time [s]."""
+    return with_prefix(time, "s") if scene.driven is None else f"{np.degrees(angle):.1f}°"
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
@@ -181,19 +204,44 @@ def _motion(ready: Prepared) -> Table:
     weakness, angle = along.weakest
     low, high = np.degrees(along.phi[[0, -1]])
     over = "repeats every turn" if along.periodic else f"{low:.4g}° to {high:.4g}°"
-    table.add_row("drive", f"joint {ready.scene.drive.joint}, {over}")
+    driven = ready.scene.driven is not None
     table.add_row(
-        "closest to a dead point",
-        f"at {np.degrees(angle):.4g}° (smallest singular value {weakness:.2g} of the largest)",
+        "drive", f"joint {ready.scene.driven}, {over}" if driven else "none: the mechanism moves by itself"
     )
+    if ready.linkage.mobility or not driven:
+        table.add_row("free motions", str(ready.linkage.mobility))
+    if driven:
+        table.add_row(
+            "closest to a dead point",
+            f"at {np.degrees(angle):.4g}° (smallest singular value {weakness:.2g} of the largest)",
+        )
     if ready.linkage.redundant:
         table.add_row("redundant joint equations", "at joints " + ", ".join(ready.linkage.redundant))
+    for where, speed in _initial_speeds(ready):
+        table.add_row(where, speed)
+    if not driven:
+        return table
     for k, name in enumerate(ready.linkage.bodies[1:], start=1):
         turned = np.degrees(
             np.arccos(np.clip((np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2, -1, 1))
         ).max()
         table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the drawn position")
     return table
+
+
+def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
+    """How fast each link starts, in words, where the scene asks for speeds."""
+    analysis = ready.scene.analysis
+    if not (analysis.initial_speeds or analysis.initial_motions):
+        return []
+    v, omega = initial_twists(ready.scene, ready.linkage)
+    moved = ready.linkage.centre if ready.scene.joints else np.zeros(3)
+    out = []
+    for k, name in enumerate(ready.linkage.bodies[1:], start=1):
+        middle = v[k] + np.cross(omega[k], moved)
+        speeds = f"{np.linalg.norm(omega[k]):.4g} rad/s, {np.linalg.norm(middle):.4g} m/s amid the joints"
+        out.append((f"link {name} starts with", speeds))
+    return out
 
 
 def _cost(ready: Prepared, cost: Cost) -> Table:

@@ -116,7 +116,60 @@ end_time = 1.0
 step = 0.001
 """
 
-BASES = {"solid": GOOD, "beam": BEAMS}
+FREE = """
+gravity = [0, -9.81, 0]
+[links.arm]
+material = "steel"
+segments = 2
+shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.02, thickness = 0.01 }
+[links.rod]
+fidelity = "beam"
+material = "steel"
+shape = { kind = "bar", between = [[1, 0], [2, 0]], width = 0.02, thickness = 0.01 }
+[links.shoe]
+fidelity = "rigid"
+mass = 0.5
+[joints.A]
+kind = "revolute"
+links = ["ground", "arm"]
+at = [0, 0]
+[joints.B]
+kind = "revolute"
+links = ["arm", "rod"]
+at = [1, 0]
+[joints.C]
+kind = "spherical"
+links = ["rod", "shoe"]
+at = [2, 0]
+[joints.S]
+kind = "prismatic"
+links = ["shoe", "ground"]
+at = [2, 0]
+axis = "x"
+[motors.m]
+joint = "A"
+torque = { over = "speed", at = [0, "600 rpm"], value = ["5 N*m", 0] }
+[motors.push]
+joint = "S"
+force = { over = "travel", at = ["0 mm", "5 mm"], value = [0, 10] }
+[springs.pull]
+kind = "spring"
+between = [{ link = "rod", at = [2, 0] }, { link = "ground", at = [2, 1] }]
+stiffness = "2 N/mm"
+[springs.turn]
+kind = "torsion"
+joint = "B"
+stiffness = 3
+damping = 0.1
+free_angle = "30 deg"
+[analysis]
+end_time = 1
+step = 0.001
+initial_speeds = { A = "60 rpm" }
+initial_motions = { rod = { at = [1, 0], velocity = [0, 6] } }
+"""
+
+BASES = {"solid": GOOD, "beam": BEAMS, "free": FREE}
 CASES = [
     pytest.param(
         base,
@@ -192,7 +245,7 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
         "links.rocker.colour: unknown key, known: fidelity, reduced, functions, material, shape, mass, mesh, element, "
-        "min_quality, shear_coefficient, beam",
+        "min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
         "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
         "of 0.164575",

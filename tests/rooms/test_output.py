@@ -294,8 +294,12 @@ def test_what_curves_are_drawn_over() -> None:
     assert turning.values[-1] == pytest.approx(360.0)
     ramp = abscissa(time, time / 2 - np.sin(np.pi * time) / (2 * np.pi))  # from rest, but it keeps on
     assert ramp.degrees is None
-    for angle in (np.sin(6 * time), np.minimum(time, 0.5), 0 * time):
+    for angle in (np.sin(6 * time), np.sin(2 * np.pi * time), np.minimum(time, 0.5)):
+        assert abscissa(time, angle).over_time
         assert abscissa(time, angle).degrees is not None
+    nothing_driven = abscissa(time, 0 * time)
+    assert nothing_driven.over_time
+    assert nothing_driven.degrees is None
 
 
 @pytest.mark.parametrize(

@@ -66,8 +66,9 @@ def fidelities(scene: Scene) -> list[Fidelity]:
     out = [
         Fidelity(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]
     ]
-    driven = next(name for name in scene.joints[scene.drive.joint].links if name in scene.links)
-    if len(each) > 1 and scene.links[driven] in _shaped(scene):
+    pair = scene.joints[scene.driven].links if scene.driven else ()
+    driven = next((name for name in pair if name in scene.links), None)
+    if driven and len(each) > 1 and scene.links[driven] in _shaped(scene):
         out += [replace(found, rigid=driven) for found in out[-1:]]
     return out
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.transient import drive_range
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
 from kedfem.scene import Scene
@@ -34,11 +35,12 @@ def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Pr
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:
-    """The linkage of a scene, and its rigid motion over the drive's range.
+    """The linkage of a scene, and its rigid motion over the drive's range; the speeds at the start are possible.
 
     Raises
     ------
     MotionError
     """
     joined = linkage(scene)
+    initial_twists(scene, joined)
     return joined, path(joined, *drive_range(scene))

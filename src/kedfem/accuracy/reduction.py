@@ -190,7 +190,7 @@ def _training(full: Prepared) -> RigidMotion:
         turn = min(per_turn * grid.step, grid.end)
         t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
     t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
-    return rigid_motion(full.linkage, full.path, t, drive_angle(scene.drive.motion, t))
+    return rigid_motion(full.linkage, full.path, t, drive_angle(scene.motion, t))
 
 
 def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:

@@ -55,14 +55,14 @@ class Resolution:
 
 
 def resolution(ready: Prepared) -> Resolution | None:
-    """Frequencies of a prepared scene's linkage; None where nothing is excited, or of a large model in full."""
-    if ready.model.unknowns > LARGE:
+    """Frequencies of a prepared scene's linkage; None where it is free to move, nothing is excited or the model large."""
+    if ready.model.unknowns > LARGE or ready.linkage.mobility:
         return None
     scene, grid = ready.scene, time_grid(ready.scene)
     turn = turn_steps(scene)
     span = min((turn or grid.steps) * grid.step, grid.end)
     t = grid.end - span * np.arange(POSES)[::-1] / POSES
-    phi = drive_angle(scene.drive.motion, t)
+    phi = drive_angle(scene.motion, t)
     motion = rigid_motion(ready.linkage, ready.path, t, phi)
     try:
         parts = static_parts(ready.model)

@@ -18,7 +18,7 @@ def fewest_steps(scene: Scene) -> float:
         return math.inf
     end = time_grid(scene).end
     t = np.linspace(0.0, end, 2001)
-    fastest = float(np.abs(drive_angle(scene.drive.motion, t)[1]).max())
+    fastest = float(np.abs(drive_angle(scene.motion, t)[1]).max())
     return fastest * end / (MARGIN * (1 - rho_inf))
 
 

@@ -94,14 +94,20 @@ def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q
     return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
 
 
+def turned_vectors(
+    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T p d"]:
+    """R λ over time, a row per port in world components, zero where a component is not held."""
+    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
+    vectors.reshape(len(force), -1)[:, attachment.keep] = force
+    return np.asarray(vectors @ R.transpose(0, 2, 1))
+
+
 def turned_ports(
     attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T q"]:
     """R λ over time: port forces of the link frame in world components."""
-    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
-    vectors.reshape(len(force), -1)[:, attachment.keep] = force
-    turned = vectors @ R.transpose(0, 2, 1)
-    return np.asarray(turned.reshape(len(force), -1)[:, attachment.keep])
+    return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
 
 
 def coupled(

@@ -271,7 +271,7 @@ def on_part(
         That of the nearest segment, if none has it.
     """
     parts = {key: link for key, link in links.items() if link.name == name}
-    gap = {key: float(np.linalg.norm(link.nodes - at, axis=1).min()) for key, link in parts.items()}
+    gap = {key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min()) for key, link in parts.items()}
     first: KedfemError | None = None
     for key in sorted(parts, key=lambda key: gap[key]):
         try:
@@ -306,7 +306,7 @@ def port_points(
     if links[next(iter(seats))].planar:
         return _plane_points(scene, name, joint, seats)
     seat = next(iter(seats.values()))
-    driven = scene.drive.joint == name
+    driven = scene.driven == name
     if joint.kind == "revolute":
         axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
@@ -344,7 +344,7 @@ def _unheld(link: Link) -> str:
 def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
     """The joint's point and, where turning is held, others: along a slide, else along the narrowest seat, and across."""
     at = np.asarray(joint.at)
-    if joint.kind == "revolute" and scene.drive.joint != name:
+    if joint.kind == "revolute" and scene.driven != name:
         return at[None, :]
     narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
     along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
@@ -378,7 +378,7 @@ def _widest_across(seat: Seat, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray
 
 def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:
     """Which of a port's components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
-    turning = scene.drive.joint == name or joint.kind in {"weld", "prismatic"}
+    turning = scene.driven == name or joint.kind in {"weld", "prismatic"}
     if not any(link.planar for link in held):
         return [0, 1, 2]
     if not turning or all(link.kind == "plane" for link in held):

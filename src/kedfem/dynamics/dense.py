@@ -90,8 +90,6 @@ class DenseSteps:
         -------
         histories per link, and the state at the end
         """
-        from kedfem.dynamics.kernel import advance_block
-
         D, n, P = self._sizes
         T, L = len(forcing[0].R), len(self.links)
         R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
@@ -102,8 +100,20 @@ class DenseSteps:
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
         forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
         history = (u, v, a, g, forces, strain)
-        advance_block(self.coefficients, self._matrices, *self._unknowns, (R, F), state, history)
+        self._loop(forcing, (R, F), state, history)
         return [self._history(i, each, history) for i, each in enumerate(forcing)], state
+
+    def _loop(
+        self,
+        forcing: Sequence[Forcing],
+        padded: tuple[np.ndarray, np.ndarray],
+        state: tuple[np.ndarray, ...],
+        history: tuple[np.ndarray, ...],
+    ) -> None:
+        """Advance the state and fill the history in place."""
+        from kedfem.dynamics.kernel import advance_block
+
+        advance_block(self.coefficients, self._matrices, *self._unknowns, padded, state, history)
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
         link, joint, part = self.links[i], self.joints[i], self.parts[i]

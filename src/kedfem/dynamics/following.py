@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
+from kedfem.dynamics.acting import Acting, Ends, nominal_ends, weights
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.coupling import Attachment
@@ -23,10 +24,12 @@ from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link, mass_times
+from kedfem.motion.rigid import RigidMotion
 
 DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 SWEEPS = 15  # in a step, of which it takes 2 to 4
+NominalEnds = tuple[float, Ends, Ends]
 CONVERGED = 1e-8  # change of a sweep, of the largest displacement
 
 
@@ -145,13 +148,19 @@ class FollowingSteps:
     """Advances all segments by generalised-α steps; their effective matrices are factored once, here."""
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
-        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        acting: Acting,
+    ) -> None:  # fmt: skip
+        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps, self.scale = len(self.parts), 0, 0.0
         self.mixing = Mixing()
+        self._shape = max(link.d for link in links), max(link.n for link in links)
+        self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
+        self._turned = np.zeros(len(acting.every))
+        A = len(acting.every)
+        self._scratch = (*np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))
 
     def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
         """The state of the first time point."""
@@ -160,8 +169,12 @@ class FollowingSteps:
             for link, joint, s in zip(self.links, self.joints, states, strict=True)
         ]
 
+    def copied(self, state: list[SegmentState]) -> list[SegmentState]:
+        """A state that a solver may use up."""
+        return list(state)
+
     def advance(
-        self, state: list[SegmentState], forcing: Sequence[Forcing]
+        self, state: list[SegmentState], forcing: Sequence[Forcing], motion: RigidMotion
     ) -> tuple[list[LinkHistory], list[SegmentState]]:
         """All time points of a block; see `DenseSteps.advance`.
 
@@ -171,15 +184,19 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[list[SegmentState]] = []
+        nominal = nominal_ends(self.acting, motion)
         for t in range(len(forcing[0].R)):
-            now = self.step(state, [Nominal(each.R[t], each.F[t]) for each in forcing])
+            ends = motion.t[t], nominal[0][t], nominal[1][t]
+            now = self.step(state, [each.at(t) for each in forcing], ends)
             if isinstance(now, str):
                 raise NotConverged(t, self._histories(taken), state, now)
             state = now
             taken.append(now)
         return self._histories(taken), state
 
-    def step(self, states: Sequence[SegmentState], at: Sequence[Nominal]) -> list[SegmentState] | str:
+    def step(
+        self, states: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
+    ) -> list[SegmentState] | str:
         """States of all segments one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle."""
         now = [self._predicted(k, s, nominal) for k, (s, nominal) in enumerate(zip(states, at, strict=True))]
         R = [s.R for s in now]
@@ -188,6 +205,7 @@ class FollowingSteps:
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
         for _ in range(SWEEPS):
+            now = self._acted(now, at, ends)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = self._solved(rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
@@ -203,11 +221,31 @@ class FollowingSteps:
             if not np.isfinite(sizes).all():
                 break
             if sum(sizes) <= CONVERGED**2 * self.scale:
+                now = self._acted(now, at, ends)
+                self._turned = self._scratch[3][:, 0].copy()
                 return [
                     self._ended(k, s, n, nominal, force)
                     for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
                 ]
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
+
+    def _acted(
+        self, now: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
+    ) -> list[SegmentState]:
+        """States with the forces of motors and springs where they are now."""
+        if not self.acting.every:
+            return list(now)
+        from kedfem.dynamics.acting_kernel import external
+
+        t, x0, v0 = ends
+        u, v, F, out = np.zeros((4, len(self.links), *self._shape))
+        for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
+            for each, x in zip(padded, rows, strict=True):
+                each[: x.shape[1], : len(x)] = x.T
+        external(
+            t, self.acting.segment, self._weights, self.acting.table, (x0, v0), (u, v), self._turned, F, out, self._scratch
+        )
+        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, out, strict=True)]
 
     def _predicted(self, k: int, s: SegmentState, at: Nominal) -> SegmentState:
         """The end of the step with an acceleration that stays, seen from frames there."""

@@ -10,7 +10,10 @@ H = Σ Bᵀ R S Rᵀ B has its entries near the diagonal: from column `first` of
     frames : number (L,), fit (L, E, D, S), K (L, E, N, N), share (L, E, N, N)
     kinds : (L,) 0: rows (u, v, w), 1: (u, v), 2: (u, v, ψ)
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components, Q (L, E + 1, 3, 3), angle (L, E + 1),
-        g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one
+        g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one;
+        turned (A,) coordinates of the actions
+    acting : segment (A, 2), weight (A, 2, 2, D, S), table, times (T,), nominal x and v (T, A, 2, 2, 3) of
+        `dynamics.acting_kernel`
     history : u, v, a, g (T, L, D, S), R (T, L, D, D), port forces (T, L, Q) in that frame, strain energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed; last step and change (2, L·D·S)
     counts : sweeps, scale², pairs that are known
@@ -23,6 +26,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from kedfem.dynamics.acting_kernel import external
+
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 SPACE, PLANE, BEAM = 0, 1, 2
@@ -33,13 +38,16 @@ TURNS = 20
 
 @compiled
 def follow_block(  # type: ignore[no-untyped-def]
-    coefficients, matrices, unknowns, shapes, frames, kinds, forcing, state, history, memory, counts
+    coefficients, matrices, unknowns, shapes, frames, kinds, forcing, acting, state, history, memory, counts
 ):
     """Take up to T steps in place, [KED, eq. (20)]; the number that settled, and the segment that did not or -1."""
     G, Yt, S, B = matrices
     columns, count, first = unknowns
     Rs, Fs = forcing
-    u, v, a, F0, f0, C, force0, Q0, angle0, g0 = state
+    segment, weight, table, times, x0, v0 = acting
+    F = np.zeros(Fs.shape[1:])
+    scratch = (np.zeros(x0.shape[1:]), np.zeros(x0.shape[1:]), np.zeros(x0.shape[1:]), np.zeros((len(segment), 4)))
+    u, v, a, F0, f0, C, force0, Q0, angle0, g0, turned = state
     T, L, D, n = Fs.shape
     Qn, c, k = B.shape[1], B.shape[2], len(first)
     h, tolerance = coefficients[7], coefficients[12]
@@ -70,7 +78,8 @@ def follow_block(  # type: ignore[no-untyped-def]
         settled, worst = False, -1
         for sweep in range(SWEEPS):
             counts[0] += 1
-            residuals(coefficients, Fs[t], Rp, state, end, rhs)
+            external(times[t], segment, weight, table, (x0[t], v0[t]), (u1, v1), turned, Fs[t], F, scratch)
+            residuals(coefficients, F, Rp, state, end, rhs)
             worst = swept(parts, Rp, rhs, H, first, z, reaction, force, change)
             moved = squares(change)
             mixed(memory, counts, sweep, change.ravel())
@@ -88,7 +97,9 @@ def follow_block(  # type: ignore[no-untyped-def]
         if not settled:
             return t, worst
         mean_frames(shapes, frames, kinds, Rs[t], u1, Q1, angle1, work)
-        recorded(coefficients, t, frames, kinds, Rs[t], Fs[t], Rp, force, state, end, history)
+        external(times[t], segment, weight, table, (x0[t], v0[t]), (u1, v1), turned, Fs[t], F, scratch)
+        turned[:] = scratch[3][:, 0]
+        recorded(coefficients, t, frames, kinds, Rs[t], F, Rp, force, state, end, history)
     return T, -1
 
 
@@ -189,7 +200,7 @@ def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
 def end_of_step(coefficients, shapes, frames, kinds, R, state, end, work):  # type: ignore[no-untyped-def]
     """Rates, frames and internal force of all segments at the end of the step, from their displacement."""
     n0, n1, n2, _, h1, h0, alpha, beta = coefficients[4:12]
-    u, v, a, _, _, C, _, _, _, g0 = state
+    u, v, a, C, g0 = state[0], state[1], state[2], state[5], state[9]
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     X, one, _ = shapes
     number, fit, K, _ = frames
@@ -520,7 +531,7 @@ def solved(H, first, x):  # type: ignore[no-untyped-def]
 def recorded(coefficients, t, frames, kinds, R, F, Rp, force, state, end, history):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and a row of the history."""
     alpha_f = coefficients[2]
-    u, v, a, F0, f0, C, force0, Q0, angle0, g0 = state
+    u, v, a, F0, f0, C, force0, Q0, angle0, g0, _ = state
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     us, vs, as_, gs, Rs, forces, energies = history
     number, _, K, share = frames

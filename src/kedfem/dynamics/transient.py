@@ -7,29 +7,42 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acting import acting_on
+from kedfem.dynamics.actions import actions
+from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
+from kedfem.dynamics.following import FollowingSteps
+from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
-from kedfem.dynamics.state import LinkState, Nominal
+from kedfem.dynamics.state import LinkState
+from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
+from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
-from kedfem.links.record import Link
+from kedfem.links.record import Link, as_rows
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, time_grid, turn_steps
+from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
 
 POINTS = 256  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
-Steps = CondensedSteps | LiteralSteps | DenseSteps
+StiffenedSteps = StiffenedCondensed | StiffenedLiteral | StiffenedDense
+Steps = CondensedSteps | LiteralSteps | DenseSteps | FollowingSteps | FollowingDense
+UNSETTLED = (
+    ": the sweeps of stiffening do not settle, it is not a small term; "
+    'take a smaller step, or frames = "following"'
+)
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:
@@ -41,11 +54,27 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         If an effective matrix is not positive definite.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    if following(scene):
+        dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
+        follower = FollowingDense if dense else FollowingSteps
+        return follower(model.links, model.joints, scheme, model.damping, acting_on(actions(scene, model)))
+    if scene.analysis.stiffening:
+        return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
     small = all(map(_is_small, model.links)) and find_spec("numba")
     solver = DenseSteps if small else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
+
+
+def stiffened_steps(scene: Scene, model: Model, scheme: Scheme) -> StiffenedSteps:
+    """The same with geometric stiffening."""
+    kind: type[StiffenedSteps] = StiffenedCondensed
+    if scene.analysis.solver == "literal":
+        kind = StiffenedLiteral
+    elif all(map(_is_small, model.links)) and find_spec("numba"):
+        kind = StiffenedDense
+    return kind(model, scheme, stiffening(model))
 
 
 def _is_small(link: Link) -> bool:
@@ -61,19 +90,46 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    law = scene.drive.motion
-    states = first_states(scene, linkage, along, law, model)
+    law = scene.motion
+    stresses = solver.stiffening if isinstance(solver, StiffenedSteps) else None
+    states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
     length = block_length(model)
+    bridge = _bridge(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
         for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
-            forcing = forcings(model, part)
-            links, state = solver.advance(state, forcing)
-            block = Block(first + k, part, links)
-            yield from _finite(block)
+            if isinstance(solver, FollowingSteps | FollowingDense):
+                try:
+                    links, state = bridge.block(solver, state, part)
+                except Stuck as stuck:
+                    if stuck.taken:
+                        yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
+                    raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
+            else:
+                links, state = solver.advance(state, forcings(model, part))
+            yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def _bridge(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
+    """Smaller steps for where those of the analysis do not settle."""
+    return Bridge(
+        time_grid(scene).step, scene.analysis.rho_inf,
+        lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
+        lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
+    )  # fmt: skip
+
+
+def _stuck(step: int, part: RigidMotion, stuck: Stuck) -> str:
+    """What to do about a step that does not settle."""
+    k = stuck.taken
+    return (
+        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive angle "
+        f"{np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from sweep to "
+        "sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
+    )
 
 
 def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
@@ -87,7 +143,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
 
     A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
     """
-    grid, law = time_grid(scene), scene.drive.motion
+    grid, law = time_grid(scene), scene.motion
     turn = turn_steps(scene) or 0.0
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
     kept: list[RigidMotion] = []
@@ -108,7 +164,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
 
 def block_length(model: Model) -> int:
     """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
-    return max(1, min(POINTS, BLOCK_BYTES // (6 * 8 * model.unknowns)))
+    return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
 
 
 def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
@@ -120,34 +176,55 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
 
 
 def first_states(
-    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw, model: Model
-) -> list[LinkState]:
+    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model,
+    stresses: Stiffening | None = None,
+) -> list[LinkState]:  # fmt: skip
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
     at_rest = scene.analysis.initial == "rest"
     grid = time_grid(scene)
     h = min(grid.step, grid.end / 2)
     t = h * np.arange(1 if at_rest else 3)
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
-    moments = instants(model, motion)
+    moments = instants(model, motion, stresses)
     if at_rest:
-        start = [Deflected(*(np.zeros((link.n, link.d)) for _ in range(3))) for link in model.links]
+        start = _undeformed(scene, linkage, model)
         return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
     u = quasi_static(model.links, model.joints, moments)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
+    if moments[0].turnings is not None:
+        start = [
+            replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
+        ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
 
 
-def instants(model: Model, motion: RigidMotion) -> list[Instant]:
-    """Orientation, load and spin of all links at each time point."""
+def _undeformed(scene: Scene, linkage: Linkage, model: Model) -> list[Deflected]:
+    """No deflection, and the speeds at the start that the scene asks for beside those of the drive."""
+    v, omega = initial_twists(scene, linkage)
+    start = []
+    for link, body in zip(model.links, model.bodies, strict=True):
+        rate = as_rows(link, np.outer(link.one, v[body]) + np.cross(omega[body], link.X))
+        if link.kind == "beam":
+            rate[:, 2] = omega[body, 2] * link.one
+        none = np.zeros_like(rate)
+        start.append(Deflected(none, rate, none))
+    return start
+
+
+def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
+    """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
     forcing = forcings(model, motion)
+    if stresses is not None:
+        forcing = stresses.stressed(forcing)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     return [
         Instant(
-            [Nominal(each.R[k], each.F[k]) for each in forcing],
+            [each.at(k) for each in forcing],
             [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
+            None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
         )
         for k in range(len(motion.t))
     ]
@@ -157,11 +234,11 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     """Least and greatest drive angle of the analysis [rad]."""
     grid = time_grid(scene)
     t = grid.step * np.arange(grid.steps + 1)
-    phi = drive_angle(scene.drive.motion, t)[0]
+    phi = drive_angle(scene.motion, t)[0]
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 
-def _finite(block: Block) -> Iterator[Block]:
+def _finite(block: Block, advice: str) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more."""
     fine = np.all([np.isfinite(link.g[:, 0]).all(axis=1) for link in block.links], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
@@ -170,5 +247,5 @@ def _finite(block: Block) -> Iterator[Block]:
     if k < len(block):
         raise SolveError(
             f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
-            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg"
+            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg{advice}"
         )

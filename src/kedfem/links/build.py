@@ -23,11 +23,11 @@ from kedfem.scene import (
     Polyline,
     RectangleSection,
     Scene,
+    link_frames,
     spatial_beams,
 )
 
 
-SEG=None
 def bare_links(scene: Scene) -> dict[str, Link]:
     """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
 
@@ -80,7 +80,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         If the mesh has fewer layers of elements than segments.
     """
     given = scene.links[name]
-    if not SEG is not None:
+    if link_frames(scene, name) == "nominal":
         return Segments((link,))
     if given.fidelity == "rigid" or link.full is not None:
         return Segments((following(link),))
@@ -93,7 +93,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case _:
             joints = [joint for joint in scene.joints.values() if name in joint.links]
             ends = np.array([joint.at for joint in joints])
-            return segmented(link, material, SEG.get(name) or 1, ends, _whole(scene, name, link, along(link, ends)))
+            return segmented(link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends)))
 
 
 def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:

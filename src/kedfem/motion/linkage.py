@@ -1,4 +1,8 @@
-"""The linkage as rigid bodies and constraint rows; its mobility and redundancy in the drawn position."""
+"""The linkage as rigid bodies and constraint rows; its mobility and redundancy in the drawn position.
+
+Where frames follow the links, motions may be left free. Nominally joints that bear them are held as drawn while the drive
+moves the rest; without a drive everything nominally rests.
+"""
 
 from dataclasses import dataclass
 
@@ -7,8 +11,8 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.motion.rows import Row, Rows, drive_row, features, jacobian, joint_rows, stacked
-from kedfem.scene import Joint, Scene
+from kedfem.motion.rows import Row, Rows, drive_row, features, free_rows, jacobian, joint_rows, stacked
+from kedfem.scene import Joint, Scene, following_links
 
 GROUND = "ground"
 RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
@@ -16,7 +20,7 @@ RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of tru
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """Bodies (ground first) and all rows of joints and drive.
+    """Bodies (ground first) and all rows of joints and drive; also those that hold free motions as drawn.
 
     bodies : names
     rows : as arrays
@@ -24,7 +28,8 @@ class Linkage:
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     redundant : joints whose rows repeat what others already hold
-    drive : name of the driven joint
+    drive : name of the driven joint; None where nothing is driven
+    mobility : free motions that the drive leaves; as many rows, the last ones, hold these
     """
 
     bodies: tuple[str, ...]
@@ -33,7 +38,8 @@ class Linkage:
     size: float
     centre: Float[np.ndarray, "3"]
     redundant: tuple[str, ...]
-    drive: str
+    drive: str | None
+    mobility: int = 0
 
 
 def linkage(scene: Scene) -> Linkage:
@@ -42,19 +48,42 @@ def linkage(scene: Scene) -> Linkage:
     Raises
     ------
     MotionError
-        If the linkage cannot move, has a dead point as drawn, or keeps a free motion.
+        If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
     """
     bodies = (GROUND, *scene.links)
-    points = np.array([joint.at for joint in scene.joints.values()])
-    centre = points.mean(axis=0)
+    points, centre = joint_points(scene), scene_centre(scene)
     rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
-    driven = scene.drive.joint
-    rows.append(drive_row(driven, *_pair(scene.joints[driven], bodies), joint_axis(scene.joints[driven])))
-    size = float(np.ptp(points, axis=0).max()) or 1.0
+    driven = scene.driven
+    if driven is not None:
+        rows.append(drive_row(driven, *_pair(scene.joints[driven], bodies), joint_axis(scene.joints[driven])))
+    size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
     J = drawn_jacobian(rows, len(bodies), size)
-    _check_mobility(J, rows, bodies, driven)
+    free = 0
+    if driven is not None:
+        free = _check_mobility(J, rows, bodies, driven, following_links(scene))
+        held = _holding(scene, J, bodies, size, free)
+        J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
+    else:
+        free = J.shape[1] - _rank(J)
     names = tuple(row.joint for row in rows)
-    return Linkage(bodies, stacked(rows), names, size, centre, _redundant(J, names), driven)
+    return Linkage(bodies, stacked(rows), names, size, centre, _redundant(J, names), driven, free)
+
+
+def _rank(J: Float[np.ndarray, "m k"]) -> int:
+    """Number of independent rows."""
+    s = scipy.linalg.svdvals(J) if len(J) else np.zeros(0)
+    return int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
+
+
+def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
+    """Places of all joints [m]."""
+    return np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
+
+
+def scene_centre(scene: Scene) -> Float[np.ndarray, "3"]:
+    """The middle of all joints [m]; the origin where there are none."""
+    points = joint_points(scene)
+    return np.asarray(points.mean(axis=0)) if len(points) else np.zeros(3)
 
 
 def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
@@ -69,9 +98,15 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
 
 def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
     joint = scene.joints[name]
-    i, j = _pair(joint, bodies)
     axis = None if joint.axis is None else unit(joint.axis)
-    return joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
+    return joint_rows(joint.kind, name, *_pair(joint, bodies), np.asarray(joint.at) - centre, axis)
+
+
+def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Row]:
+    """Rows of what a joint leaves free."""
+    joint = scene.joints[name]
+    axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
+    return free_rows(joint.kind, name, *_pair(joint, bodies), point, axis)
 
 
 def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
@@ -95,7 +130,10 @@ def scaled(J: Float[np.ndarray, "... m k"], rows: Rows, size: float) -> Float[np
     return np.asarray(J * row * column)
 
 
-def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str) -> None:
+def _check_mobility(
+    J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str, following: frozenset[str]
+) -> int:
+    """How many motions the drive leaves free; they must be of links whose frames follow."""
     _, s, Vt = scipy.linalg.svd(J)
     rank = int((s > RANK_TOLERANCE * s[0]).sum())
     without = J[[row.b_drive is None for row in rows]]
@@ -106,22 +144,43 @@ def _check_mobility(J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], dri
             "(the joints hold every link; is an axis askew, or one joint too many?)"
         )
     if rank == J.shape[1]:
-        return
+        return 0
     if mobility == 1:
         raise MotionError(
             f"joints.{drive}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
             "draw it at another angle or drive another joint"
         )
-    motion = _free_motion(Vt[rank:].reshape(-1, len(bodies) - 1, 6), bodies[1:])
+    null = Vt[rank:].reshape(-1, len(bodies) - 1, 6)
+    if following.issuperset(_moving(null, bodies[1:])):
+        return len(null)
     raise MotionError(
-        f"joints: every motion must be held or driven, got free motion left at drive angle 0 deg: {motion}"
+        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
+        f'{_free_motion(null, bodies[1:])} (with analysis.frames = "following" they may)'
     )
+
+
+def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[Row]:
+    """Rows that hold, as drawn, as many motions of joints as are free: those that these motions change most."""
+    if not free:
+        return []
+    rows = [
+        row for name in scene.joints if name != scene.driven for row in joint_free_rows(scene, name, bodies)
+    ]
+    _, _, Vt = scipy.linalg.svd(J)
+    change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T
+    _, _, order = scipy.linalg.qr(change.T, pivoting=True, mode="economic")
+    return [rows[k] for k in order[:free]]
+
+
+def _moving(null: np.ndarray, links: tuple[str, ...]) -> list[str]:
+    """The links that take part in free motions."""
+    norm = np.linalg.norm(null, axis=2).max(axis=0)
+    return [name for name, x in zip(links, norm, strict=True) if x > 1e-6]
 
 
 def _free_motion(null: np.ndarray, links: tuple[str, ...]) -> str:
     """Free motions in words: which links can still turn or slide, and how."""
-    norm = np.linalg.norm(null, axis=2).max(axis=0)
-    moving = [name for name, x in zip(links, norm, strict=True) if x > 1e-6]
+    norm, moving = np.linalg.norm(null, axis=2).max(axis=0), _moving(null, links)
     most = int(norm.argmax())
     v, omega = null[np.linalg.norm(null[:, most], axis=1).argmax(), most].reshape(2, 3)
     verb = "turn about" if np.linalg.norm(omega) > 1e-6 else "slide along"
@@ -133,6 +192,8 @@ def _free_motion(null: np.ndarray, links: tuple[str, ...]) -> str:
 
 def _redundant(J: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:
     """Joints that own the dependent rows, by rank-revealing QR of Jᵀ."""
+    if not names:
+        return ()
     _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
     rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
     return tuple(sorted({names[k] for k in pivot[rank:]}))

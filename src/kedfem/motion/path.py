@@ -53,7 +53,7 @@ class Path:
 
 
 def path(link: Linkage, low: float, high: float) -> Path:
-    """Follow the linkage from its drawn position over the drive angles low ≤ 0 ≤ high [rad].
+    """Follow the linkage from its drawn position over the drive angles low ≤ 0 ≤ high [rad]; undriven it rests there.
 
     Raises
     ------
@@ -61,6 +61,9 @@ def path(link: Linkage, low: float, high: float) -> Path:
         Naming the joint and the drive angle where the linkage locks or cannot be assembled.
     """
     start = (np.tile(np.eye(3), (1, len(link.bodies), 1, 1)), np.zeros((1, len(link.bodies), 3)))
+    if link.drive is None:
+        zero = (np.zeros_like(start[1]), np.zeros_like(start[1]))
+        return Path(np.zeros(1), *start, zero, zero, periodic=False, weakest=(1.0, 0.0))
     turn = 2 * np.pi
     if high > turn or low < -turn:
         once = _first_turn(link, start, turn, needed=high > turn)

@@ -53,6 +53,13 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
     )
 
 
+def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
+    """Nominal motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
+    R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
+    p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
+    return RigidMotion(t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, omega_phi, v_phi)
+
+
 Drive = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
 
 
@@ -72,6 +79,8 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
     MotionError
         If a joint is left open, with time and drive angle.
     """
+    if link.drive is None:
+        return resting(len(link.bodies), t)
     phi, speed, acceleration = drive
     poses, worst = closed(link, predicted(along, phi), phi)
     if worst.size and worst.max() > OPEN:

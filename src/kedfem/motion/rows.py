@@ -77,6 +77,22 @@ def drive_row(name: str, i: int, j: int, axis: Vector) -> Row:
     return Row(TURN, i, j, e1, e2, name, -e1)
 
 
+def free_rows(kind: str, name: str, i: int, j: int, point: Vector, axis: Vector | None) -> list[Row]:
+    """Rows of what a joint leaves free, as `joint_rows` holds the rest; i is the body that moves.
+
+    Their rates: of a hinge's turn row −(ω_i − ω_j) · axis, of a slide's gap row (v_i − v_j) · axis.
+    """
+    x, y, z = np.eye(3)
+    if kind == "spherical":
+        return [Row(TURN, i, j, a, b, name) for a, b in combinations((x, y, z), 2)]
+    if kind == "weld" or axis is None:
+        return []
+    if kind == "prismatic":
+        return [Row(GAP, i, j, point, axis, name)]
+    e1, e2 = perpendiculars(axis)
+    return [Row(TURN, i, j, e2, e1, name)]
+
+
 @dataclass(frozen=True, slots=True)
 class Rows:
     """Rows as arrays: kind, i, j (m,); a, b, b_drive (m, 3); driven (m,)."""
@@ -92,11 +108,13 @@ class Rows:
 
 def stacked(rows: list[Row]) -> Rows:
     """Rows as arrays, for evaluation all at once."""
+    zero = np.zeros(3)
     return Rows(
-        kind=np.array([r.kind for r in rows]), i=np.array([r.i for r in rows]), j=np.array([r.j for r in rows]),
-        a=np.array([r.a for r in rows]), b=np.array([r.b for r in rows]),
-        b_drive=np.array([np.zeros(3) if r.b_drive is None else r.b_drive for r in rows]),
-        driven=np.array([r.b_drive is not None for r in rows]),
+        kind=np.array([r.kind for r in rows], int),
+        i=np.array([r.i for r in rows], int), j=np.array([r.j for r in rows], int),
+        a=np.array([r.a for r in rows]).reshape(-1, 3), b=np.array([r.b for r in rows]).reshape(-1, 3),
+        b_drive=np.array([zero if r.b_drive is None else r.b_drive for r in rows]).reshape(-1, 3),
+        driven=np.array([r.b_drive is not None for r in rows], bool),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""What curves are drawn over: the drive angle, or time where the drive does not keep turning."""
+"""What curves are drawn over: the drive angle, or time where the drive does not keep turning or there is none."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,13 +18,16 @@ class Abscissa:
 
     Parameters
     ----------
-    values : (n,) [deg], or [s] when `degrees` is given
+    values : (n,) [deg], or [s] over time
     degrees : (n,) [deg]
-        The drive angle, when the curves are over time.
+        The drive angle, when the curves are over time and there is one that moves.
+    over_time
+        Whether the curves are over time.
     """
 
     values: Float[np.ndarray, " n"]
     degrees: Float[np.ndarray, " n"] | None = None
+    over_time: bool = False
 
 
 def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> Abscissa:
@@ -41,11 +44,11 @@ def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> A
     speed) for less than a tenth of the steps.
     """
     degrees = np.degrees(angle)
-    steps = np.diff(degrees) * np.sign(degrees[-1] - degrees[0])
+    steps = np.diff(degrees) * (np.sign(degrees[-1] - degrees[0]) or 1.0)
     fastest = np.max(steps, initial=0.0)
     if fastest > 0 and np.min(steps) >= 0 and np.mean(steps < 1e-3 * fastest) < 0.1:
         return Abscissa(degrees)
-    return Abscissa(time, degrees)
+    return Abscissa(time, degrees if steps.any() else None, over_time=True)
 
 
 def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
@@ -57,11 +60,11 @@ def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
         Axes of matplotlib that share the abscissa.
     """
     first, last = float(along.values[0]), float(along.values[-1])
-    bottom.set_xlabel("time (s)" if along.degrees is not None else "drive angle (°)")
+    bottom.set_xlabel("time (s)" if along.over_time else "drive angle (°)")
     if first == last:
         return
     bottom.set_xlim(first, last)  # a drive that turns backwards still runs from left to right
-    if along.degrees is not None:
+    if along.over_time:
         return
     span = abs(last - first)
     bottom.xaxis.set_major_locator(_ticks(span))

@@ -1,7 +1,6 @@
 """From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,32 +11,30 @@ from kedfem.dynamics.condensed import turned_ports
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.model import Carried, Model, Slider
+from kedfem.dynamics.model import Carried, Model, Slider, on_segment
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
+from kedfem.results.acting import acting
+from kedfem.results.audit import Account, energy_channels
+from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
 
-Rows = Float[np.ndarray, "T c"]
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
-    """A channel, and its rows over a block of time points."""
-
-    channel: Channel
-    rows: Callable[[Block], Rows]
-
-
-def recording(scene: Scene, model: Model) -> list[Recorded]:
+def recording(scene: Scene, model: Model, account: Account | None = None) -> list[Recorded]:
     """All channels that a scene asks for.
+
+    Parameters
+    ----------
+    account : of energy and momentum, if one is kept already
 
     Raises
     ------
@@ -46,7 +43,9 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    return [*probes, *joints, *_torque(scene, model), _rigid_torque(model), _energy(model)]
+    drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
+    energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
+    return [*probes, *joints, *drive, *acting(scene, model), *energies]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -55,9 +54,9 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
 
 
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
-    k = _number(model, probe.link)
+    where, drawn = f"output.probes.{name}.at", np.asarray(probe.at)
+    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn))
     link = model.links[k]
-    at = point_rows(link, f"output.probes.{name}.at", np.asarray(probe.at))
     key = f"probes/{name}/{probe.quantity}"
     place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
     if probe.quantity == "stress":
@@ -84,7 +83,8 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
         history = block.links[k]
         x = np.tensordot(getattr(history, field)[:, nodes], weights, (1, 0))
         if probe.frame == "link":
-            x = (x[:, None] @ history.R)[:, 0] @ link.axes[: link.d, : link.d]
+            R = block.motion.R[:, model.bodies[k], : link.d, : link.d]
+            x = (x[:, None] @ R)[:, 0] @ link.axes[: link.d, : link.d]
         return np.asarray(x[:, : len(columns)])
 
     description = f"elastic {probe.quantity} {place}"
@@ -102,7 +102,7 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
-    k = _number(model, held[0])
+    k = _holder(model, held[0], name)
     first, second = scene.joints[name].links
     opposite = first in {x.link.name for x in model.carried}  # it has no ports of its own
     on, other = (first, second) if held[0] == first or opposite else (second, first)
@@ -155,7 +155,7 @@ def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, l
     for name, joint in scene.joints.items():
         elastic = [x.name for x in model.links if x.name in joint.links]
         if link.name in joint.links and elastic:
-            held.append((_number(model, elastic[0]), name, np.asarray(joint.at)))
+            held.append((_holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(_wrench(model, *each), each[2]) for each in held]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
@@ -189,7 +189,8 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wre
         for j, share in shares:
             history = block.links[j]
             f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
-        R = block.motion.R[:, model.bodies[k]]
+        R = np.tile(np.eye(3), (len(block), 1, 1))
+        R[:, : link.d, : link.d] = block.links[k].R
         return _resultant(link, arms @ R.transpose(0, 2, 1), f.reshape(len(f), len(arms), link.d))
 
     return wrench
@@ -268,15 +269,15 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
-def _torque(scene: Scene, model: Model) -> list[Recorded]:
+def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
-    joint = scene.joints[scene.drive.joint]
+    joint = scene.joints[driven]
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
     channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
-        wrench = _wrench(model, _number(model, name), scene.drive.joint, at)
+        wrench = _wrench(model, _holder(model, name, driven), driven, at)
     else:
         wrench, others = _hub_wrench(scene, model, carried)
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
@@ -306,14 +307,9 @@ def _rigid_torque(model: Model) -> Recorded:
     return Recorded(channel, torque)
 
 
-def _energy(model: Model) -> Recorded:
-    """Strain energy ½ gᵀ K0 g of all links, [KED, eq. (13)]."""
-    channel = Channel("energy/strain", ("strain",), "J", "", "strain energy of all links")
-    return Recorded(channel, lambda block: np.sum([link.strain for link in block.links], axis=0)[:, None])
-
-
-def _number(model: Model, name: str) -> int:
-    return next(k for k, link in enumerate(model.links) if link.name == name)
+def _holder(model: Model, name: str, joint: str) -> int:
+    """The link of a name, or its segment, that a joint holds."""
+    return next(k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints)
 
 
 def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:

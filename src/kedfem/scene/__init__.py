@@ -4,6 +4,8 @@ from kedfem.scene.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.damping import Damping, rayleigh
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
+from kedfem.scene.frames import following, following_links, link_frames
+from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, load_factor
 from kedfem.scene.links import GROUND, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
@@ -19,12 +21,14 @@ from kedfem.scene.loads import (
     inertia_tensor,
 )
 from kedfem.scene.materials import Material
+from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import read_scene, scene_from
 from kedfem.scene.scene import Scene
 from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
 from kedfem.scene.shapes import Bar, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
+from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
 from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
 
 __all__ = [
@@ -35,22 +39,27 @@ __all__ = [
     "Bar",
     "Body",
     "BodyLoad",
-    "ConstantSpeed", "ConstantsSection",
+    "ConstantSpeed",
+    "ConstantsSection",
     "Cycloidal",
     "Damping",
     "Drive",
     "Extrusion",
     "Factor",
     "Flywheel",
+    "ForceCurve",
     "ForceLoad",
     "Hole",
+    "InitialMotion",
     "Joint",
+    "LineSpring",
     "LinkScene",
     "Load",
     "Material",
     "MeshFile",
     "Meshing",
     "MotionLaw",
+    "Motor",
     "Output",
     "Part",
     "PartGeometry",
@@ -66,12 +75,19 @@ __all__ = [
     "Scene",
     "SectionShape",
     "Shape",
+    "Spring",
+    "SpringEnd",
     "SurfaceLoad",
     "Table",
     "TimeGrid",
+    "TorqueCurve",
+    "TorsionSpring",
     "TubeSection",
     "drive_angle",
+    "following",
+    "following_links",
     "inertia_tensor",
+    "link_frames",
     "load_factor",
     "part_geometry",
     "rayleigh",

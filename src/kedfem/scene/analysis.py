@@ -14,6 +14,8 @@ from pydantic import (
 )
 
 from kedfem.scene.base import FileName, Name, Record
+from kedfem.scene.frames import Frames
+from kedfem.scene.initial import InitialMotion, JointSpeed
 from kedfem.scene.links import Count
 from kedfem.scene.points import Point
 from kedfem.scene.units import PositiveTime, Quantity, fault
@@ -37,11 +39,22 @@ class Analysis(Record):
     acceleration, which leaves it all"""
     initial: Literal["rest", "quasi-static"] = "rest"
     """elastic state at the start: none, or that of the slowly turning mechanism"""
+    frames: Frames | None = None
+    """nominal: the stiffness of links turns with the rigid motion, deflections are small; following: with the links
+    themselves, which may bend as far as they like, or move freely. Nominal if not given, following without a drive"""
+    initial_speeds: dict[str, JointSpeed] = Field(default_factory=dict)
+    """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
+    the ground against the other, about or along its axis; other joints then move as little as they can"""
+    initial_motions: dict[str, InitialMotion] = Field(default_factory=dict)
+    """velocities of links at the start, by name of the link"""
     accuracy: Annotated[float, Quantity("1", above=0.0, below=1.0)] | None = None
     """relative error to aim at in probes, joint forces and the drive's torque: fidelities (of links with `fidelity =
     "auto"`), mesh sizes, functions and step are then chosen for it; none of them is if not given"""
     reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
     """relative error that reduced links may cause there"""
+    stiffening: StrictBool = False
+    """whether stresses of the nominal motion stiffen the links: tension, as in fast rotors, makes them stiffer across it,
+    compression softer"""
     solver: Literal["condensed", "literal"] = "condensed"
     """condensed: one factorisation per link; literal: assembles and factors at every step"""
 
@@ -50,7 +63,7 @@ class Animation(Record):
     """Frames for ParaView."""
 
     frames_per_turn: Count = 36
-    """frames in a turn; in the whole analysis if the drive has no turns"""
+    """frames in a turn; in the whole analysis if the drive has no turns, or there is none"""
     exaggeration: Positive = 1.0
     """factor on the elastic displacement"""
     last_turns: Positive | None = None

@@ -13,12 +13,12 @@ Times = Float[np.ndarray, " t"]
 Law = tuple[Times, Times, Times]
 
 
-def drive_angle(motion: MotionLaw, t: Times) -> Law:
+def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
     """Angle of the driven joint and its derivatives.
 
     Parameters
     ----------
-    motion : law of motion of the drive
+    motion : law of motion of the drive; None where nothing is driven: the angle is zero
     t : (t,) [s]
         Times, from 0 on.
 
@@ -42,6 +42,8 @@ def drive_angle(motion: MotionLaw, t: Times) -> Law:
             return spline(motion, t)
         case Cycloidal() | Polynomial():
             return rise_dwell(motion, t)
+        case None:
+            return np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
 
 
 def ramp(motion: Ramp, t: Times) -> Law:

@@ -10,7 +10,7 @@ from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import FLAT, off_plane, vector
+from kedfem.scene.planes import FLAT, off_plane, spring_ends, vector
 from kedfem.scene.shapes import MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
@@ -57,8 +57,9 @@ def plane_faults(parts: Parts, here: str) -> Iterator[str]:
     others = {link.name for link in parts.links.values() if fidelity(link) in {"solid", "beam"}}
     entries = [
         entry
-        for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes)
-        for entry in section.values()
+        for section in (parts.joints, parts.links, parts.loads, parts.bodies, parts.probes, parts.springs)
+        for item in section.values()
+        for entry in (spring_ends(item) if section is parts.springs else [item])
         if entry.record is not None and link_of(entry) not in others
     ]
     yield from off_plane(entries, f"the other points of {here}")
@@ -66,6 +67,8 @@ def plane_faults(parts: Parts, here: str) -> Iterator[str]:
 
 def link_of(entry: Entry) -> str | None:
     """The link that an entry is, or is on; none for a joint."""
+    if entry.where[0] == "springs":
+        return str(entry.record.link)
     return entry.name if entry.where[0] == "links" else entry.word("link")
 
 
@@ -77,7 +80,10 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
     if analysis.has("turns") and analysis.has("end_time"):
         yield analysis.fault("turns", "must stand without end_time, got both")
     if not analysis.has("turns") and not analysis.has("end_time"):
-        yield analysis.fault("turns", "is required, or end_time [s], got neither")
+        key, wanted = (
+            ("turns", "is required, or end_time [s]") if parts.driven else ("end_time", "is required [s]")
+        )
+        yield analysis.fault(key, f"{wanted}, got {'neither' if parts.driven else 'nothing'}")
     if analysis.has("step") and analysis.has("steps_per_turn"):
         yield analysis.fault("step", "must stand without steps_per_turn, got both")
     if parts.drive.record is not None:

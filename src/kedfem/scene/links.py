@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
 from kedfem.scene.base import Record
+from kedfem.scene.frames import Frames
 from kedfem.scene.points import Axis, Point
 from kedfem.scene.shapes import Bar, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
@@ -67,6 +68,10 @@ class LinkScene(Record):
     """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
     beam: Literal["planar", "spatial"] | None = None
     """what moves of a beam: (u, v, ψ) in a plane z = constant, or all in space; if not given, planar where it can be"""
+    frames: Frames | None = None
+    """frames of this link, if other than those of the analysis"""
+    segments: Count | None = None
+    """number of segments, each with a frame of its own, of a link with frames that follow; of a beam: its elements"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:

@@ -16,12 +16,16 @@ from kedfem.scene.faults import line
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN
+from kedfem.scene.motors import Motor
+from kedfem.scene.springs import Spring
 
 TYPES: dict[str, Any] = {
     "links": LinkScene,
     "joints": Joint,
     "loads": Load,
     "bodies": Body,
+    "motors": Motor,
+    "springs": Spring,
     "probes": Probe,
     "drive": Drive,
     "analysis": Analysis,
@@ -46,14 +50,14 @@ def good(section: str, raw: Any) -> Any:
 class Entry:
     """A part of the scene: its place, what was given, and the record if that is good."""
 
-    where: tuple[str, ...]
+    where: tuple[str | int, ...]
     raw: Mapping[str, Any]
     record: Any
 
     @property
     def name(self) -> str:
         """Its name."""
-        return self.where[-1]
+        return str(self.where[-1])
 
     def word(self, *path: str) -> str | None:
         """What a key holds, as given, if it is a word."""
@@ -74,6 +78,10 @@ class Entry:
         return line((*self.where, key, *inner), message)
 
 
+NONE = Entry((), {}, None)
+"""What is not there."""
+
+
 @dataclass(frozen=True, slots=True)
 class Parts:
     """A scene under validation: its entries by name, known materials and the folder of its files."""
@@ -82,12 +90,19 @@ class Parts:
     joints: dict[str, Entry]
     loads: dict[str, Entry]
     bodies: dict[str, Entry]
+    motors: dict[str, Entry]
+    springs: dict[str, Entry]
     probes: dict[str, Entry]
     drive: Entry
     analysis: Entry
     gravity: tuple[float, ...]
     materials: list[str]
     folder: Path
+
+    @property
+    def driven(self) -> bool:
+        """Whether the scene has a drive, be it a good one or not."""
+        return bool(self.drive.where)
 
 
 def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
@@ -114,8 +129,10 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         joints=entries("joints", raw.get("joints")),
         loads=entries("loads", raw.get("loads")),
         bodies=entries("bodies", raw.get("bodies")),
+        motors=entries("motors", raw.get("motors")),
+        springs=entries("springs", raw.get("springs")),
         probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
-        drive=single("drive", raw.get("drive")),
+        drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
         analysis=single("analysis", raw.get("analysis")),
         gravity=gravity,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from kedfem.scene.checks import fidelity, link_names
-from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.parts import NONE, Entry, Parts
 from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import Polyline
 
@@ -22,13 +22,13 @@ Key = tuple[str, *tuple[str | int, ...]]
 def spatial_beams(scene: Scene) -> frozenset[str]:
     """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
     tables: dict[str, Mapping[str, Any]] = {
-        "links": scene.links, "joints": scene.joints, "loads": scene.loads, "bodies": scene.bodies
+        "links": scene.links, "joints": scene.joints, "loads": scene.loads, "bodies": scene.bodies,
+        "motors": scene.motors, "springs": scene.springs,
     }  # fmt: skip
     known = {section: _entries(section, table) for section, table in tables.items()}
     probes = _entries("probes", scene.output.probes, "output")
-    none = Entry((), {}, None)
     parts = Parts(
-        **known, probes=probes, drive=none, analysis=none, gravity=scene.gravity, materials=[], folder=scene.folder
+        **known, probes=probes, drive=NONE, analysis=NONE, gravity=scene.gravity, materials=[], folder=scene.folder
     )  # fmt: skip
     return spatial_names(parts)
 
@@ -141,7 +141,16 @@ def touching(parts: Parts, name: str) -> Iterator[Entry]:
     here = [parts.links[name], *(joint for joint in parts.joints.values() if name in link_names(joint))]
     for section in (parts.loads, parts.bodies, parts.probes):
         here += [entry for entry in section.values() if entry.word("link") == name]
+    for spring in parts.springs.values():
+        ends = spring_ends(spring)
+        here += ends if any(end.record is not None and end.record.link == name for end in ends) else []
     yield from (entry for entry in here if entry.record is not None)
+
+
+def spring_ends(spring: Entry) -> list[Entry]:
+    """The ends of a spring between two points, as entries, if it is good."""
+    ends = getattr(spring.record, "between", ())
+    return [Entry((*spring.where, "between", i), {}, end) for i, end in enumerate(ends)]
 
 
 def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:

@@ -18,14 +18,17 @@ from kedfem.scene import (
     analysis,
     damping,
     drives,
+    initial,
     links,
     loads,
     materials,
+    motors,
     outlines,
     points,
     scene,
     sections,
     shapes,
+    springs,
 )
 from kedfem.scene.hints import field_hint, keys, kind_of, models, options
 from kedfem.scene.units import Quantity
@@ -77,11 +80,17 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("[joints.NAME]", "", [links.Joint]),
     ("[drive]", "", [drives.Drive]),
     ("[drive.motion]", "", models(drives.MotionLaw)),
+    ("[motors.NAME]", "", [motors.Motor]),
+    ("torque of a motor", "", [motors.TorqueCurve]),
+    ("force of a motor", "", [motors.ForceCurve]),
+    ("[springs.NAME]", "", models(springs.Spring)),
+    ("Ends of a spring", "", [springs.SpringEnd]),
     ("[loads.NAME]", "", models(loads.Load)),
     ("factor of a load", "", [loads.Factor]),
     ("[bodies.NAME]", "", models(loads.Body)),
     ("[damping]", "", [damping.Damping]),
     ("[analysis]", "", [analysis.Analysis]),
+    ("[analysis.initial_motions.NAME]", "", [initial.InitialMotion]),
     ("[output]", "", [analysis.Output]),
     ("[output.animation]", "", [analysis.Animation]),
     ("[output.probes.NAME]", "", [analysis.Probe]),
@@ -95,6 +104,12 @@ NAMED = {
     loads.BodyVector: ("vector", "N/m³"),
     loads.SurfaceVector: ("vector", "Pa"),
     loads.FactorOverTime: ("number or table", ""),
+    motors.TorqueOver: ("number or table", "N·m"),
+    motors.ForceOver: ("number or table", "N"),
+    motors.Abscissa: ("number", "s, rad/s, rad, m/s or m"),
+    initial.JointSpeed: ("number", "rad/s or m/s"),
+    initial.VelocityVector: ("vector", "m/s"),
+    initial.SpinVector: ("vector", "rad/s"),
 }
 
 

@@ -20,17 +20,21 @@ from kedfem.scene.analysis import Analysis, Output
 from kedfem.scene.base import Name, Record, plain
 from kedfem.scene.checks import drive_faults, joint_faults, link_faults, load_faults, reference_faults
 from kedfem.scene.damping import Damping
-from kedfem.scene.drives import Drive
+from kedfem.scene.drives import Drive, MotionLaw
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_motion_table
+from kedfem.scene.frames import default_frames
+from kedfem.scene.free import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
 from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
+from kedfem.scene.motors import Motor
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
+from kedfem.scene.springs import Spring
 
 GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
 
@@ -56,10 +60,15 @@ class Scene(Record):
     """materials of this scene, beside those that are built in; one of the same name replaces them"""
     links: dict[Name, LinkScene] = Field(min_length=1)
     """the links by name"""
-    joints: dict[Name, Joint] = Field(min_length=1)
-    """the joints by name"""
-    drive: Drive
-    """what moves the mechanism"""
+    joints: dict[Name, Joint] = Field(default_factory=dict)
+    """the joints by name; required with a drive"""
+    drive: Drive | None = None
+    """what moves the mechanism; without one it moves by itself: under motors, springs, gravity and other loads, from its
+    initial speeds, with frames that follow"""
+    motors: dict[Name, Motor] = Field(default_factory=dict)
+    """torques and forces on joints that are not driven"""
+    springs: dict[Name, Spring] = Field(default_factory=dict)
+    """springs and dampers between links, or links and the ground"""
     loads: dict[Name, Load] = Field(default_factory=dict)
     """forces, beside gravity and inertia"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
@@ -86,6 +95,16 @@ class Scene(Record):
         return self._folder
 
     @property
+    def motion(self) -> MotionLaw | None:
+        """How the driven joint turns; None without a drive."""
+        return None if self.drive is None else self.drive.motion
+
+    @property
+    def driven(self) -> str | None:
+        """Name of the driven joint; None without a drive."""
+        return None if self.drive is None else self.drive.joint
+
+    @property
     def results_folder(self) -> Path:
         """Where the results go."""
         return self._folder / (self.output.folder or f"{self._stem}-results")
@@ -104,6 +123,8 @@ class Scene(Record):
             raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_table(raw, scene_folder.get())
         faults = placement.faults + faults
+        if raw.get("drive") is not None and raw.get("joints", {}) == {}:
+            faults.append("joints: is required with a drive, got nothing")
         with known_points(placement):
             try:
                 scene = handler(prepared(raw, points))
@@ -112,6 +133,8 @@ class Scene(Record):
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
+        if scene.analysis.frames is None:
+            scene.analysis.fill(frames=default_frames(scene.drive is not None))
         return scene
 
 
@@ -160,5 +183,10 @@ def cross_faults(parts: Parts) -> list[str]:
         beam_faults,
         analysis_faults,
         file_faults,
+        frame_faults,
+        motor_faults,
+        spring_faults,
+        initial_faults,
+        undriven_faults,
     )
     return [fault for check in checks for fault in check(parts)]

@@ -36,8 +36,8 @@ class TimeGrid:
         return self.step * self.steps
 
 
-def turning_speed(motion: MotionLaw) -> float:
-    """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not."""
+def turning_speed(motion: MotionLaw | None) -> float:
+    """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not, or where there is none."""
     return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
 
 
@@ -64,8 +64,10 @@ def time_grid(scene: Scene) -> TimeGrid:
     With ``steps_per_turn`` the step is the turn at the drive's final speed, divided, and the last step may
     pass the end; ``step`` is shortened so that a whole number reaches the end.
     """
-    analysis, motion = scene.analysis, scene.drive.motion
-    end = analysis.end_time if analysis.turns is None else time_of_turns(motion, analysis.turns)
+    analysis, motion = scene.analysis, scene.motion
+    end = analysis.end_time
+    if motion is not None and analysis.turns is not None:
+        end = time_of_turns(motion, analysis.turns)
     if end is None:
         raise ValueError("an analysis needs turns or an end time")
     if analysis.step is not None:
@@ -79,5 +81,5 @@ def time_grid(scene: Scene) -> TimeGrid:
 
 def turn_steps(scene: Scene) -> float | None:
     """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
-    speed = turning_speed(scene.drive.motion)
+    speed = turning_speed(scene.motion)
     return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

@@ -30,6 +30,7 @@ KINDS = {
     "Hz": "a frequency",
     "rad/s": "a rotational speed",
     "1/s": "a rate",
+    "m/s": "a speed",
     "m/s^2": "an acceleration",
     "kg": "a mass",
     "kg*m^2": "a moment of inertia",
@@ -37,6 +38,11 @@ KINDS = {
     "Pa": "a pressure",
     "N": "a force",
     "N/m^3": "a force per volume",
+    "N*m": "a torque",
+    "N/m": "a stiffness",
+    "N*s/m": "a damping constant",
+    "N*m/rad": "a torsional stiffness",
+    "N*m*s/rad": "a torsional damping constant",
 }
 UNREADABLE = (
     ValueError,

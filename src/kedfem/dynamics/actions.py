@@ -1,0 +1,166 @@
+"""Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kedfem.dynamics.action import (
+    ANGLE,
+    DISTANCE,
+    IN_SPACE,
+    OVER,
+    PAIR,
+    POINT,
+    SINGLE,
+    SLIDE,
+    TURN,
+    Action,
+    End,
+    Vector,
+)
+from kedfem.dynamics.coupling import seat_of, slider_axis
+from kedfem.dynamics.model import Model, Slider, on_segment
+from kedfem.errors import MeshError, SceneError
+from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows
+from kedfem.links.seats import Seat, face_normal, holds, port_weights
+from kedfem.motion.linkage import joint_axis
+from kedfem.motion.rows import perpendiculars
+from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
+
+
+def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
+    """All motors and springs of a scene.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a point or joint is not on its link.
+    """
+    find = _Ends(scene, model)
+    motors = [_motor(find, name, motor) for name, motor in scene.motors.items()]
+    springs = [_spring(find, name, spring) for name, spring in scene.springs.items()]
+    return (*motors, *springs)
+
+
+def hinges(scene: Scene, model: Model) -> tuple[Action, ...]:
+    """An action without a force for each revolute joint: its turn is looked at."""
+    find = _Ends(scene, model)
+    names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
+    return tuple(_hinge(find, f"joints/{name}", name) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """Where ends are on the links of a model."""
+
+    scene: Scene
+    model: Model
+
+    def body(self, name: str) -> int | None:
+        """The body that a link without unknowns moves with; None of others."""
+        if name == GROUND or slider_axis(self.scene, name) is not None:
+            return 0
+        return next((x.body for x in self.model.carried if x.link.name == name), None)
+
+    def point(self, where: str, name: str, at: Vector) -> End:
+        """A point of a link, the ground or a slider."""
+        slider = next((x for x in self.model.sliders if x.name == name), None)
+        if slider is not None:
+            return self.on_slider(slider, at)
+        body = self.body(name)
+        if body is not None:
+            return End(-1, body, POINT, np.zeros((1, 0)), at[None])
+        k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
+        link = self.model.links[k]
+        beside = float(np.linalg.norm(rows.X - at))
+        if link.kind == "beam" and beside > 1e-6 * link.size:
+            raise SceneError(f"{where}: must lie on the axis of beam '{name}', got {beside:.3g} m beside it")
+        return End(k, self.model.bodies[k], POINT, rows.value[None], rows.X[None], _plane(link))
+
+    def on_slider(self, slider: Slider, at: Vector) -> End:
+        """A point of a slider, which rides on its carrier and never turns."""
+        port = np.asarray(self.scene.joints[slider.joint].at)
+        k, link = slider.carrier, self.model.links[slider.carrier]
+        return End(
+            k, self.model.bodies[k], POINT, slider.weights[None], port[None], _plane(link), offset=at - port
+        )
+
+    def across(self, joint: str, name: str) -> End:
+        """Directions of a link across the axis of a hinge."""
+        axis, at = joint_axis(self.scene.joints[joint]), np.asarray(self.scene.joints[joint].at)
+        both = np.array(perpendiculars(axis))
+        body = self.body(name)
+        if body is not None:
+            return End(-1, body, PAIR, np.zeros((2, 0)), both)
+        k, seat = on_segment(self.model, name, at, lambda link: seat_of(self.scene, joint, link))
+        link, here = self.model.links[k], self.model.bodies[k]
+        if link.kind == "beam":
+            return End(k, here, ANGLE, seat.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
+        if all(holds(seat, e) for e in both):
+            return End(k, here, PAIR, both @ seat.fit[1:], both, _plane(link))
+        known = np.array([_in_face(f"joints.{joint}", link, seat, axis), axis])
+        return End(k, here, SINGLE, known @ seat.fit[1:], known, _plane(link))
+
+
+def _plane(link: Link) -> tuple[float, float, float]:
+    """The components of a state's rows that are displacements."""
+    return (1.0, 1.0, 0.0) if link.planar else IN_SPACE
+
+
+def _in_face(where: str, link: Link, seat: Seat, axis: Vector) -> Vector:
+    """The direction within a flat seat across an axis."""
+    t = np.cross(face_normal(seat), axis)
+    if np.linalg.norm(t) < 1e-6 or not holds(seat, t):
+        raise MeshError(
+            f"{where}: must sit on a bore of link '{link.name}' to be turned, got a face across its axis"
+        )
+    return np.asarray(t / np.linalg.norm(t))
+
+
+def _ordered(links: tuple[str, str]) -> tuple[str, str]:
+    """The links of a joint: the first that is not the ground, and the other."""
+    return (links[1], links[0]) if links[0] == GROUND else links
+
+
+def _hinge(find: _Ends, name: str, joint: str) -> Action:
+    """An action on the turn of a hinge, without a force yet."""
+    one, other = _ordered(find.scene.joints[joint].links)
+    ends = (find.across(joint, one), find.across(joint, other))
+    return Action(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
+
+
+def _slide(find: _Ends, name: str, joint: str) -> Action:
+    """An action on the travel of a slide, without a force yet: the port of its link against the ground."""
+    at = np.asarray(find.scene.joints[joint].at)
+    one, other = _ordered(find.scene.joints[joint].links)
+    ends = (_port(find, joint, one, at), find.point(f"joints.{joint}", other, at))
+    return Action(name, SLIDE, ends, axis=joint_axis(find.scene.joints[joint]))
+
+
+def _port(find: _Ends, joint: str, name: str, at: Vector) -> End:
+    """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
+    if find.body(name) is not None:
+        return find.point(f"joints.{joint}", name, at)
+    k, seat = on_segment(find.model, name, at, lambda link: seat_of(find.scene, joint, link))
+    link, weights = find.model.links[k], port_weights(seat, at[None])
+    return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
+
+
+def _motor(find: _Ends, name: str, motor: Motor) -> Action:
+    curve = motor.curve
+    made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
+    return replace(made, over=OVER[curve.over], at=curve.at, value=curve.value)
+
+
+def _spring(find: _Ends, name: str, spring: Spring) -> Action:
+    if not isinstance(spring, LineSpring):
+        made = _hinge(find, f"springs/{name}", spring.joint)
+        return replace(made, stiffness=spring.stiffness, damping=spring.damping, free=spring.free_angle)
+    one, other = (
+        find.point(f"springs.{name}.between[{i}].at", end.link, np.asarray(end.at))
+        for i, end in enumerate(spring.between)
+    )
+    a, b = (np.asarray(end.at) for end in spring.between)
+    free = float(np.linalg.norm(a - b)) if spring.free_length is None else spring.free_length
+    return Action(f"springs/{name}", DISTANCE, (one, other), spring.stiffness, spring.damping, free)

@@ -1,0 +1,143 @@
+"""Velocities of all bodies where a linkage starts to move by itself, from speeds that the scene asks for."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.motion.linkage import RANK_TOLERANCE, Linkage, drawn_jacobian, joint_axis, joint_free_rows, scaled
+from kedfem.motion.newton import cross_matrix
+from kedfem.motion.rows import cross, features, jacobian
+from kedfem.scene import Scene
+
+REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for
+AXES = "xyz"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """One speed that a scene asks for.
+
+    where, unit : for messages
+    row : (6 B,) its row on the twists (v, ω) of all bodies, ground first, v at the linkage's centre
+    value : [m/s or rad/s]
+    """
+
+    where: str
+    unit: str
+    row: Float[np.ndarray, " k"]
+    value: float
+
+
+def initial_twists(
+    scene: Scene, linkage: Linkage
+) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
+    """Velocities that all joints allow, with the speeds asked for, the drive held: they add to the nominal velocities.
+
+    What these leave open: joints that are not named move as little against each other as can be, in the sum of squares
+    (slides per size of the linkage); after that bodies as little as can be.
+
+    Returns
+    -------
+    v, omega : (B, 3) each [m/s, rad/s]
+        Velocity of the point that is drawn at the origin, as in `RigidMotion`, and rotational speed; ground first.
+
+    Raises
+    ------
+    MotionError
+        If the joints do not allow these speeds: naming them, with what was asked for and the closest that is possible.
+    """
+    bodies, size = len(linkage.bodies), linkage.size
+    asked = list(_wanted(scene, linkage))
+    twists = np.zeros((bodies, 6))
+    if any(each.value for each in asked):
+        column = np.tile([size, size, size, 1.0, 1.0, 1.0], bodies - 1)
+        A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.value for each in asked])
+        free = _allowed(linkage)
+        other = [row for name in scene.joints if name not in scene.analysis.initial_speeds
+                 for row in joint_free_rows(scene, name, linkage.bodies)]  # fmt: skip
+        q = free @ _least(A @ free, b, drawn_jacobian(other, bodies, size) @ free)
+        _check_reached(asked, A @ q)
+        twists[1:] = (q * column).reshape(-1, 6)
+    v, omega = twists[:, :3], twists[:, 3:]
+    return v - cross(omega, np.broadcast_to(linkage.centre, omega.shape)), np.array(omega)
+
+
+def _least(
+    A: Float[np.ndarray, "w f"], b: Float[np.ndarray, " w"], C: Float[np.ndarray, "c f"]
+) -> Float[np.ndarray, " f"]:
+    """x nearest to A x = b, of these the least |C x|, of these the least |x|."""
+    scale = np.abs(A).max(axis=1, initial=0.0)
+    scale[scale == 0.0] = 1.0
+    A, b = A / scale[:, None], b / scale
+    x = scipy.linalg.lstsq(A, b, cond=RANK_TOLERANCE)[0]
+    Z = scipy.linalg.null_space(A, rcond=RANK_TOLERANCE)
+    if Z.shape[1] and len(C):
+        x = x - Z @ scipy.linalg.lstsq(C @ Z, C @ x, cond=RANK_TOLERANCE)[0]
+    return np.asarray(x)
+
+
+def _allowed(linkage: Linkage) -> Float[np.ndarray, "k f"]:
+    """Orthonormal basis of the scaled twists that all joints allow as drawn, the drive held but nothing else."""
+    bodies = len(linkage.bodies)
+    held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
+    if not held:
+        return np.eye(6 * (bodies - 1))
+    poses = (np.tile(np.eye(3), (1, bodies, 1, 1)), np.zeros((1, bodies, 3)))
+    f = features(linkage.rows, poses, np.zeros(1))
+    J = scaled(jacobian(linkage.rows, f, bodies)[0], linkage.rows, linkage.size)
+    return np.asarray(scipy.linalg.null_space(J[:held], rcond=RANK_TOLERANCE))
+
+
+def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
+    for name, value in scene.analysis.initial_speeds.items():
+        joint = scene.joints[name]
+        moving, other = _order(joint.links)
+        i, j = linkage.bodies.index(moving), linkage.bodies.index(other)
+        row, axis = np.zeros((len(linkage.bodies), 2, 3)), joint_axis(joint)
+        if joint.kind == "revolute":
+            row[i, 1], row[j, 1] = axis, -axis
+        else:  # bodies of a slide do not turn against each other
+            arm = cross(np.asarray(joint.at) - linkage.centre, axis)
+            row[i], row[j] = (axis, arm), (-axis, -arm)
+        unit = "rad/s" if joint.kind == "revolute" else "m/s"
+        yield Wanted(f"analysis.initial_speeds.{name}", unit, row.ravel(), value)
+    for name, motion in scene.analysis.initial_motions.items():
+        k = linkage.bodies.index(name)
+        turn = -cross_matrix(np.asarray(motion.at) - linkage.centre)
+        for key, blocks, vector, unit in (
+            ("velocity", (np.eye(3), turn), motion.velocity, "m/s"),
+            ("spin", (np.zeros((3, 3)), np.eye(3)), motion.spin, "rad/s"),
+        ):
+            for c, value in enumerate(vector or ()):
+                row = np.zeros((len(linkage.bodies), 2, 3))
+                row[k] = blocks[0][c], blocks[1][c]
+                where = f"analysis.initial_motions.{name}.{key} along {AXES[c]}"
+                yield Wanted(where, unit, row.ravel(), value)
+
+
+def _order(links: tuple[str, str]) -> tuple[str, str]:
+    """The link of a joint that its speeds and torques are of, and the other: the first that is not the ground."""
+    return (links[1], links[0]) if links[0] == "ground" else links
+
+
+def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"]) -> None:
+    """Raise an error for speeds that the joints do not allow together."""
+    for unit in ("rad/s", "m/s"):
+        alike = [(each.value, x) for each, x in zip(asked, got, strict=True) if each.unit == unit]
+        fastest = max((abs(value) for value, _ in alike), default=0.0)
+        if any(abs(value - x) > REACHED * fastest for value, x in alike):
+            break
+    else:
+        return
+    lines = [
+        f"{each.where} = {each.value:.6g} {each.unit} (closest possible {round(x, 9) + 0.0:.6g})"
+        for each, x in zip(asked, got.tolist(), strict=True)
+        if each.value or abs(x) > REACHED
+    ]
+    raise MotionError(
+        f"analysis: the joints must allow the speeds at the start together, got {', '.join(lines)}"
+    )

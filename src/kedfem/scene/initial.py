@@ -1,0 +1,50 @@
+"""Velocities at the start, of joints and of links."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BeforeValidator, PlainValidator, model_validator
+from pydantic_core import PydanticCustomError
+
+from kedfem.scene.base import Record, refuse
+from kedfem.scene.points import Point, as_vector
+from kedfem.scene.units import Quantity, Speed, fault
+
+TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
+Velocity = Annotated[float, Quantity("m/s")]
+VelocityVector = Annotated[tuple[Velocity, Velocity, Velocity], BeforeValidator(as_vector)]
+SpinVector = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vector)]
+
+
+def joint_speed(value: object) -> float:
+    """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
+    try:
+        return TURNING.number(value)
+    except PydanticCustomError as reason:
+        if not isinstance(value, str):
+            raise
+        try:
+            return SLIDING.number(value)
+        except PydanticCustomError:
+            raise fault(f"{reason.message()} (of a slider in m/s)") from None
+
+
+JointSpeed = Annotated[float, PlainValidator(joint_speed)]
+
+
+class InitialMotion(Record):
+    """How a link moves at the start."""
+
+    at: Point
+    """a point of the link, in the drawn position"""
+    velocity: VelocityVector | None = None
+    """velocity of this point; left open if not given"""
+    spin: SpinVector | None = None
+    """rotational speed of the link, a vector; left open if not given"""
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        given = self.velocity is not None or self.spin is not None
+        refuse([] if given else [(("velocity",), "is required [m/s], or spin [rad/s], got neither")])
+        return self

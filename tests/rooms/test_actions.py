@@ -1,0 +1,438 @@
+"""Motors, springs and dampers: forces that do the work of their coordinate, whatever moves, and balance by themselves."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from kedfem.dynamics.action import (
+    ANGLE,
+    DISTANCE,
+    PAIR,
+    POINT,
+    POSITION,
+    SINGLE,
+    SLIDE,
+    SPEED,
+    TURN,
+    Action,
+    End,
+    kernel_table,
+)
+from kedfem.dynamics.actions import actions, hinges
+from kedfem.dynamics.actions_kernel import evaluate, evaluate_all
+from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.errors import MeshError, SceneError
+from kedfem.motion.linkage import linkage
+from kedfem.motion.rigid import resting
+from kedfem.motion.rows import perpendiculars
+from kedfem.results.recording import recording, rows
+from kedfem.scene import Scene, scene_from
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def end(form: int, X: Any, k: int = 0) -> End:
+    X = np.atleast_2d(np.asarray(X, float))
+    return End(k, 1, form, np.ones((len(X), 1)), X)
+
+
+def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> Action:
+    """A hinge whose ends show themselves in two ways; the second is drawn turned by 0.4 rad about the axis."""
+    e = np.array(perpendiculars(axis))
+    aside = Rotation.from_rotvec(0.4 * axis).apply(e)
+    X = {PAIR: (e, e), SINGLE: ([e[0], axis], [aside[0], axis]), ANGLE: (np.zeros(3), np.zeros(3))}
+    return Action("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), axis=axis, **law)
+
+
+def drawn(every: Sequence[Action]) -> np.ndarray:
+    x = np.zeros((len(every), 2, 2, 3))
+    for i, action in enumerate(every):
+        for e in (0, 1):
+            x[i, e, : len(action.ends[e].X)] = action.ends[e].X
+    return x
+
+
+def found(
+    action: Action, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (2, 2, 3) and values (4,) of one action."""
+    forces, values = np.zeros((1, 2, 2, 3)), np.zeros((1, 4))
+    v = np.zeros_like(x) if v is None else v
+    evaluate(t, x[None], v[None], np.array([before]), kernel_table([action]), forces, values)
+    return forces[0], values[0]
+
+
+def turned(x: np.ndarray, action: Action, turns: Sequence[np.ndarray]) -> np.ndarray:
+    """Each end's vectors turned by its own rotation; a planar beam's angle about z added."""
+    out = x.copy()
+    for e, theta in enumerate(turns):
+        if action.ends[e].form == ANGLE:
+            out[e, 0, 2] += theta[2]
+        else:
+            out[e] = Rotation.from_rotvec(theta).apply(x[e])
+    return out
+
+
+LAWS = {"stiffness": 3.0, "free": 0.7}
+FORMS = [(PAIR, PAIR), (PAIR, SINGLE), (SINGLE, PAIR), (SINGLE, SINGLE)]
+UPRIGHT = [(ANGLE, ANGLE), (ANGLE, PAIR), (PAIR, ANGLE), (ANGLE, SINGLE), (SINGLE, ANGLE)]
+vectors = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def unit(seed: int) -> np.ndarray:
+    n = np.random.default_rng(seed).normal(size=3)
+    return np.asarray(n / np.linalg.norm(n))
+
+
+# -- the turn of a hinge ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
+@pytest.mark.parametrize("axis", [Z, -Z], ids=["z", "-z"])
+@pytest.mark.parametrize("angle", [0.0, 1.2, -2.9, 3.1])
+def test_a_hinge_tells_its_turn(one: int, other: int, axis: np.ndarray, angle: float) -> None:
+    action = hinge(one, other, axis)
+    x = turned(drawn([action])[0], action, [(angle + 0.3) * axis, 0.3 * axis])
+    assert found(action, x)[1][0] == pytest.approx(angle, abs=1e-12)
+
+
+@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
+def test_turns_are_counted_on(one: int, other: int) -> None:
+    action = hinge(one, other, Z)
+    x0, q = drawn([action])[0], 0.0
+    for angle in [*np.arange(0, 20, 1.3), *np.arange(20, -20, -2.9)]:
+        q = float(found(action, turned(x0, action, [angle * Z, 0 * Z]), before=q)[1][0])
+        assert q == pytest.approx(angle, abs=1e-9)
+
+
+@pytest.mark.parametrize(("one", "other"), FORMS)
+@given(seed=seeds, whole=vectors, angle=st.floats(-3, 3))
+@settings(max_examples=20, deadline=None)
+def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
+    one: int, other: int, seed: int, whole: np.ndarray, angle: float
+) -> None:
+    axis = unit(seed)
+    action = hinge(one, other, axis, **LAWS)
+    x = turned(drawn([action])[0], action, [angle * axis, 0 * axis])
+    x += 0.1 * np.random.default_rng(seed).normal(size=x.shape)  # hubs deform and tilt
+    f, values = found(action, x, before=angle)
+    R = Rotation.from_rotvec(3 * whole)
+    F, turned_values = found(action, np.array([R.apply(e) for e in x]), before=angle)
+    np.testing.assert_allclose(turned_values, values, atol=1e-9)
+    np.testing.assert_allclose(F, [R.apply(e) for e in f], atol=1e-9)
+
+
+@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
+@given(seed=seeds)
+@settings(max_examples=20, deadline=None)
+def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: int) -> None:
+    """Forces · δx = Q δq by central differences, from any deformed and tilted state."""
+    rng = np.random.default_rng(seed)
+    axis = unit(seed) if ANGLE not in (one, other) else Z
+    action = hinge(one, other, axis, at=(0.0,), value=(2.5,))
+    x = turned(drawn([action])[0], action, [rng.uniform(-2, 2) * axis, 0 * axis])
+    x += 0.1 * rng.normal(size=x.shape)
+    v = rng.normal(size=x.shape)
+    f, values = found(action, x, v)
+    h = 1e-5
+    rate = (found(action, x + h * v)[1][0] - found(action, x - h * v)[1][0]) / (2 * h)
+    assert values[1] == pytest.approx(rate, abs=1e-7)
+    assert np.vdot(f, v) == pytest.approx(2.5 * rate, abs=1e-7)
+
+
+@pytest.mark.parametrize(("one", "other"), FORMS)
+def test_torques_on_both_ends_balance(one: int, other: int) -> None:
+    """Σ x × f over all directions is the moment; on the first end it is T n where nothing is tilted."""
+    axis = unit(3)
+    action = hinge(one, other, axis, at=(0.0,), value=(2.5,))
+    x = turned(drawn([action])[0], action, [0.9 * axis, 0.2 * axis])
+    moments = np.cross(x, found(action, x)[0]).sum(axis=1)
+    np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
+    x += 0.1 * np.random.default_rng(1).normal(size=x.shape)
+    np.testing.assert_allclose(np.cross(x, found(action, x)[0]).sum(axis=(0, 1)), 0, atol=1e-12)
+
+
+def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
+    for axis in (Z, -Z):
+        action = hinge(ANGLE, ANGLE, axis, at=(0.0,), value=(2.5,))
+        f, _ = found(action, turned(drawn([action])[0], action, [4 * Z, 1 * Z]))
+        np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
+        assert not f[:, 1].any()
+
+
+# -- laws ---------------------------------------------------------------------------------------------------
+
+
+def test_a_torsion_spring_turns_back() -> None:
+    action = hinge(PAIR, PAIR, Z, stiffness=3.0, damping=0.5, free=0.2)
+    x0 = drawn([action])[0]
+    x = turned(x0, action, [1.2 * Z, 0 * Z])
+    v = np.zeros_like(x)
+    v[0] = np.cross(2.0 * Z, x[0])
+    _, values = found(action, x, v)
+    np.testing.assert_allclose(values, [1.2, 2.0, -3.0 * 1.0 - 0.5 * 2.0, 0.5 * 3.0 * 1.0**2], atol=1e-12)
+
+
+def test_a_spring_between_points_pulls_along_its_line() -> None:
+    action = Action("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
+    x, v = drawn([action])[0], np.zeros((2, 2, 3))
+    v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
+    f, values = found(action, x, v)
+    np.testing.assert_allclose(values, [5, 0.6, -10 * 1 - 2 * 0.6, 5.0])
+    np.testing.assert_allclose(f[:, 0], 11.2 * np.array([[0.6, 0.8, 0], [-0.6, -0.8, 0]]))
+
+
+def test_a_spring_of_no_length_has_no_direction() -> None:
+    action = Action("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
+    f, values = found(action, drawn([action])[0])
+    assert not f.any()
+    assert not values.any()
+
+
+def test_a_slide_is_pushed_along_its_axis() -> None:
+    axis = unit(5)
+    action = Action("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
+                    over=POSITION, at=(0.0, 1.0), value=(0.0, 8.0))  # fmt: skip
+    x = drawn([action])[0]
+    x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
+    f, values = found(action, x)
+    np.testing.assert_allclose(values, [0.25, 0, 2.0, 0], atol=1e-12)
+    np.testing.assert_allclose(f[:, 0], [2 * axis, -2 * axis], atol=1e-12)
+
+
+@pytest.mark.parametrize("over", [0, SPEED, POSITION])
+def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
+    at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
+    action = hinge(PAIR, PAIR, Z, over=over, at=at, value=value)
+    x0 = drawn([action])[0]
+    for s in np.linspace(-2, 3, 21):
+        x = turned(x0, action, [(s if over == POSITION else 0.3) * Z, 0 * Z])
+        v = np.zeros_like(x)
+        v[0] = np.cross((s if over == SPEED else 0.1) * Z, x[0])
+        got = found(action, x, v, t=s if not over else 9.0)[1][2]
+        assert got == pytest.approx(np.interp(s, at, value), abs=1e-12)
+
+
+def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
+    every = [hinge(PAIR, PAIR, Z, **LAWS), Action("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])), 2.0),
+             hinge(ANGLE, PAIR, Z, at=(0.0, 1.0), value=(1.0, 2.0))]  # fmt: skip
+    x0, t = drawn(every), np.linspace(0, 2, 9)
+    x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
+                  for s in t])  # fmt: skip
+    values, before = np.zeros((9, 3, 4)), np.zeros(3)
+    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), values)
+    q = np.zeros(3)
+    for k in range(9):
+        for i, action in enumerate(every):
+            np.testing.assert_allclose(
+                values[k, i], found(action, x[k, i], t=t[k], before=q[i])[1], atol=1e-12
+            )
+        q = values[k, :, 0]
+    np.testing.assert_allclose(values[:, 0, 0], 3 * t, atol=1e-12)
+    np.testing.assert_array_equal(before, values[-1, :, 0])
+
+
+# -- on links -----------------------------------------------------------------------------------------------
+
+BAR = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.04, "thickness": 0.02}
+PLATE = {
+    "kind": "plate_link",
+    "between": [[0, 0], [1, 0]],
+    "width": 0.04,
+    "thickness": 0.02,
+    "bore_diameter": 0.02,
+}
+KINDS: dict[str, dict[str, Any]] = {
+    "solid": {"shape": PLATE, "mesh": {"size": 0.02}},
+    "face": {"shape": BAR, "mesh": {"elements": [8, 2, 1]}},
+    "plane": {"fidelity": "plane", "shape": PLATE, "mesh": {"size": 0.02}},
+    "edge": {"fidelity": "plane", "shape": BAR},
+    "beam": {"fidelity": "beam", "shape": BAR, "mesh": {"elements": 3}},
+    "spatial": {"fidelity": "beam", "beam": "spatial", "shape": BAR, "mesh": {"elements": 3}},
+    "rigid": {"fidelity": "rigid", "shape": PLATE},
+    "rigid beam": {"fidelity": "rigid", "shape": {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.04,
+                                                  "thickness": 0.02}},
+}  # fmt: skip
+
+
+def arm(kind: str, **more: Any) -> dict[str, Any]:
+    return {
+        "links": {"arm": {"material": "steel", **KINDS[kind]}},
+        "joints": {"A": {"kind": "revolute", "links": ["arm", "ground"], "at": [0, 0], "axis": [0, 0, -1]}},
+        "motors": {"m": {"joint": "A", "torque": 2.5}},
+        "analysis": {"end_time": 1.0, "step": 0.01},
+        **more,
+    }
+
+
+def built(raw: dict[str, Any]) -> tuple[Scene, Model]:
+    scene = scene_from(raw)
+    return scene, elastic_model(scene, linkage(scene))
+
+
+def state_of(action: Action, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]) -> np.ndarray:
+    """Vectors (2, 2, 3) of an action's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
+    x = drawn([action])[0]
+    for e, at in enumerate(action.ends):
+        if at.k >= 0:
+            u = motion(at.k, model.links[at.k].X)
+            x[e, : len(at.X), : u.shape[1]] += (at.weights @ u) * np.array(at.mask)[: u.shape[1]]
+    return x
+
+
+def turning(model: Model, theta: np.ndarray) -> Callable[[int, np.ndarray], np.ndarray]:
+    """All links turned about the origin by a rotation vector, as displacements of their functions."""
+
+    def motion(k: int, X: np.ndarray) -> np.ndarray:
+        link = model.links[k]
+        u = Rotation.from_rotvec(theta).apply(np.array(X)) - X
+        if link.kind == "beam":
+            u[:, 2] = theta[2] * link.one
+        return u[:, : link.d]
+
+    return motion
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("angle", [0.5, -2.2])
+def test_every_kind_of_link_shows_its_turn_and_takes_the_torque(kind: str, angle: float) -> None:
+    """Angles count about the joint's axis, here −z, of the link named first against the ground."""
+    scene, model = built(arm(kind))
+    (action,) = actions(scene, model)
+    (looked,) = hinges(scene, model)
+    link = model.links[0]
+    x = state_of(action, model, turning(model, angle * Z))
+    f, values = found(action, x)
+    assert values[0] == pytest.approx(-angle, abs=1e-9)
+    assert found(looked, x)[1][0] == pytest.approx(-angle, abs=1e-9)
+    mask = np.array(action.ends[0].mask)[: link.d]
+    forces = np.einsum("mn,mc->nc", action.ends[0].weights, (f[0, : len(action.ends[0].X), : link.d] * mask))
+    spin = 1e-6
+    u = turning(model, (angle + spin) * Z)(0, link.X) - turning(model, (angle - spin) * Z)(0, link.X)
+    assert np.vdot(forces, u) / (2 * spin) == pytest.approx(-2.5, rel=1e-6)  # about z
+    push = np.outer(link.one, np.ones(link.d))[:, : 2 if link.planar else 3]
+    assert np.abs(np.einsum("nc,nc->c", forces[:, : push.shape[1]], push)).max() < 1e-9  # no net force
+
+
+def spring(link: str, at: list[float], to: list[float], **more: Any) -> dict[str, Any]:
+    return {
+        "kind": "spring",
+        "between": [{"link": link, "at": at}, {"link": "ground", "at": to}],
+        "stiffness": 10,
+        **more,
+    }
+
+
+def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
+    springs = {
+        "tip": spring("arm", [1, 0], [1, 2]),
+        "shoe": spring("shoe", [1.5, 0.1], [3.5, 0.1], free_length=0),
+    }
+    raw = arm("beam", springs=springs)
+    raw["links"]["shoe"] = {"fidelity": "rigid", "mass": 1}
+    raw["joints"]["B"] = {"kind": "revolute", "links": ["arm", "shoe"], "at": [1, 0]}
+    raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [1, 0], "axis": "x"}
+    raw["motors"]["push"] = {"joint": "S", "force": 4}
+    scene, model = built(raw)
+    motor, push, tip, shoe = actions(scene, model)
+    assert [x.name for x in (motor, push, tip, shoe)] == [
+        "motors/m",
+        "motors/push",
+        "springs/tip",
+        "springs/shoe",
+    ]
+    assert (tip.free, shoe.free) == (2.0, 0.0)
+    x = state_of(tip, model, lambda k, X: np.array([[0.0, 0.5, 9.0]] * len(X)))
+    np.testing.assert_allclose(found(tip, x)[1][0], 1.5)
+    # shorter than free, it pushes down; and never by a moment on ψ
+    np.testing.assert_allclose(found(tip, x)[0][0, 0], [0, -5, 0])
+    moved = state_of(push, model, lambda k, X: np.array([[-0.2, 0.0, 9.0]] * len(X)))
+    np.testing.assert_allclose(found(push, moved)[1][[0, 2]], [-0.2, 4])
+    np.testing.assert_allclose(shoe.ends[0].X + shoe.ends[0].offset, [[1.5, 0.1, 0]])
+
+
+def test_the_nearest_of_several_segments_bears_an_end() -> None:
+    """Segments are links of one name."""
+    scene, model = built(arm("beam", springs={"tip": spring("arm", [1, 0], [1, 2])}))
+    far = replace(model.links[0], X=model.links[0].X + np.array([5.0, 0.0, 0.0]))
+    several = replace(model, links=(far, model.links[0]), bodies=(1, 1))
+    assert [x.ends[0].k for x in actions(scene, several)] == [1, 1]
+    assert [x.ends[0].k for x in actions(scene, several, lambda name, point: 1)] == [1, 1]
+
+
+def test_ends_must_be_on_their_links() -> None:
+    scene, model = built(arm("beam", springs={"tip": spring("arm", [1, 0.01], [1, 2])}))
+    with pytest.raises(
+        SceneError, match=r"springs\.tip\.between\[0\]\.at: must lie on the axis of beam 'arm'"
+    ):
+        actions(scene, model)
+    scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
+    with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
+        actions(scene, model)
+
+
+# -- recorded -----------------------------------------------------------------------------------------------
+
+
+def blocks(model: Model, t: np.ndarray, angle: np.ndarray, length: int) -> list[Block]:
+    """An arm that turns about the origin by an angle over time, nominally at rest, block by block."""
+    link, out = model.links[0], []
+    rate = np.gradient(angle, t)
+    for k in range(0, len(t), length):
+        here = range(k, min(k + length, len(t)))
+        u = np.array([turning(model, angle[i] * Z)(0, link.X) for i in here])
+        x = u + link.X[:, : link.d] if link.kind != "beam" else u + link.X * [1.0, 1.0, 0.0]
+        v = np.zeros_like(u)
+        v[..., 0], v[..., 1] = -rate[here, None] * x[..., 1], rate[here, None] * x[..., 0]
+        if link.kind == "beam":
+            v[..., 2] = rate[here, None] * link.one
+        none, R = np.zeros((len(u), 0)), np.tile(np.eye(link.d), (len(u), 1, 1))
+        history = LinkHistory(u, v, 0 * u, 0 * u, R, 0 * u, none, np.zeros(len(u)))
+        out.append(Block(k, resting(2, t[here]), [history]))
+    return out
+
+
+@pytest.mark.parametrize("kind", ["beam", "plane", "solid"])
+@pytest.mark.parametrize("length", [1, 7, 100])
+def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> None:
+    """Over a turn, in blocks; the joint's axis is −z, a motor over speed, a spring from the tip to the ground."""
+    motor = {"joint": "A", "torque": {"over": "speed", "at": [-20, 20], "value": [10, -10]}}
+    torsion = {"kind": "torsion", "joint": "A", "stiffness": 2, "damping": 0.5, "free_angle": 1}
+    tip = [1, 0] if kind == "beam" else [0.98, 0]
+    raw = arm(kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)})
+    scene, model = built(raw)
+    t = np.linspace(0, 2, 61)
+    angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
+    recorded = recording(scene, model)
+    assert not any(each.channel.name.startswith("drive") for each in recorded)
+    parts = [rows([x for x in recorded if x.channel.name.split("/")[0] in ("motors", "springs") or "angle" in x.channel.name], b)
+             for b in blocks(model, t, angle, length)]  # fmt: skip
+    got = {name: np.concatenate([part[name][:, 0] for part in parts]) for name in parts[0]}
+    rate = np.gradient(angle, t)
+    place = np.linalg.norm(tip) * np.array([np.cos(angle), np.sin(angle)])
+    length_now = np.hypot(place[0], place[1] - 2)
+    stretch = rate * (place[0] * (place[1] - 2) - place[1] * place[0]) / length_now
+    pull = 10 * (length_now - np.hypot(tip[0], 2)) + 3 * stretch
+    expected = {
+        "motors/m/angle": -angle, "motors/m/speed": -rate, "motors/m/torque": np.interp(-rate, [-20, 20], [10, -10]),
+        "springs/t/angle": -angle, "springs/t/torque": -2 * (-angle - 1) + 0.5 * rate,
+        "springs/s/length": length_now, "springs/s/force": pull, "joints/A/angle": -angle,
+    }  # fmt: skip
+    assert list(got) == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_allclose(got[name], values, atol=1e-8, err_msg=name)
+    again = rows(
+        recorded[:0] + [x for x in recorded if x.channel.name == "joints/A/angle"],
+        blocks(model, t, angle, 5)[0],
+    )
+    np.testing.assert_allclose(
+        again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9
+    )  # a new run counts from zero
