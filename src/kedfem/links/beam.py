@@ -30,6 +30,12 @@ def parent_nodes(nodes: int) -> Float[np.ndarray, " m"]:
     return out
 
 
+def parent_weights(nodes: int) -> Float[np.ndarray, " m"]:
+    """Lobatto's weights, with which values at the nodes are integrated over [-1, 1]."""
+    last = np.polynomial.legendre.Legendre.basis(nodes - 1)
+    return np.asarray(2 / (nodes * (nodes - 1) * last(parent_nodes(nodes)) ** 2))
+
+
 @cache
 def _by_legendre(nodes: int) -> Float[np.ndarray, "2 m m"]:
     """Coefficients of N_a and of dN_a/dr by Legendre's polynomials, a column for each function."""

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import assembled, cell_type, line_axes, parent_nodes, shape_functions
+from kedfem.links.beam import assembled, cell_type, line_axes, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beam_axis import Axis
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.links.section import Section
@@ -100,9 +100,8 @@ def space_stiffness(
         rows, det_J = space_strains(x, float(r))
         B = rows.reshape(6, -1)
         K += w * det_J * (B.T * rigidity) @ B
-    for a, parent in enumerate(parent_nodes(m)):
+    for a, (parent, weight) in enumerate(zip(parent_nodes(m), parent_weights(m), strict=True)):
         _, dN = shape_functions(parent, m)
-        weight = 2 / (m * (m - 1) * np.polynomial.legendre.legval(parent, np.eye(m)[-1]) ** 2)  # Lobatto's
         S = section_strains(x[a]).reshape(3, 9)
         here = slice(9 * a, 9 * a + 9)
         K[here, here] += weight * np.linalg.norm(dN @ x[:, 0]) * rigidity[0] * S.T @ S
