@@ -27,6 +27,7 @@ ELEMENTS = {
     "quad9": "quad9",
     "line3": "beam3",
     "line": "beam2",
+    **{f"line{nodes}": f"beam{nodes}" for nodes in (4, 5, 7, 9)},
 }
 STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))

@@ -1,4 +1,6 @@
-"""Planar isoparametric beams with 2 or 3 nodes: [KED, eqs. (21)(22)], reduced integration against shear locking."""
+"""Planar isoparametric beams: [KED, eqs. (21)(22)], m nodes, m − 1 Gauss points: no shear locking."""
+
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +13,59 @@ from kedfem.scene import Material
 CELL_TYPES = {2: "line", 3: "line3"}
 
 
+def cell_type(nodes: int) -> str:
+    """meshio's name of a line element, or one like it where meshio has none."""
+    return CELL_TYPES.get(nodes, f"line{nodes}")
+
+
+@cache
+def parent_nodes(nodes: int) -> Float[np.ndarray, " m"]:
+    """Where the nodes of a line element are on [-1, 1]: ends first, those within in order; Lobatto's points.
+
+    There the interpolation of any number of nodes is well conditioned; up to 3 they are equally spaced.
+    """
+    within = np.polynomial.legendre.Legendre.basis(nodes - 1).deriv().roots()
+    out = np.array([-1.0, 1.0, *(within - within[::-1]) / 2])  # symmetric to the last digit
+    read_only(out)
+    return out
+
+
+def parent_weights(nodes: int) -> Float[np.ndarray, " m"]:
+    """Lobatto's weights, with which values at the nodes are integrated over [-1, 1]."""
+    last = np.polynomial.legendre.Legendre.basis(nodes - 1)
+    return np.asarray(2 / (nodes * (nodes - 1) * last(parent_nodes(nodes)) ** 2))
+
+
+@cache
+def _by_legendre(nodes: int) -> Float[np.ndarray, "2 m m"]:
+    """Coefficients of N_a and of dN_a/dr by Legendre's polynomials, a column for each function."""
+    values = np.linalg.inv(np.polynomial.legendre.legvander(parent_nodes(nodes), nodes - 1))
+    slopes = np.zeros_like(values)
+    slopes[:-1] = np.polynomial.legendre.legder(values)
+    return np.stack([values, slopes])
+
+
 def shape_functions(r: float, nodes: int) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """N_a(r) and dN_a/dr of a line element on [-1, 1], ends first."""
-    if nodes == 2:
-        return np.array([1 - r, 1 + r]) / 2, np.array([-0.5, 0.5])
-    return np.array([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r]), np.array([r - 0.5, r + 0.5, -2 * r])
+    N, dN = np.polynomial.legendre.legvander(np.array([r]), nodes - 1)[0] @ _by_legendre(nodes)
+    return N, dN
+
+
+def spaced(elements: int, nodes: int) -> Float[np.ndarray, " n"]:
+    """Places of the nodes of elements in a row, each of length one."""
+    within = (1 + np.sort(parent_nodes(nodes))[:-1]) / 2
+    return np.append((np.arange(elements)[:, None] + within).ravel(), elements)
+
+
+def line_cells(first: Int[np.ndarray, " e"], nodes: int) -> Int[np.ndarray, "e m"]:
+    """Elements from the numbers of their first nodes: ends first."""
+    return np.asarray(first[:, None] + np.array([0, nodes - 1, *range(1, nodes - 1)]))
+
+
+def line_pairs(cells: Int[np.ndarray, "e m"]) -> Int[np.ndarray, "p 2"]:
+    """Neighbouring nodes of line elements: how elements of many nodes are drawn."""
+    in_order = cells[:, [0, *range(2, cells.shape[1]), 1]]
+    return np.stack([in_order[:, :-1].ravel(), in_order[:, 1:].ravel()], axis=1)
 
 
 def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray, "3 k"], float]:
@@ -90,18 +140,15 @@ def beam_mesh(
     ----------
     points : (p, 3) corners [m]
     elements : per segment
-    nodes : per element, 2 or 3
+    nodes : per element
 
     Returns
     -------
     (n, 3) and (e, nodes), ends first
     """
-    per_segment = elements * (nodes - 1)
-    s = np.arange((len(points) - 1) * per_segment + 1) / per_segment
+    s = spaced((len(points) - 1) * elements, nodes) / elements
     X = np.stack([np.interp(s, np.arange(len(points)), points[:, k]) for k in range(3)], axis=1)
-    first = np.arange(0, len(X) - 1, nodes - 1)
-    columns = [first, first + nodes - 1] + ([first + 1] if nodes == 3 else [])
-    return X, np.stack(columns, axis=1)
+    return X, line_cells(np.arange(0, len(X) - 1, nodes - 1), nodes)
 
 
 def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, material: Material,
@@ -112,7 +159,7 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     ----------
     points : (p, 3) corners of its axis in the reference position [m]
     elements : per straight segment
-    nodes : per element, 2 or 3
+    nodes : per element
     """
     X, cells = beam_mesh(points, elements, nodes)
     E, G = material.youngs_modulus, material.shear_modulus
@@ -127,7 +174,7 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     m1, mX = mass_constants(mass, one, X * [1, 1, 0])
     read_only(X, one, cells, m1, mX)
     return Link(
-        name=name, kind="beam", X=X, one=one, cells=cells, cell_type=CELL_TYPES[nodes],
+        name=name, kind="beam", X=X, one=one, cells=cells, cell_type=cell_type(nodes),
         axes=line_axes(points[0], points[-1]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=E, lame=material.lame(), section=section,
     )  # fmt: skip

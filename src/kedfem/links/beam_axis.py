@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.links.beam import line_axes
+from kedfem.links.beam import line_axes, line_cells, spaced
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ def straight_axis(
     Parameters
     ----------
     elements : per segment
-    nodes : per element, 2 or 3
+    nodes : per element
     up : the section's z is as near to it as can be; as `line_axes` chooses if None
     """
     steps = elements * (nodes - 1)
-    along = np.linspace(0.0, 1.0, steps + 1)[:, None]
+    along = spaced(elements, nodes)[:, None] / elements
     segments = []
     for P, Q in pairwise(points):
         frame = np.empty((steps + 1, 4, 3))
@@ -48,7 +48,7 @@ def straight_axis(
     node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
     first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
     return Axis(
-        np.concatenate(segments), node, _cells(first, nodes), np.arange(count * steps + 1) % steps == 0
+        np.concatenate(segments), node, line_cells(first, nodes), np.arange(count * steps + 1) % steps == 0
     )
 
 
@@ -60,7 +60,7 @@ def smooth_axis(
     Parameters
     ----------
     elements : between neighbouring points
-    nodes : per element, 2 or 3
+    nodes : per element
     up : the section's z at the first point is as near to it as can be
     """
     chord = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
@@ -69,7 +69,7 @@ def smooth_axis(
     curve = CubicSpline(chord, points)
     steps = elements * (nodes - 1)
     number = np.arange((len(points) - 1) * steps + 1)
-    s = np.interp(number / steps, np.arange(len(points)), chord)
+    s = np.interp(spaced((len(points) - 1) * elements, nodes) / elements, np.arange(len(points)), chord)
     frame = np.empty((len(s), 4, 3))
     frame[:, 0] = curve(s)
     tangent = curve(s, 1)
@@ -78,7 +78,7 @@ def smooth_axis(
     for k in range(1, len(s)):
         frame[k, 2] = carried(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
         frame[k, 3] = np.cross(frame[k, 1], frame[k, 2])
-    return Axis(frame, number, _cells(number[: -1 : nodes - 1], nodes), number % steps == 0)
+    return Axis(frame, number, line_cells(number[: -1 : nodes - 1], nodes), number % steps == 0)
 
 
 def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
@@ -98,8 +98,3 @@ def carried(
     turned = v - (v @ after) / (1 + before @ after) * (before + after)
     turned -= (turned @ after) * after
     return np.asarray(turned / np.linalg.norm(turned))
-
-
-def _cells(first: Int[np.ndarray, " e"], nodes: int) -> Int[np.ndarray, "e m"]:
-    columns = [first, first + nodes - 1] + ([first + 1] if nodes == 3 else [])
-    return np.stack(columns, axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import shape_functions, strain_rows
+from kedfem.links.beam import parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 
 THROUGH = 4  # Gauss points of a probe
@@ -91,10 +91,9 @@ def straight_run(link: Link, element: int, kinks: Points) -> Int[np.ndarray, " e
 def beam_fibre(link: Link, offset: float) -> sp.csr_array:
     """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
     nodes = link.cells.shape[1]
-    parent = [-1.0, 1.0, 0.0][:nodes]
     total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
     for e, cell in enumerate(link.cells):
-        for a, r in zip(cell, parent, strict=True):
+        for a, r in zip(cell, parent_nodes(nodes), strict=True):
             total[a] += fibre_row(link, e, r, offset)
             count[a] += 1
     return sp.csr_array(total / count[:, None])

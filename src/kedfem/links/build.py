@@ -119,9 +119,8 @@ def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
     points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
-    nodes = 3 if link.element == "beam3" else 2
     if not spatial:
-        return beam_link(name, points, section, material, elements, nodes)
+        return beam_link(name, points, section, material, elements, beam_nodes(link))
     return spatial_beam_link(name, _axis(link), section, material)
 
 
@@ -134,7 +133,12 @@ def _axis(link: LinkScene) -> Axis:
     points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
     make = smooth_axis if smooth else straight_axis
-    return make(points, elements, 3 if link.element == "beam3" else 2, None if up is None else np.array(up))
+    return make(points, elements, beam_nodes(link), None if up is None else np.array(up))
+
+
+def beam_nodes(link: LinkScene) -> int:
+    """Nodes of each element of a beam: the number in its name."""
+    return int(str(link.element).removeprefix("beam"))
 
 
 def _of_bar(bar: Bar) -> RectangleSection:

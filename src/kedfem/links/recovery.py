@@ -12,7 +12,7 @@ import skfem
 from jaxtyping import Float, Int
 
 from kedfem.errors import SceneError
-from kedfem.links.beam import shape_functions
+from kedfem.links.beam import line_pairs, shape_functions
 from kedfem.links.beam_recovery import beam_fibre, fibre_row, nearest_on_beam
 from kedfem.links.record import Link
 from kedfem.links.spatial_recovery import (
@@ -157,7 +157,9 @@ def stress_recovery(link: Link) -> StressRecovery:
         return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
     fibres = (beam_fibre(link, half), beam_fibre(link, -half))
-    return StressRecovery(link, fibres, link.cells, link.cell_type)
+    if link.cells.shape[1] <= 3:
+        return StressRecovery(link, fibres, link.cells, link.cell_type)
+    return StressRecovery(link, fibres, line_pairs(link.cells), "line")
 
 
 def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p 6"]:

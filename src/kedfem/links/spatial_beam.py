@@ -9,13 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import CELL_TYPES, assembled, line_axes, shape_functions
+from kedfem.links.beam import assembled, cell_type, line_axes, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beam_axis import Axis
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.links.section import Section
 from kedfem.scene import Material
 
-LOBATTO = {2: np.array([1.0, 1.0]), 3: np.array([1.0, 1.0, 4.0]) / 3}  # weights at the nodes, ends first
 HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
 HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
 
@@ -101,11 +100,11 @@ def space_stiffness(
         rows, det_J = space_strains(x, float(r))
         B = rows.reshape(6, -1)
         K += w * det_J * (B.T * rigidity) @ B
-    for a, parent in enumerate([-1.0, 1.0, 0.0][:m]):
+    for a, (parent, weight) in enumerate(zip(parent_nodes(m), parent_weights(m), strict=True)):
         _, dN = shape_functions(parent, m)
         S = section_strains(x[a]).reshape(3, 9)
         here = slice(9 * a, 9 * a + 9)
-        K[here, here] += LOBATTO[m][a] * np.linalg.norm(dN @ x[:, 0]) * rigidity[0] * S.T @ S
+        K[here, here] += weight * np.linalg.norm(dN @ x[:, 0]) * rigidity[0] * S.T @ S
     return K
 
 
@@ -147,7 +146,7 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
     m1, mX = mass_constants(mass, one, X)
     read_only(X, one, cells, m1, mX)
     return Link(
-        name=name, kind="spatial_beam", X=X, one=one, cells=cells, cell_type=CELL_TYPES[cells.shape[1]],
+        name=name, kind="spatial_beam", X=X, one=one, cells=cells, cell_type=cell_type(cells.shape[1]),
         axes=line_axes(x[0, 0], x[-1, 0]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=material.youngs_modulus, lame=material.lame(), section=section, triples=triples,
     )  # fmt: skip

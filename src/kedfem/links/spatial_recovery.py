@@ -4,12 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import shape_functions
+from kedfem.links.beam import line_pairs, parent_nodes, shape_functions
 from kedfem.links.record import Link
 from kedfem.links.section import Section, outline, torsion_stress
 from kedfem.links.spatial_beam import space_strains
-
-PARENT = (-1.0, 1.0, 0.0)  # of an element's nodes
 
 
 def element_frame(link: Link, element: int) -> Float[np.ndarray, "m 3 3"]:
@@ -84,16 +82,12 @@ def drawn(link: Link) -> tuple[sp.csr_array, tuple[sp.csr_array, ...], Int[np.nd
     values = np.zeros((stations, len(points), link.n))
     stress = np.zeros((3, stations, len(points), 3 * link.n))
     for e, cell in enumerate(link.cells):
-        for s, r in zip(cell, PARENT[: len(cell)], strict=True):
+        for s, r in zip(cell, parent_nodes(len(cell)), strict=True):
             strains = beam_strains(link, e, r)
             for k, (y, z) in enumerate(points):
                 values[s, k] = section_value(link, e, r, y, z)
                 stress[:, s, k] += section_stress(link, strains, y, z) / count[s]
-    pairs = (
-        link.cells
-        if link.cells.shape[1] == 2
-        else np.concatenate([link.cells[:, [0, 2]], link.cells[:, [2, 1]]])
-    )
+    pairs = line_pairs(link.cells)
     corners = pairs[:, None, :, None] * len(points) + quads[None, :, None, :]
     matrices = tuple(sp.csr_array(rows.reshape(-1, 3 * link.n)) for rows in stress)
     return sp.csr_array(values.reshape(-1, link.n)), matrices, corners.reshape(-1, 8)

@@ -9,16 +9,15 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.links.beam import assembled, shape_functions
+from kedfem.links.beam import assembled, parent_nodes, parent_weights, shape_functions
 from kedfem.links.record import Link
 from kedfem.links.spatial_beam import (
     HUB_STIFFNESS,
-    LOBATTO,
     hub_functions,
     section_strains,
     space_strains,
 )
-from kedfem.links.spatial_recovery import PARENT, section_of
+from kedfem.links.spatial_recovery import section_of
 
 T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
@@ -72,9 +71,9 @@ def _element(
         c[N2_S, N2_S] += E * I_z * strain[0]
         flat = fields.reshape(5, -1)
         out += w * det_J * flat.T @ c @ flat
-    for a, parent in enumerate(PARENT[:m]):
+    for a, (parent, weight) in enumerate(zip(parent_nodes(m), parent_weights(m), strict=True)):
         det_J = float(np.linalg.norm(shape_functions(parent, m)[1] @ x[:, 0]))
-        s = E * A * LOBATTO[m][a] * det_J * np.einsum("ifc,fc->i", section_strains(x[a]), u[a])
+        s = E * A * weight * det_J * np.einsum("ifc,fc->i", section_strains(x[a]), u[a])
         p, q = 3 * a + 1, 3 * a + 2
         out[p, p] += s[0]
         out[p, q] += s[1] / 2
