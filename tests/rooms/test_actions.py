@@ -413,8 +413,9 @@ def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> N
     angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
     recorded = recording(scene, model)
     assert not any(each.channel.name.startswith("drive") for each in recorded)
-    parts = [rows([x for x in recorded if x.channel.name.split("/")[0] in ("motors", "springs") or "angle" in x.channel.name], b)
-             for b in blocks(model, t, angle, length)]  # fmt: skip
+    sections = ("motors", "springs")
+    wanted = [x for x in recorded if x.channel.name.split("/")[0] in sections or "angle" in x.channel.name]
+    parts = [rows(wanted, block) for block in blocks(model, t, angle, length)]
     got = {name: np.concatenate([part[name][:, 0] for part in parts]) for name in parts[0]}
     rate = np.gradient(angle, t)
     place = np.linalg.norm(tip) * np.array([np.cos(angle), np.sin(angle)])
@@ -429,10 +430,5 @@ def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> N
     assert list(got) == list(expected)
     for name, values in expected.items():
         np.testing.assert_allclose(got[name], values, atol=1e-8, err_msg=name)
-    again = rows(
-        recorded[:0] + [x for x in recorded if x.channel.name == "joints/A/angle"],
-        blocks(model, t, angle, 5)[0],
-    )
-    np.testing.assert_allclose(
-        again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9
-    )  # a new run counts from zero
+    again = rows(wanted, blocks(model, t, angle, 5)[0])  # a new run counts from zero
+    np.testing.assert_allclose(again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9)
