@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.accuracy.geometric import GeometricError, geometric_warning
 from kedfem.accuracy.histories import worst
 from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
@@ -19,21 +20,18 @@ from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
-from kedfem.links.record import in_space
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, following, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
-SMALL_DEFLECTION = (
-    0.01  # of a link's length: above, the linear equation is off by several percent (docs/theory.md)
-)
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
 T = TypeVar("T")
@@ -54,7 +52,11 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run leaves: results, files, the highest stress, seconds per stage, warnings for the user, choices made."""
+    """What a run leaves: results, files, highest stress, seconds per stage, warnings for the user, choices made.
+
+    balance : of energy and momentum, as far as it was kept account of
+    geometric : estimated error of the peak stress because links bend [-]
+    """
 
     folder: FilePath
     results: Results
@@ -63,6 +65,8 @@ class Run:
     warnings: tuple[str, ...] = ()
     reduction: Reduction | None = None
     plan: Plan | None = None
+    balance: Balance | None = None
+    geometric: float = 0.0
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -84,23 +88,27 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
-    recorded = clock.timed("probes", lambda: recording(scene, ready.model))
+    account = Account(ready.model)
+    recorded = clock.timed("probes", lambda: recording(scene, ready.model, account))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
-    peak, deflection, error = clock.timed(
+    peak, geometric, error = clock.timed(
         "steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch)
     )
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
         *stability_warning(scene),
-        *(() if following(scene) else deflection_warning(deflection)),
+        *(() if following(scene) else geometric_warning(geometric)),
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
+        *balance_warning(account.balance),
         *warnings,
     )
-    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan)
+    return Run(
+        folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, geometric.estimate
+    )
 
 
 @dataclass
@@ -141,16 +149,6 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
 
 
-def deflection_warning(deflection: float) -> tuple[str, ...]:
-    """A warning where links bend so much that the linear equation with nominal frames is far from the truth."""
-    if deflection < SMALL_DEFLECTION:
-        return ()
-    return (
-        f"links deflect by up to {100 * deflection:.2g} % of their length; equation (20) takes that as small: "
-        f"expect the results to be trustworthy below {100 * SMALL_DEFLECTION:.0f} % only",
-    )
-
-
 def plan_warning(plan: Plan | None) -> tuple[str, ...]:
     """A warning where the accuracy asked for is not expected."""
     return () if plan is None or plan.reached else plan.notes[-1:]
@@ -173,13 +171,13 @@ def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
 
 
 def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
-             folder: FilePath, watch: Watch) -> tuple[Peak | None, float, float]:  # fmt: skip
-    """All time steps: rows to the results file, frames to the animation; also largest deflection and error of a step."""
+             folder: FilePath, watch: Watch) -> tuple[Peak | None, GeometricError, float]:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation; also geometric error and error of a step."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
-    deflection, errors = 0.0, step_error(ready)
+    geometric, errors = GeometricError(model), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     with ResultsWriter(
@@ -191,7 +189,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
         try:
             for block in transient(scene, ready.linkage, ready.path, model, solver):
                 table.add(block, rows(recorded, block))
-                deflection = max(deflection, _deflection(model, block))
+                geometric.add(block)
                 errors.add(block)
                 for k in range(len(block)):
                     if block.step + k in wanted:
@@ -199,7 +197,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
-    return peak, deflection, errors.relative
+    return peak, geometric, errors.relative
 
 
 @dataclass
@@ -253,17 +251,6 @@ def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: Animation
     if peak is not None and stress <= peak.stress:
         return peak
     return Peak(stress, highest.name, snapshot.t, snapshot.phi, file)
-
-
-def _deflection(model: Model, block: Block) -> float:
-    """Largest component of the displacement of any link, of the link's size [-]; of a reduced one at a few moments."""
-    worst = 0.0
-    for link, history in zip(model.links, block.links, strict=True):
-        shown = link.full or link
-        u = history.u if link.Q is None else link.Q @ history.u[:: max(1, len(block) // 4)]
-        moved = in_space(shown, u)[..., shown.one != 0, :]
-        worst = max(worst, float(np.abs(moved).max()) / link.size)
-    return worst
 
 
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from kedfem.links.record import Link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.path import Path
+from kedfem.results.audit import Balance
 from kedfem.scene import LineSpring, LinkScene, Motor, Scene, Spring, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
@@ -68,10 +69,25 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         at = moment(scene, p.time, p.angle)
         table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), at)
         table.caption = "links: the highest stress of all animation frames"
+    balance = [] if done.balance is None else [balance_table(done.balance, done.geometric)]
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    return [*before, table, spent]
+    return [*before, table, *balance, spent]
+
+
+def balance_table(found: Balance, geometric: float) -> Table:
+    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
+    table = Table(title="Balance and geometric error", show_header=False)
+    for what, share in (
+        ("energy left over by the steps", found.energy),
+        ("momentum", found.linear),
+        ("angular momentum", found.angular),
+    ):
+        table.add_row(what, f"{_percent(share)} of the largest exchanged")
+    table.add_row("work that nominal frames neglect", f"{_percent(found.neglected)} of it")
+    table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
+    return table
 
 
 def moment(scene: Scene, time: float, angle: float) -> str:

@@ -20,6 +20,7 @@ MODULES = (
     "spatial_beams",
     "histories",
     "rotation",
+    "stiffening",
     "kinematics",
     "mechanisms",
 )

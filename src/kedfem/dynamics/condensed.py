@@ -45,6 +45,10 @@ class Substructure:
     S: Float[np.ndarray, "c c"]
     anchors: Int[np.ndarray, " e"]
 
+    def seen(self, y: Nodal) -> Float[np.ndarray, " c"]:
+        """Cᵀ y: values at ports and anchors."""
+        return np.concatenate([port_values(self.attachment, y), y.ravel()[self.anchors]])
+
 
 def substructure(
     attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
@@ -90,14 +94,20 @@ def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q
     return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
 
 
+def turned_vectors(
+    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T p d"]:
+    """R λ over time, a row per port in world components, zero where a component is not held."""
+    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
+    vectors.reshape(len(force), -1)[:, attachment.keep] = force
+    return np.asarray(vectors @ R.transpose(0, 2, 1))
+
+
 def turned_ports(
     attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T q"]:
     """R λ over time: port forces of the link frame in world components."""
-    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
-    vectors.reshape(len(force), -1)[:, attachment.keep] = force
-    turned = vectors @ R.transpose(0, 2, 1)
-    return np.asarray(turned.reshape(len(force), -1)[:, attachment.keep])
+    return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
 
 
 def coupled(
@@ -117,7 +127,7 @@ def coupled(
     forces : per link (q,) λ on the link at its ports, link frame
     """
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
-    v = [_held(part, x) for part, x in zip(parts, y, strict=True)]
+    v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
     RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
     z = np.zeros(parts[0].attachment.B.shape[1])
     if len(z):
@@ -131,11 +141,6 @@ def coupled(
     forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
-
-
-def _held(part: Substructure, y: Nodal) -> Float[np.ndarray, " c"]:
-    """Cᵀ y: values at ports and anchors."""
-    return np.concatenate([port_values(part.attachment, y), y.ravel()[part.anchors]])
 
 
 def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:

@@ -3,19 +3,22 @@
 Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Bool, Float, Int
 
-from kedfem.errors import MeshError
+from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.motion.linkage import joint_axis, unit
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
+
+T = TypeVar("T")
 
 DEPENDENT = 1e-9  # relative: ports of one seat repeat each other to rounding, others differ by far more
 
@@ -44,6 +47,15 @@ class Attachment:
     B: Float[np.ndarray, "q k"]
     shares: tuple[Float[np.ndarray, "m _"], ...] = ()
     loose: Float[np.ndarray, "m r"] = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, slots=True)
+class SharedCut:
+    """Where two segments of a link meet: their keys, the points of the cut (k, 3) and each one's weights (k, n)."""
+
+    keys: tuple[str, str]
+    points: Float[np.ndarray, "k 3"]
+    weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]
 
 
 @dataclass
@@ -91,8 +103,12 @@ class _Ports:
         )
 
 
-def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
-    """All joints of a scene as attachments of its elastic links.
+def attachments(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut] = ()) -> dict[str, Attachment]:
+    """All joints of a scene, and cuts between segments, as attachments of its elastic links.
+
+    Parameters
+    ----------
+    links : elastic links, or their segments, by a key of each
 
     Raises
     ------
@@ -104,9 +120,10 @@ def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
     for name, joint in scene.joints.items():
-        held = [link for link in joint.links if link in links]
-        seats = {link: seat_of(scene, name, links[link]) for link in held}
-        others = [link for link in joint.links if link not in links]
+        elastic = {link.name for link in links.values()}
+        seats = dict(part_seat(scene, name, links, link) for link in joint.links if link in elastic)
+        held = list(seats)
+        others = [link for link in joint.links if link not in elastic]
         if len({links[link].planar for link in held}) == 2:
             unknowns += _mixed(scene, name, {link: (ports[link], seats[link]) for link in held}, unknowns)
             continue
@@ -118,6 +135,12 @@ def attachments(scene: Scene, links: dict[str, Link]) -> dict[str, Attachment]:
                 weights = port_weights(seats[link], point[None, :])[0]
                 ports[link].add(weights, point, name, components, first, block)
             unknowns += new
+    for cut in cuts:
+        for point, *weights in zip(cut.points, *cut.weights, strict=True):
+            for key, row in zip(cut.keys, weights, strict=True):
+                d = ports[key].link.d
+                ports[key].add(row, point, "", list(range(d)), unknowns, np.eye(d))
+            unknowns += d
     every = [ports[name].attachment(unknowns) for name in links]
     return dict(zip(links, independent(every), strict=True))
 
@@ -235,6 +258,33 @@ def seat_of(scene: Scene, name: str, link: Link) -> Seat:
     joint = scene.joints[name]
     axis = None if joint.axis is None or joint.kind == "prismatic" else unit(joint.axis)
     return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis)
+
+
+def on_part(
+    links: Mapping[str, Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
+) -> tuple[str, T]:
+    """The segment of a link that has something at a point, nearest first, and what was found on it.
+
+    Raises
+    ------
+    MeshError, SceneError
+        That of the nearest segment, if none has it.
+    """
+    parts = {key: link for key, link in links.items() if link.name == name}
+    gap = {key: float(np.linalg.norm(link.nodes - at, axis=1).min()) for key, link in parts.items()}
+    first: KedfemError | None = None
+    for key in sorted(parts, key=lambda key: gap[key]):
+        try:
+            return key, found(parts[key])
+        except (MeshError, SceneError) as error:
+            first = first or error
+    raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
+
+
+def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, Seat]:
+    """The segment of a link on which a joint sits, and the seat."""
+    at = np.asarray(scene.joints[joint].at)
+    return on_part(links, name, at, lambda link: seat_of(scene, joint, link))
 
 
 def port_points(

@@ -20,7 +20,7 @@ SMALL = 360  # unknowns of a link: up to here dense matrices beat a sparse facto
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
+class DensePart:
     """One link with its ports held, in mass-orthonormal coordinates x, component first: row c of δ is T[c] x[c].
 
     T : per component (n, n)
@@ -49,7 +49,7 @@ class DenseSteps:
             c_M, c_K, scheme.alpha_f, b[0], b[1], b[2] - scheme.alpha_m, c_f, *scheme.acceleration,
             scheme.h * scheme.gamma, scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, *(c_f * scheme.rate),
         ])  # fmt: skip
-        self.parts = [_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
+        self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
         self._sizes = (
             max(link.d for link in links), max(link.n for link in links), max(len(j.weights) for j in joints)
@@ -67,11 +67,11 @@ class DenseSteps:
             zip(self.links, self.joints, self.parts, states, strict=True)
         ):
             for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
-                out[i, : link.d, : link.n] = _coordinates(link, part, rows)
+                out[i, : link.d, : link.n] = coordinates(link, part, rows)
             for out, rows in ((F, s.F), (f, s.f)):
-                out[i, : link.d, : link.n] = _work(part, rows)
+                out[i, : link.d, : link.n] = work_on(part, rows)
             for k in range(3 if s.C is not None else 0):
-                C[k, i, : link.d, : link.n] = _work(part, s.C[k])  # type: ignore[index]
+                C[k, i, : link.d, : link.n] = work_on(part, s.C[k])  # type: ignore[index]
             R[i, : link.d, : link.d] = s.R
             forces[i] = self._ports_padded(joint, s.port_forces)
         return u, v, a, F, f, R, forces, C
@@ -90,8 +90,6 @@ class DenseSteps:
         -------
         histories per link, and the state at the end
         """
-        from kedfem.dynamics.kernel import advance_block
-
         D, n, P = self._sizes
         T, L = len(forcing[0].R), len(self.links)
         R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
@@ -102,12 +100,24 @@ class DenseSteps:
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
         forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
         history = (u, v, a, g, forces, strain)
-        advance_block(self.coefficients, self._matrices, *self._unknowns, (R, F), state, history)
+        self._loop(forcing, (R, F), state, history)
         return [self._history(i, each, history) for i, each in enumerate(forcing)], state
+
+    def _loop(
+        self,
+        forcing: Sequence[Forcing],
+        padded: tuple[np.ndarray, np.ndarray],
+        state: tuple[np.ndarray, ...],
+        history: tuple[np.ndarray, ...],
+    ) -> None:
+        """Advance the state and fill the history in place."""
+        from kedfem.dynamics.kernel import advance_block
+
+        advance_block(self.coefficients, self._matrices, *self._unknowns, padded, state, history)
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
         link, joint, part = self.links[i], self.joints[i], self.parts[i]
-        u, v, a, g = (_rows(link, part, x[:, i]) for x in history[:4])
+        u, v, a, g = (rows_of(link, part, x[:, i]) for x in history[:4])
         held = self._held(joint)
         return LinkHistory(u, v, a, g, forcing.R, forcing.F, history[4][:, i, held], history[5][:, i].copy())
 
@@ -149,28 +159,24 @@ def _known(B: Sequence[Float[np.ndarray, "_ k"]]) -> tuple[Int[np.ndarray, "L k"
     return columns, count
 
 
-def _part(link: Link, joint: Attachment, c_M: float, c_K: float) -> _Part:
+def dense_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> DensePart:
     """A link in mass-orthonormal coordinates; its ports are held by a null-space basis, so that a long step, where A
     nearly lets a free link go, does no harm."""
     T = tuple(_mass_orthonormal(_dense(m)) for m in link.mass)
     n, d = link.n, link.d
-    K = _dense(link.K0).reshape(n, d, n, d).transpose(1, 0, 3, 2)
-    K = np.concatenate(
-        [np.concatenate([T[i].T @ K[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)]
-    )
-    A = c_K * (K + K.T) / 2
+    A = c_K * _symmetric(component_first(T, link.K0))
     A[np.diag_indices(len(A))] += c_M
     W = port_columns(joint, n).T.reshape(-1, n, d).transpose(0, 2, 1)
     W = np.concatenate([W[:, c] @ T[c] for c in range(d)], axis=1)
     if not len(W):
-        return _Part(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W)
+        return DensePart(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W)
     V, L = scipy.linalg.qr(W.T)
     V1, Z = V[:, : len(W)], V[:, len(W) :]
     factor = scipy.linalg.cho_factor(_symmetric(Z.T @ A @ Z))
     G = Z @ scipy.linalg.cho_solve(factor, Z.T)
     moved = V1 @ np.linalg.inv(L[: len(W)]).T  # W moved = 1
     Y = moved - G @ (A @ moved)
-    return _Part(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W)
+    return DensePart(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W)
 
 
 def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
@@ -180,17 +186,28 @@ def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(m)).T)
 
 
-def _coordinates(link: Link, part: _Part, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+def component_first(
+    T: Sequence[Float[np.ndarray, "n n"]], K: Any
+) -> Float[np.ndarray, "N N"]:
+    """Tᵀ K T of a matrix on states, component by component."""
+    n, d = len(T[0]), len(T)
+    blocks = _dense(K).reshape(n, d, n, d).transpose(1, 0, 3, 2)
+    return np.concatenate(
+        [np.concatenate([T[i].T @ blocks[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)]
+    )
+
+
+def coordinates(link: Link, part: DensePart, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
     """x of a state: T⁻¹ = Tᵀ m."""
     return np.stack([part.T[c].T @ (link.mass[c] @ rows[:, c]) for c in range(link.d)])
 
 
-def _work(part: _Part, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+def work_on(part: DensePart, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
     """Nodal forces on x."""
     return np.stack([T.T @ rows[:, c] for c, T in enumerate(part.T)])
 
 
-def _rows(link: Link, part: _Part, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
+def rows_of(link: Link, part: DensePart, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
     """States of x over time."""
     return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=2)
 

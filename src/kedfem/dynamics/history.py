@@ -1,7 +1,7 @@
 """What the time integration hands on: all links over a block of time points."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,10 +16,34 @@ class Forcing:
 
     R : (T, d, d) orientation, link to world
     F : (T, n, d) P − M R0'', world components [N]
+    stress : (T, m) factors of the link's stress modes; None without stiffening
     """
 
     R: Float[np.ndarray, "T d d"]
     F: Float[np.ndarray, "T n d"]
+    stress: Float[np.ndarray, "T m"] | None = None
+
+    def at(self, k: int) -> Nominal:
+        """At the k-th of the times."""
+        return Nominal(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
+
+
+@dataclass(frozen=True, slots=True)
+class Products:
+    """Products with the state that a solver has at hand anyway; all (T, n, d).
+
+    Mv : M δ', world components [kg m/s]
+    Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping
+    """
+
+    Mv: Float[np.ndarray, "T n d"]
+    Kg: Float[np.ndarray, "T n d"]
+    Cg: Float[np.ndarray, "T n d"] | None
+
+    def part(self, first: int, end: int) -> "Products":
+        """The time points from one number up to another."""
+        Cg = None if self.Cg is None else self.Cg[first:end]
+        return Products(self.Mv[first:end], self.Kg[first:end], Cg)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +55,7 @@ class LinkHistory:
     R, F : as in `Forcing`
     port_forces : (T, q) λ on the link at its ports, link frame [N]
     strain : (T,) strain energy ½ gᵀ K0 g, [KED, eq. (13)] [J]
+    products : of a solver of large links; None where they are cheap to make
     """
 
     u: Float[np.ndarray, "T n d"]
@@ -41,10 +66,17 @@ class LinkHistory:
     F: Float[np.ndarray, "T n d"]
     port_forces: Float[np.ndarray, "T q"]
     strain: Float[np.ndarray, " T"]
+    products: Products | None = None
 
     def part(self, first: int, end: int) -> "LinkHistory":
         """The time points from one number up to another."""
-        return LinkHistory(*(getattr(self, field.name)[first:end] for field in fields(self)))
+        products = None if self.products is None else self.products.part(first, end)
+        return replace(self.every(slice(first, end)), products=products)
+
+    def every(self, which: slice) -> "LinkHistory":
+        """Some of the time points, without products."""
+        names = [each.name for each in fields(self) if each.name != "products"]
+        return LinkHistory(**{name: getattr(self, name)[which] for name in names})
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +116,11 @@ class Block:
         links = [each.part(first, end) for each in self.links]
         return Block(self.step + first, self.motion.part(first, end), links)
 
+    def every(self, stride: int) -> "Block":
+        """Some of its time points, the first and each so many further on; without products."""
+        which = slice(None, None, stride)
+        return Block(self.step, self.motion.at(which), [link.every(which) for link in self.links])
+
     def at(self, k: int) -> "Snapshot":
         """The k-th of its time points."""
         moments = [
@@ -116,9 +153,13 @@ class Snapshot:
 def history(states: Sequence[LinkState]) -> LinkHistory:
     """States of one link at successive time points, stacked."""
     stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "g", "R", "F")}
+    Cg = [s.C[0] for s in states if s.C is not None]
+    products = Products(
+        np.stack([s.Mv for s in states]), np.stack([s.Kg for s in states]), np.stack(Cg) if Cg else None
+    )
     return LinkHistory(
         **stacked, port_forces=np.stack([s.port_forces for s in states]),
-        strain=np.array([0.5 * float(np.vdot(s.g, s.Kg)) for s in states]),
+        strain=np.array([0.5 * float(np.vdot(s.g, s.Kg)) for s in states]), products=products,
     )  # fmt: skip
 
 
@@ -130,6 +171,6 @@ def stepwise(
     """All time points of a block by a solver that takes one step at a time."""
     taken = []
     for k in range(len(forcing[0].R)):
-        states = step(states, [Nominal(each.R[k], each.F[k]) for each in forcing])
+        states = step(states, [each.at(k) for each in forcing])
         taken.append(states)
     return [history([states[i] for states in taken]) for i in range(len(forcing))], states

@@ -90,8 +90,7 @@ class LiteralSteps:
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.step`."""
-        K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
-        A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
+        A = self._matrices(at)
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]
         system = sp.csc_array(self.T.T @ sp.csr_array(sp.block_diag(A)) @ self.T)
         lu = scipy.sparse.linalg.splu(
@@ -104,6 +103,11 @@ class LiteralSteps:
             self._next(k, states[k], at[k], parts[k].reshape(rhs[k].shape), A[k], rhs[k])
             for k in range(len(self.links))
         ]
+
+    def _matrices(self, at: Sequence[Nominal]) -> list[sp.csr_array]:
+        """Effective matrices of all links, world frame."""
+        K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
+        return [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
 
     def _effective(self, M: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
         s, d = self.scheme, self.damping

@@ -3,13 +3,14 @@
 [KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.coupling import on_part
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, as_rows
 from kedfem.links.recovery import point_rows
@@ -32,21 +33,23 @@ class Pattern:
     factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
 
 
-def patterns(scene: Scene, name: str, link: Link) -> tuple[Pattern, ...]:
-    """All loads P on a link, [KED, eqs. (15)(16)], gravity first.
+def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern, ...]]:
+    """All loads P on links or their segments, by key, [KED, eqs. (15)(16)], gravity first.
 
     Raises
     ------
     MeshError, SceneError
         If a point or face is not on the link.
     """
-    out = []
+    out: dict[str, list[Pattern]] = {key: [] for key in links}
     if any(scene.gravity):
-        out.append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, np.ones_like))
-    for key, load in scene.loads.items():
-        if load.link == name:
-            out.append(_pattern(f"loads.{key}", load, link))
-    return tuple(out)
+        for key, link in links.items():
+            out[key].append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, np.ones_like))
+    for name, load in scene.loads.items():
+        for key, weights in _weights(f"loads.{name}", load, links).items():
+            forces = np.outer(weights, as_rows(links[key], np.asarray(load.vector)))
+            out[key].append(Pattern(forces, load.frame == "link", partial(load_factor, load.factor)))
+    return {key: tuple(found) for key, found in out.items()}
 
 
 def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
@@ -55,26 +58,45 @@ def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]
     return Pattern(forces, False, partial(load_factor, load.factor))
 
 
-def _pattern(where: str, load: Load, link: Link) -> Pattern:
+def _weights(where: str, load: Load, links: Mapping[str, Link]) -> dict[str, Float[np.ndarray, " n"]]:
+    """Which segments of its link a load acts on, and how much of it each function takes."""
+    parts = {key: link for key, link in links.items() if link.name == load.link}
     match load:
-        case ForceLoad():
-            rows = point_rows(link, f"{where}.at", np.asarray(load.at))
-            beside = float(np.linalg.norm(rows.X - load.at))
-            if link.kind == "beam" and beside > 1e-6 * link.size:
-                raise SceneError(
-                    f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
-                )
-            weights = rows.value
+        case ForceLoad() if parts:
+            key, weights = on_part(parts, load.link, np.asarray(load.at), lambda x: _point_weights(where, load, x))
+            return {key: weights}
         case BodyLoad():
-            weights = link.volume
-        case SurfaceLoad() if link.meshed:
-            weights = surface_weights(link, face_seat(link, f"{where}.at", np.asarray(load.at)))
+            return {key: link.volume for key, link in parts.items()}
+        case SurfaceLoad() if parts:
+            return _surface_weights(where, load, parts)
         case _:
+            return {}
+
+
+def _point_weights(where: str, load: ForceLoad, link: Link) -> Float[np.ndarray, " n"]:
+    rows = point_rows(link, f"{where}.at", np.asarray(load.at))
+    beside = float(np.linalg.norm(rows.X - load.at))
+    if link.kind == "beam" and beside > 1e-6 * link.size:
+        raise SceneError(
+            f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
+        )
+    return rows.value
+
+
+def _surface_weights(
+    where: str, load: SurfaceLoad, parts: Mapping[str, Link]
+) -> dict[str, Float[np.ndarray, " n"]]:
+    """A face may run over several segments: all of it that each has, seen from the face's own plane or curve."""
+    found: dict[str, Float[np.ndarray, " n"]] = {}
+    at = np.asarray(load.at)
+    for link in parts.values():
+        if not link.meshed:
             raise SceneError(
                 f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
             )
-    forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
-    return Pattern(forces, load.frame == "link", partial(load_factor, load.factor))
+    key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
+    found[key] = surface_weights(parts[key], seat)
+    return found
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:

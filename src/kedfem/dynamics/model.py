@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import Attachment, attachments, seat_of, slider_axis
+from kedfem.dynamics.coupling import Attachment, SharedCut, attachments, on_part, part_seat, slider_axis
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
 from kedfem.dynamics.state import Rayleigh
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
-from kedfem.links.build import bare_links
+from kedfem.links.build import bare_links, parted
 from kedfem.links.record import Link
 from kedfem.links.reduced import on_functions, reduced, rigid
-from kedfem.links.seats import holds, is_flat, joint_seat, port_weights
+from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
+from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
@@ -99,37 +100,49 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     SceneError
         If a load or body does not fit its link.
     """
-    links = bare_links(scene) if bare is None else dict(bare)
+    cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
+    links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
     for key, body in scene.bodies.items():
-        if body.link in links:
-            links[body.link] = _with_scene_body(scene, f"bodies.{key}", body, links[body.link])
+        if body.link in cut:
+            on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
+            links[on] = carrier
     carried = tuple(
         Carried(rigid(links.pop(name)), linkage.bodies.index(name), str(scene.driven), ())
-        for name in list(links) if moves_with_drive(scene, name)
+        for name in list(cut) if moves_with_drive(scene, name)
     )  # fmt: skip
     if not links:
         raise SceneError(
             "links: must hold a link that the drive does not simply carry along, got rigid ones only"
         )
-    carried = tuple(replace(x, loads=patterns(scene, x.link.name, x.link)) for x in carried)
-    numbers = {name: k for k, name in enumerate(links)}
+    carried = tuple(replace(x, loads=patterns(scene, {x.link.name: x.link})[x.link.name]) for x in carried)
+    numbers = {key: k for k, key in enumerate(links)}
     sliders = tuple(
         _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None
     )
     for slider in sliders:
-        name = list(links)[slider.carrier]
-        links[name] = with_point_mass(links[name], slider.weights, slider.mass)
-    links = {name: rigid(x) if scene.links[name].fidelity == "rigid" else x for name, x in links.items()}
+        key = list(links)[slider.carrier]
+        links[key] = with_point_mass(links[key], slider.weights, slider.mass)
+    links = {key: rigid(x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()}
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
-    joined = attachments(scene, links)
-    loads = {name: patterns(scene, name, link) for name, link in links.items()}
+    joined = attachments(scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)])
+    loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads
     return Model(
-        links=tuple(links.values()), bodies=tuple(linkage.bodies.index(name) for name in links),
-        joints=tuple(joined[name] for name in links), loads=tuple(loads[name] for name in links),
+        links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
+        joints=tuple(joined[key] for key in links), loads=tuple(loads[key] for key in links),
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
     )  # fmt: skip
+
+
+def keys(name: str, link: Segments) -> list[str]:
+    """A key for each segment of a link; of a whole link its name."""
+    return [name] if len(link.parts) == 1 else [f"{name}/{k + 1}" for k in range(len(link.parts))]
+
+
+def _shared(name: str, link: Segments) -> list[SharedCut]:
+    key = keys(name, link)
+    return [SharedCut((key[a], key[b]), cut.points, cut.weights) for cut in link.cuts for a, b in [cut.segments]]
 
 
 def moves_with_drive(scene: Scene, name: str) -> bool:
@@ -187,16 +200,22 @@ def _slider_on(slider: Slider, link: Link) -> Slider:
     )
 
 
-def _with_scene_body(scene: Scene, where: str, body: Body, link: Link) -> Link:
+def _with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Link]) -> tuple[str, Link]:
+    """The link or segment that carries a body, and it with the body."""
     at = np.asarray(body.at)
-    near = 1e-6 * link.size
+    near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)
     here = (
         j
         for j in scene.joints.values()
         if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
     )
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
-    seat = joint_seat(link, f"{where}.at", at, axis)
+    key, seat = on_part(links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis))
+    return key, _carrying(links[key], seat, where, body, axis)
+
+
+def _carrying(link: Link, seat: Seat, where: str, body: Body, axis: Float[np.ndarray, "3"] | None) -> Link:
+    at = np.asarray(body.at)
     match body:
         case Flywheel(mass=mass, inertia=inertia):
             spin = unit((0, 0, 1)) if axis is None else axis
@@ -231,11 +250,13 @@ def _wide_seat(link: Link) -> str:
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     guide = next(key for key, joint in joints.items() if joint.kind == "prismatic")
-    held = [(key, other) for key, joint in joints.items() for other in joint.links if other in links]
+    elastic = {link.name for link in links.values()}
+    held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:
         raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none")
-    key, carrier = held[0]
-    weights = port_weights(seat_of(scene, key, links[carrier]), np.array([joints[key].at]))[0]
+    key, other = held[0]
+    carrier, seat = part_seat(scene, key, links, other)
+    weights = port_weights(seat, np.array([joints[key].at]))[0]
     extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
     loads = tuple(
         slider_pattern(links[carrier], x, weights)

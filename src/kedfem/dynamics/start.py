@@ -1,10 +1,11 @@
 """Initial states that satisfy the equation: at rest, or quasi-static; rates where links start to move by themselves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.condensed import (
@@ -17,6 +18,7 @@ from kedfem.dynamics.condensed import (
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
+from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
@@ -24,16 +26,21 @@ from kedfem.motion.rows import cross
 from kedfem.scene import Scene
 
 TURNING_SWEEPS = 20
+KRYLOV = 50  # vectors
 CONVERGED = 1e-9  # change of a sweep, of the deflection
 
 
 @dataclass(frozen=True, slots=True)
 class Deflected:
-    """A link's given start: u, v (n, d) δ and δ' in world components, g_rate (n, d) rate of δ in the link frame."""
+    """A link's given start: u, v (n, d) δ and δ' in world components, g_rate (n, d) rate of δ in the link frame.
+
+    stressed : (n, d) force k g P of its stress stiffness, link frame [N]
+    """
 
     u: Nodal
     v: Nodal
     g_rate: Nodal
+    stressed: Nodal | float = 0.0
 
 
 def initial_rates(scene: Scene, linkage: Linkage, model: Model) -> list[Nodal]:
@@ -71,7 +78,7 @@ def initial_states(
     g = [x.u @ now.R for x, now in zip(deflected, at, strict=True)]
     Kg = [_stiffness_times(link, x) for link, x in zip(links, g, strict=True)]
     Cg1 = [damping_times(link, damping, x.g_rate) for link, x in zip(links, deflected, strict=True)]
-    f = [a + b for a, b in zip(Kg, Cg1, strict=True)]
+    f = [a + b + x.stressed for a, b, x in zip(Kg, Cg1, deflected, strict=True)]
     # the mass is the same in every frame, so the accelerations can be found in the link frames
     a_link, forces = coupled(
         parts, [now.R for now in at], [now.F @ now.R - x for now, x in zip(at, f, strict=True)]
@@ -93,10 +100,14 @@ def initial_states(
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×²."""
+    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×².
+
+    turnings : g → k g P of the links' stress stiffness, if it counts
+    """
 
     at: Sequence[Nominal]
     spin: Sequence[Rotation]
+    turnings: Sequence[Callable[[Nodal], Nodal]] | None = None
 
 
 def quasi_static(
@@ -105,7 +116,7 @@ def quasi_static(
     """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
 
     The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
-    frequency).
+    frequency); with stress stiffness, K_σ δ, by GMRES.
 
     Returns
     -------
@@ -121,6 +132,9 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
     g, _ = coupled(parts, R, load)
+    if instant.turnings is not None:
+        g = _stiffened(links, parts, R, g, spin, instant.turnings)
+        return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
     before = np.inf
     for _ in range(TURNING_SWEEPS):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
@@ -132,6 +146,31 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
         if change <= CONVERGED * size:
             break
     return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
+
+
+def _stiffened(
+    links: Sequence[Link], parts: Sequence[Substructure], R: Sequence[Rotation], g: Sequence[NodalOf],
+    spin: Sequence[Rotation], turnings: Sequence[Callable[[Nodal], Nodal]],
+) -> list[NodalOf]:  # fmt: skip
+    """The deflection with stress stiffness, which need not be small beside K0: (1 + K0⁻¹ (M spin + k P)) g = g0."""
+    ends = np.cumsum([x.size for x in g])[:-1]
+
+    def applied(x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        each = [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
+        forces = [
+            mass_times(link.mass, y @ S.T) + k(y)
+            for link, y, S, k in zip(links, each, spin, turnings, strict=True)
+        ]
+        return np.asarray(x + np.concatenate([y.ravel() for y in coupled(parts, R, forces)[0]]))
+
+    start = np.concatenate([x.ravel() for x in g])
+    operator = LinearOperator((len(start),) * 2, applied, dtype=float)
+    x, left = gmres(operator, start, rtol=CONVERGED, restart=KRYLOV, maxiter=4)
+    if left:
+        raise SolveError(
+            'analysis.initial: must be a deflection that can be found, got none: take initial = "rest"'
+        )
+    return [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
 
 
 def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, float]:

@@ -30,10 +30,12 @@ class Nominal:
 
     R : (d, d) orientation, link to world, of a plane link in its plane
     F : (n, d) P − M R0'', world components [N]
+    stress : (m,) factors of the link's stress modes; None without stiffening
     """
 
     R: Float[np.ndarray, "d d"]
     F: Nodal
+    stress: Float[np.ndarray, " m"] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,11 @@ from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
-from kedfem.dynamics.state import LinkState, Nominal
+from kedfem.dynamics.state import LinkState
+from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
+from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
@@ -29,7 +31,12 @@ BLOCK_BYTES = 64_000_000
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
+StiffenedSteps = StiffenedCondensed | StiffenedLiteral | StiffenedDense
 Steps = CondensedSteps | LiteralSteps | DenseSteps
+UNSETTLED = (
+    ": the sweeps of stiffening do not settle, it is not a small term; "
+    'take a smaller step, or frames = "following"'
+)
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:
@@ -43,11 +50,23 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         raise SolveError("analysis.frames: must be 'nominal' so far, got frames that follow")
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    if scene.analysis.stiffening:
+        return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
         return LiteralSteps(model.links, model.joints, scheme, model.damping)
     small = all(map(_is_small, model.links)) and find_spec("numba")
     solver = DenseSteps if small else CondensedSteps
     return solver(model.links, model.joints, scheme, model.damping)
+
+
+def stiffened_steps(scene: Scene, model: Model, scheme: Scheme) -> StiffenedSteps:
+    """The same with geometric stiffening."""
+    kind: type[StiffenedSteps] = StiffenedCondensed
+    if scene.analysis.solver == "literal":
+        kind = StiffenedLiteral
+    elif all(map(_is_small, model.links)) and find_spec("numba"):
+        kind = StiffenedDense
+    return kind(model, scheme, stiffening(model))
 
 
 def _is_small(link: Link) -> bool:
@@ -64,7 +83,8 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         If a displacement is not finite: with step, time and drive angle.
     """
     law = scene.motion
-    states = first_states(scene, linkage, along, law, model)
+    stresses = solver.stiffening if isinstance(solver, StiffenedSteps) else None
+    states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
@@ -75,7 +95,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
             forcing = forcings(model, part)
             links, state = solver.advance(state, forcing)
             block = Block(first + k, part, links)
-            yield from _finite(block)
+            yield from _finite(block, UNSETTLED if stresses else "")
 
 
 def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
@@ -110,7 +130,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
 
 def block_length(model: Model) -> int:
     """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
-    return max(1, min(POINTS, BLOCK_BYTES // (6 * 8 * model.unknowns)))
+    return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
 
 
 def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
@@ -122,15 +142,16 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
 
 
 def first_states(
-    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model
-) -> list[LinkState]:
+    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model,
+    stresses: Stiffening | None = None,
+) -> list[LinkState]:  # fmt: skip
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
     at_rest = scene.analysis.initial == "rest"
     grid = time_grid(scene)
     h = min(grid.step, grid.end / 2)
     t = h * np.arange(1 if at_rest else 3)
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
-    moments = instants(model, motion)
+    moments = instants(model, motion, stresses)
     if at_rest:
         start = [Deflected(*(np.zeros((link.n, link.d)) for _ in range(3))) for link in model.links]
         return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
@@ -138,18 +159,25 @@ def first_states(
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
+    if moments[0].turnings is not None:
+        start = [
+            replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
+        ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
 
 
-def instants(model: Model, motion: RigidMotion) -> list[Instant]:
-    """Orientation, load and spin of all links at each time point."""
+def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
+    """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
     forcing = forcings(model, motion)
+    if stresses is not None:
+        forcing = stresses.stressed(forcing)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     return [
         Instant(
-            [Nominal(each.R[k], each.F[k]) for each in forcing],
+            [each.at(k) for each in forcing],
             [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
+            None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
         )
         for k in range(len(motion.t))
     ]
@@ -163,7 +191,7 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 
-def _finite(block: Block) -> Iterator[Block]:
+def _finite(block: Block, advice: str) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more."""
     fine = np.all([np.isfinite(link.g[:, 0]).all(axis=1) for link in block.links], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
@@ -172,5 +200,5 @@ def _finite(block: Block) -> Iterator[Block]:
     if k < len(block):
         raise SolveError(
             f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
-            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg"
+            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg{advice}"
         )

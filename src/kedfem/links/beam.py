@@ -44,6 +44,18 @@ def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray
     return rows.reshape(3, -1), det_J
 
 
+def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3"]:
+    """Weights with which an element's nodes tell how its axis has turned at r: Σ x_a ⊗ fit_a = x' ⊗ t, t as drawn.
+
+    Parameters
+    ----------
+    x : (m, 2) node positions [m]
+    """
+    _, dN = shape_functions(r, len(x))
+    tangent = dN @ x
+    return np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent)
+
+
 def element_stiffness(
     x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "k k"]:
@@ -132,6 +144,8 @@ def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Flo
 
 def assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
     """The sum of element matrices, each at its dofs."""
+    if not blocks:
+        return sp.csr_array((size, size))
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
     return sp.csr_array(

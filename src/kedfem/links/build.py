@@ -4,10 +4,13 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.links.beam import beam_link, line_axes
-from kedfem.links.beam_axis import smooth_axis, straight_axis
+from kedfem.errors import MeshError
+from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.section import scene_section
+from kedfem.links.seats import joint_seat
+from kedfem.links.segments import Interval, Segments, along, beam_segments, following, segmented, space_segments
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.mesh import link_mesh, plane_mesh
@@ -20,6 +23,7 @@ from kedfem.scene import (
     Polyline,
     RectangleSection,
     Scene,
+    link_frames,
     spatial_beams,
 )
 
@@ -63,6 +67,50 @@ def bare_link(scene: Scene, name: str) -> Link:
     return _beam(name, link, material, name in spatial_beams(scene))
 
 
+def parted(scene: Scene, name: str, link: Link) -> Segments:
+    """A link as the dynamics takes it: whole where its frame is the nominal one, else in segments that follow.
+
+    Parameters
+    ----------
+    link : its record, without attached bodies
+
+    Raises
+    ------
+    MeshError
+        If the mesh has fewer layers of elements than segments.
+    """
+    given = scene.links[name]
+    if link_frames(scene, name) == "nominal":
+        return Segments((link,))
+    if given.fidelity == "rigid" or link.full is not None:
+        return Segments((following(link),))
+    material = scene.materials[str(given.material)]
+    match link.kind:
+        case "beam":
+            return beam_segments(link, material)
+        case "spatial_beam":
+            return space_segments(link, _axis(given), material)
+        case _:
+            joints = [joint for joint in scene.joints.values() if name in joint.links]
+            ends = np.array([joint.at for joint in joints])
+            return segmented(link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends)))
+
+
+def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:
+    """What of a link the elements around its joints and bodies take up along a direction."""
+    out = []
+    places = [(joint.at, joint.axis if joint.kind != "prismatic" else None) for joint in scene.joints.values() if name in joint.links]
+    for at, axis in places:
+        try:
+            seat = joint_seat(link, f"links.{name}", np.asarray(at), None if axis is None else np.asarray(axis) / np.linalg.norm(axis))
+        except MeshError:
+            continue  # is said where the joint is made
+        if seat.facets is not None:
+            s = link.X[link.cells[link.basis.mesh.f2t[0, seat.facets]]] @ e
+            out.append((float(s.min()), float(s.max())))
+    return out
+
+
 def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link:
     shape = link.shape
     if not isinstance(shape, Bar | Polyline):
@@ -74,11 +122,19 @@ def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link
     nodes = 3 if link.element == "beam3" else 2
     if not spatial:
         return beam_link(name, points, section, material, elements, nodes)
+    return spatial_beam_link(name, _axis(link), section, material)
+
+
+def _axis(link: LinkScene) -> Axis:
+    """The axis of a beam in space."""
+    shape = link.shape
+    if not isinstance(shape, Bar | Polyline):
+        raise TypeError("a beam is a bar or a polyline")  # refused by the scene already
     smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, None)
-    axis = (smooth_axis if smooth else straight_axis)(
-        points, elements, nodes, None if up is None else np.array(up)
-    )
-    return spatial_beam_link(name, axis, section, material)
+    points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
+    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
+    make = smooth_axis if smooth else straight_axis
+    return make(points, elements, 3 if link.element == "beam3" else 2, None if up is None else np.array(up))
 
 
 def _of_bar(bar: Bar) -> RectangleSection:

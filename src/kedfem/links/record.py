@@ -19,6 +19,20 @@ Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
 @dataclass(frozen=True, slots=True)
+class Frame:
+    """A part of a segment's strain energy, ½ gᵀ K0 g, seen from a frame that follows a part of the segment's shape.
+
+    fit : (n, 3) weights of the frame's rotation: that of Σ x_a ⊗ fit_a
+    K0 : (dn, dn) [N/m]
+    share : (dn, dn) what g in this frame adds to the deformation of the segment from which stresses come [-]
+    """
+
+    fit: Float[np.ndarray, "n 3"]
+    K0: Matrix
+    share: Float[np.ndarray, "k k"]
+
+
+@dataclass(frozen=True, slots=True)
 class Link:
     """A link as the dynamics sees it; all arrays are for the drawn (reference) position, R = I.
 
@@ -42,6 +56,8 @@ class Link:
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
+    fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
+    frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
     """
 
     name: str
@@ -65,6 +81,8 @@ class Link:
     full: "Link | None" = None
     Q: Float[np.ndarray, "_ n"] | None = None
     rigid: bool = False
+    fit: Float[np.ndarray, "n 3"] | None = None
+    frames: tuple[Frame, ...] = ()
 
     @property
     def n(self) -> int:

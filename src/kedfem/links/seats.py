@@ -85,7 +85,7 @@ def joint_seat(
     facets = _surface_at(link, point, axis)
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
-    return _facet_seat(link, facets)
+    return facet_seat(link, facets)
 
 
 def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
@@ -105,7 +105,7 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
         facets = smooth_face(link, seen)
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
-    return _facet_seat(link, facets)
+    return facet_seat(link, facets)
 
 
 def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
@@ -157,7 +157,8 @@ def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat
     return Seat(fit, link.X[node], np.stack([y, z, np.cross(y, z)]), known * link.size / np.sqrt(12))
 
 
-def _facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
+def facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> Seat:
+    """The seat that some boundary facets of a meshed link make."""
     on = surface(link, facets)
     x, dA = on.x.transpose(2, 0, 1), on.dA  # (3, f, q), (f, q)
     area = dA.sum()

@@ -206,7 +206,7 @@ def length_of(axis: Axis) -> float:
 
 
 def _dofs(numbers: Int[np.ndarray, "e m"], per: int) -> Int[np.ndarray, "e k"]:
-    return (per * numbers[:, :, None] + np.arange(per)).reshape(len(numbers), -1)
+    return (per * numbers[:, :, None] + np.arange(per)).reshape(len(numbers), per * numbers.shape[1])
 
 
 def _diagonal(at: Int[np.ndarray, " k"], value: float, n: int) -> sp.csr_array:

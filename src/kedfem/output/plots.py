@@ -1,4 +1,4 @@
-"""Curves over the drive angle: one PNG per channel and one of all joint forces."""
+"""Curves over the drive angle: one PNG per channel, one of all energies and one of all joint forces."""
 
 import textwrap
 import warnings
@@ -29,13 +29,16 @@ NEGLIGIBLE = 1e-9
 MARK = "kedfem plot"
 """What a PNG of this room says of itself, so that stale ones are told from a user's own."""
 
+ENERGY = "energy/"
+"""Channels of this kind are drawn together."""
+
 VECTOR = ("x", "y", "z")
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
 
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
-    """Plot every channel: ``probes-rocker_mid-stress.png``, …, and ``joint_forces.png`` for all joints.
+    """Plot every channel: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and ``joint_forces.png`` for all joints.
 
     Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
     with the drive angle below. Plots that an earlier run left in the folder are removed.
@@ -61,10 +64,18 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         return []
     along = abscissa(results.time, results.angle)
     written = []
+    energies = _energies(results)
     for channel, values in results.channels.values():
+        if energies and channel.name.startswith(ENERGY):
+            continue
         path = Path(folder) / f"{channel.name.replace('/', '-')}.png"
         with _saved(path, _title(channel.description or channel.name, channel, results)) as figure:
             _draw_panels(figure, along, _panels(channel, values))
+        written.append(path)
+    if energies:
+        path = Path(folder) / "energies.png"
+        with _saved(path, _title("Energies of all links, and what is left over", None, results)) as figure:
+            _draw_panels(figure, along, [("energy", "J", energies)])
         written.append(path)
     forces = _force_magnitudes(results)
     if len(forces) > 1:
@@ -113,6 +124,16 @@ def _panels(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[tuple[st
         equivalent = {"von Mises": curves.pop("von_mises")}
         return [(quantity, channel.unit, curves), ("von Mises stress", channel.unit, equivalent)]
     return [(quantity, channel.unit, curves)]
+
+
+def _energies(results: Results) -> Curves:
+    """All energies by name, if there are several."""
+    found = {
+        f"{name.removeprefix(ENERGY)}{'' if len(channel.columns) == 1 else f' ({column})'}": curve
+        for name, (channel, values) in results.channels.items() if name.startswith(ENERGY)
+        for column, curve in zip(channel.columns, values.T, strict=True)
+    }  # fmt: skip
+    return found if len(found) > 1 else {}
 
 
 def _force_magnitudes(results: Results) -> Curves:

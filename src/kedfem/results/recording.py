@@ -18,6 +18,7 @@ from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
 from kedfem.results.acting import acting
+from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Probe, Scene
@@ -28,8 +29,12 @@ INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint w
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
-def recording(scene: Scene, model: Model) -> list[Recorded]:
+def recording(scene: Scene, model: Model, account: Account | None = None) -> list[Recorded]:
     """All channels that a scene asks for.
+
+    Parameters
+    ----------
+    account : of energy and momentum, if one is kept already
 
     Raises
     ------
@@ -39,7 +44,8 @@ def recording(scene: Scene, model: Model) -> list[Recorded]:
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
     drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
-    return [*probes, *joints, *drive, *acting(scene, model), _energy(model)]
+    energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
+    return [*probes, *joints, *drive, *acting(scene, model), *energies]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -297,12 +303,6 @@ def _rigid_torque(model: Model) -> Recorded:
         return -work[:, None]
 
     return Recorded(channel, torque)
-
-
-def _energy(model: Model) -> Recorded:
-    """Strain energy ½ gᵀ K0 g of all links, [KED, eq. (13)]."""
-    channel = Channel("energy/strain", ("strain",), "J", "", "strain energy of all links")
-    return Recorded(channel, lambda block: np.sum([link.strain for link in block.links], axis=0)[:, None])
 
 
 def _number(model: Model, name: str) -> int:

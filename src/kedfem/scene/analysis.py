@@ -52,6 +52,9 @@ class Analysis(Record):
     "auto"`), mesh sizes, functions and step are then chosen for it; none of them is if not given"""
     reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
     """relative error that reduced links may cause there"""
+    stiffening: StrictBool = False
+    """whether stresses of the nominal motion stiffen the links: tension, as in fast rotors, makes them stiffer across it,
+    compression softer"""
     solver: Literal["condensed", "literal"] = "condensed"
     """condensed: one factorisation per link; literal: assembles and factors at every step"""
 

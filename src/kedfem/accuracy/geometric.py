@@ -1,0 +1,178 @@
+"""How far the linear equation is off because links bend: its geometric error, estimated from a run's own deflections.
+
+Equation (20) turns K with the nominal rigid motion, which leaves two things out:
+
+* **Axial forces.** On a link that has turned by ψ against its nominal direction an axial force N acts across it. This
+  changes the stiffness that the deflection meets by the share
+
+      e = ∫ N ψ² ds / 2V,     V = ½ gᵀ K0 g the strain energy,
+
+  Rayleigh's quotient of the geometric and the elastic stiffness in the very shape that the link takes: N L²/(π² E I) of
+  a strut that bends between its ends, N over the buckling load of any other in its own shape. No length, section or end
+  condition need be known, so it serves links of every kind.
+* **Large turns.** Where N vanishes, as under a force across a cantilever, the error is of second order, c ψ².
+
+All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
+factor of e is measured, on the four-bar of [KED] (docs/theory.md): 2. Half of that is the change of stiffness itself. The
+other half is the joint forces that change as the deflected links pass them on; alone on its foot an arm does not have it,
+and the estimate is then up to twice too large. c is that of the elastica under a load across its tip.
+
+N comes from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean
+displacements of slices across the link's axis; so both take scalar weights only.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.condensed import turned_vectors
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link, in_space
+from kedfem.motion.rigid import RigidMotion
+
+SLICES = 8  # of a link along its axis, if it has so many nodes
+INSTANTS = 64  # of a block that are looked at
+AXIAL = 2.0  # error of the peak stress in units of e, measured
+TURN = 0.4  # and of ψ²: elastica, load across the tip, 0.42 of its deflection, 0.24 of the stress at its root
+STIFFENED = 0.4  # of the error that geometric stiffening leaves: 0.25 to 0.4, measured
+LARGE = 0.02  # an error that is worth a warning
+MODERATE = 0.15  # up to here stiffening helps
+
+
+@dataclass(frozen=True, slots=True)
+class Slices:
+    """A link cut across its axis; k slices, k − 1 cuts between them.
+
+    axis : (3,) along the link as drawn
+    means : (k, n) mean displacement of each slice
+    beyond : (k − 1, n) sum of the nodal forces beyond each cut
+    mass : (k − 1, n) the same of M u
+    mended : (k − 1, 4) what `beyond` misses of −M (1 ⊗ p'' + X R''ᵀ) where functions are few
+    ports : (k − 1, p) 1 where a port is beyond a cut
+    gaps : (k − 1,) between the slices' middles [m]
+    """
+
+    axis: Float[np.ndarray, "3"]
+    means: Float[np.ndarray, "k n"]
+    beyond: Float[np.ndarray, "c n"]
+    mass: Float[np.ndarray, "c n"]
+    mended: Float[np.ndarray, "c 4"]
+    ports: Float[np.ndarray, "c p"]
+    gaps: Float[np.ndarray, " c"]
+
+
+def slices(link: Link, joint: Attachment) -> Slices:
+    """Cut a link between its nodes into slices of equal length; those without nodes are left out."""
+    full, axis = link.full or link, link.axes[:, 0]
+    nodes = np.flatnonzero(full.one)
+    s = full.X[nodes] @ axis
+    of = np.minimum((SLICES * (s - s.min()) / np.ptp(s)).astype(int), SLICES - 1)
+    used, of = np.unique(of, return_inverse=True)
+    inside = np.zeros((len(used), full.n))
+    inside[of, nodes] = 1.0
+    means = inside / inside.sum(axis=1, keepdims=True)
+    middles = means[:, nodes] @ s
+    chosen = np.cumsum(inside[::-1], axis=0)[::-1][1:]
+    cuts = (middles[1:] + middles[:-1]) / 2
+    ports = (joint.weights @ link.X[joint.nodes]) @ axis
+    beyond = chosen if link.Q is None else _projected(full, link.Q, chosen)
+    mended = beyond @ _inertia(link) - chosen @ _inertia(full)
+    return Slices(
+        axis, means if link.Q is None else means @ link.Q, beyond, (link.mass[0] @ beyond.T).T, mended,
+        (ports > cuts[:, None]).astype(float), np.diff(middles),
+    )  # fmt: skip
+
+
+@dataclass
+class GeometricError:
+    """Largest sums over time of a run, looked at block by block.
+
+    axial : ∫ N ψ² ds of all links [J]
+    strain : energy of all links [J]
+    turn : ψ of any slice [rad]
+    """
+
+    model: Model
+    stiffened: bool = False
+    axial: float = 0.0
+    strain: float = 0.0
+    turn: float = 0.0
+    _of: list[Slices] = field(default_factory=list, repr=False)
+
+    def __post_init__(self) -> None:
+        self._of = [slices(*each) for each in zip(self.model.links, self.model.joints, strict=True)]
+
+    def add(self, block: Block) -> None:
+        """Look at some time points of a block; links whose frames follow them have no such error."""
+        self.strain = max(self.strain, float(np.sum([link.strain for link in block.links], axis=0).max()))
+        some, axial = block.every(max(1, len(block) // INSTANTS)), np.zeros(1)
+        joined = zip(
+            self.model.links, self.model.joints, self.model.bodies, some.links, self._of, strict=True
+        )
+        for link, joint, body, history, of in joined:
+            if np.array_equal(history.R, some.motion.R[:, body, : link.d, : link.d]):
+                turned = (slopes(link, of, history, some.motion.R[:, body]) ** 2).sum(axis=2)
+                N = axial_forces(link, joint, of, history, some.motion, body)
+                axial = axial + (N * turned) @ of.gaps
+                self.turn = max(self.turn, float(np.sqrt(turned.max(initial=0.0))))
+        self.axial = max(self.axial, float(np.abs(axial).max()))
+
+    @property
+    def estimate(self) -> float:
+        """Of the peak stress."""
+        share = self.axial / (2 * self.strain) if self.strain else 0.0
+        error = AXIAL * share + TURN * self.turn**2
+        return STIFFENED * error if self.stiffened else error
+
+
+def slopes(
+    link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]
+) -> Float[np.ndarray, "T c 3"]:
+    """ψ between slices: how far the link's line has turned off its nominal axis [rad]."""
+    along = (R @ of.axis)[:, None]
+    change = np.diff(in_space(link, of.means @ history.u), axis=1)
+    across = change - (change * along).sum(axis=2, keepdims=True) * along
+    return np.asarray(across / of.gaps[:, None])
+
+
+def axial_forces(
+    link: Link, joint: Attachment, of: Slices, history: LinkHistory, motion: RigidMotion, body: int
+) -> Float[np.ndarray, "T c"]:
+    """N at each cut, tension positive: what P − M R0'' − M δ'' and the port forces beyond it pull along the axis [N]."""
+    affine = np.concatenate([motion.p2[:, body, None], motion.R2[:, body].transpose(0, 2, 1)], axis=1)
+    force = in_space(link, of.beyond @ history.F - of.mass @ history.a) + of.mended @ affine
+    force += of.ports @ in_space(link, turned_vectors(joint, history.R, history.port_forces))
+    return np.asarray((force @ (motion.R[:, body] @ of.axis)[:, :, None])[:, :, 0])
+
+
+def geometric_warning(found: GeometricError) -> tuple[str, ...]:
+    """A warning where the linear equation is not enough, and what is."""
+    error = found.estimate
+    if error < LARGE:
+        return ()
+    following = 'analysis.frames = "following" is right at any deflection'
+    stiffening = "analysis.stiffening = true leaves about a third of it, " if not found.stiffened else ""
+    remedy = (
+        f"{stiffening}{following}" if error < MODERATE else f"take {following.replace(' is', ', which is')}"
+    )
+    return (
+        f"links turn by up to {np.degrees(found.turn):.2g} deg against their rigid motion, which the linear equation "
+        f"takes as small: it is off by about {100 * min(error, 1.0):.2g} % of the peak stress"
+        f"{' or more' if error > 1 else ''}; {remedy}",
+    )
+
+
+def _projected(
+    full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]
+) -> Float[np.ndarray, "c s"]:
+    """Coefficients of functions Q that come nearest to weights of nodes, by the nodes' share in the volume."""
+    share = np.sqrt(np.abs(full.volume))[:, None]
+    return np.asarray(np.linalg.lstsq(share * Q, share * chosen.T, rcond=None)[0].T)
+
+
+def _inertia(link: Link) -> Float[np.ndarray, "n 4"]:
+    """m [1, X]: −M (1 ⊗ p'' + X R''ᵀ) is its negative times p'' and R''ᵀ."""
+    return np.column_stack([link.m1[:, 0], link.mX])

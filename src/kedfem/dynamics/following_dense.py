@@ -1,0 +1,186 @@
+"""Steps of small segments whose frames follow them: dense constant matrices and one compiled loop. Needs numba."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from kedfem.dynamics.condensed import effective_coefficients, port_vectors
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state
+from kedfem.dynamics.frames import frames_of
+from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import LinkState, Rayleigh
+from kedfem.links.record import Link
+
+KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
+State = tuple[np.ndarray, ...]
+
+
+class FollowingDense:
+    """`FollowingSteps` of small segments; everything constant is made here, once."""
+
+    def __init__(
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
+    ) -> None:
+        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        c_M, c_K = effective_coefficients(scheme, damping)
+        self.coefficients = np.array([
+            c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
+            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, CONVERGED,
+        ])  # fmt: skip
+        self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
+        self.factorisations = len(self.parts)
+        self._counts = np.zeros(3)
+        self._sizes = (max(link.d for link in links), max(link.n for link in links),
+                       max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
+        size = len(links) * self._sizes[0] * self._sizes[1]
+        self._memory = np.zeros((2, DEPTH, size)), np.zeros((2, size))
+        self._matrices, self._unknowns = self._coupled()
+        self._shapes, self._frames = self._fitted()
+        self._kinds = np.array([KINDS[link.kind] for link in links])
+
+    @property
+    def sweeps(self) -> int:
+        """Taken so far."""
+        return int(self._counts[0])
+
+    def begin(self, states: Sequence[LinkState]) -> State:
+        """The loop's own state, from link states."""
+        D, n, P = self._sizes
+        L, E = len(self.links), self._frames[1].shape[1]
+        u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
+        C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, E + 1, 3, 3)), np.zeros((L, E + 1))
+        g = np.zeros((3, L, E, D * n))
+        Q[:] = np.eye(3)
+        general = [first_state(*each, s) for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)]
+        for i, (link, joint, part, s) in enumerate(zip(self.links, self.joints, self.parts, general, strict=True)):
+            for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
+                out[i, : link.d, : link.n] = coordinates(link, part, rows)
+            for out, rows in ((F, s.F), (f, s.f)):
+                out[i, : link.d, : link.n] = work_on(part, rows)
+            for m in range(3):
+                C[m, i, : link.d, : link.n] = work_on(part, s.damped[m])
+            force[i] = self._padded_ports(joint, s.port_forces)
+            for e, frame in enumerate(s.frames):
+                Q[i, e, : link.d, : link.d], angle[i, e] = frame.Q, frame.angle
+                x = coordinates(link, part, frame.g)
+                g[0, i, e].reshape(D, n)[: link.d, : link.n] = x
+            if link.fit is not None:
+                Q[i, -1], angle[i, -1] = Q[i, 0], angle[i, 0]
+        return u, v, a, F, f, C, force, Q, angle, g
+
+    def advance(self, state: State, forcing: Sequence[Forcing]) -> tuple[list[LinkHistory], State]:
+        """All time points of a block, one step after the other, [KED, eq. (20)]; see `DenseSteps.advance`.
+
+        Raises
+        ------
+        NotConverged
+            With what was done before.
+        """
+        from kedfem.dynamics.following_kernel import follow_block
+
+        D, n, P = self._sizes
+        T, L = len(forcing[0].R), len(self.links)
+        R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
+        for i, (link, part, each) in enumerate(zip(self.links, self.parts, forcing, strict=True)):
+            R[:, i, : link.d, : link.d] = each.R
+            for c in range(link.d):
+                F[:, i, c, : link.n] = each.F[:, :, c] @ part.T[c]
+        u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
+        history = (u, v, a, g, np.empty((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
+        taken, worst = follow_block(
+            self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F), state,
+            history, self._memory, self._counts,
+        )  # fmt: skip
+        histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
+        if taken < T:
+            raise NotConverged(taken, histories, state, self.links[worst].name)
+        return histories, state
+
+    def _history(self, i: int, forcing: Forcing, history: State, taken: int) -> LinkHistory:
+        link, part, held = self.links[i], self.parts[i], self._held(self.joints[i])
+        u, v, a, g = (rows_of(link, part, x[:taken, i]) for x in history[:4])
+        R = history[4][:taken, i, : link.d, : link.d].copy()
+        forces, strain = history[5][:taken, i, held], history[6][:taken, i].copy()
+        return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces, strain)
+
+    def _coupled(self) -> tuple[State, State]:
+        D, n, P = self._sizes
+        L, order = len(self.links), near_diagonal(self.joints)
+        columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in self.joints]
+        count = np.array([len(each) for each in columns])
+        G, Yt = np.zeros((L, D * n, D * n)), np.zeros((L, D * P, D * n))
+        S, B = np.zeros((L, D * P, D * P)), np.zeros((L, D * P, count.max()))
+        numbers = np.zeros((L, count.max()), int)
+        first = np.arange(len(order))
+        for i, (link, joint, part) in enumerate(zip(self.links, self.joints, self.parts, strict=True)):
+            x, held = self._places(link), self._held(joint)
+            G[i][np.ix_(x, x)] = part.G
+            Yt[i][np.ix_(held, x)] = part.Y.T
+            S[i][np.ix_(held, held)] = part.S
+            B[i][held, : count[i]] = joint.B[:, columns[i]]
+            numbers[i, : count[i]] = order[columns[i]]
+            if count[i]:
+                here = order[columns[i]]
+                first[here] = np.minimum(first[here], here.min())
+        return (G, Yt, S, B), (numbers, count, first)
+
+    def _fitted(self) -> tuple[State, State]:
+        D, n, _ = self._sizes
+        every = [frames_of(link) for link in self.links]
+        L, E = len(self.links), max(1, *(len(frames) for frames in every))
+        X, one, mean = (np.zeros((L, D, n)) for _ in range(3))
+        fit, K, share = np.zeros((L, E, D, n)), np.zeros((L, E, D * n, D * n)), np.zeros((L, E, D * n, D * n))
+        for i, (link, part, frames) in enumerate(zip(self.links, self.parts, every, strict=True)):
+            rows = link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
+            X[i, : link.d, : link.n] = coordinates(link, part, rows)
+            one[i, : link.d, : link.n] = coordinates(link, part, np.repeat(link.one[:, None], link.d, axis=1))
+            x = self._places(link)
+            if link.fit is not None:
+                mean[i, : link.d, : link.n] = work_on(part, link.fit[:, : link.d])
+            if not frames:
+                K[i, 0][np.ix_(x, x)] = component_first(part.T, link.K0)
+            for e, frame in enumerate(frames):
+                fit[i, e, : link.d, : link.n] = work_on(part, frame.fit[:, : link.d])
+                K[i, e][np.ix_(x, x)] = component_first(part.T, frame.K0)
+                if len(frames) > 1:
+                    there = component_first(part.T, _mass(link) @ frame.share)  # T⁻¹ = Tᵀ m
+                    share[i, e][np.ix_(x, x)] = there
+        return (X, one, mean), (np.array([len(frames) for frames in every]), fit, K, share)
+
+    def _places(self, link: Link) -> Int[np.ndarray, " x"]:
+        """Where the coordinates of a link stand among the padded ones."""
+        return np.asarray((self._sizes[1] * np.arange(link.d)[:, None] + np.arange(link.n)).ravel())
+
+    def _held(self, joint: Attachment) -> Int[np.ndarray, " q"]:
+        """Where the held components of a link stand among the padded ones."""
+        port, component = np.divmod(joint.keep, joint.components)
+        return np.asarray(self._sizes[0] * port + component)
+
+    def _padded_ports(self, joint: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, " Q"]:
+        out = np.zeros((self._sizes[2], self._sizes[0]))
+        vectors = port_vectors(joint, force)
+        out[: len(vectors), : vectors.shape[1]] = vectors
+        return out.ravel()
+
+
+def _mass(link: Link) -> sp.csr_array:
+    from kedfem.dynamics.condensed import mass_matrix
+
+    return mass_matrix(link)
+
+
+def near_diagonal(joints: Sequence[Attachment]) -> Int[np.ndarray, " k"]:
+    """New number of each interface unknown, so that those which share a segment stand near each other."""
+    touched = np.array([joint.B.any(axis=0) for joint in joints], dtype=float)
+    if not touched.shape[1]:
+        return np.zeros(0, int)
+    order = reverse_cuthill_mckee(sp.csr_array(touched.T @ touched).tocsr(), symmetric_mode=True)
+    number = np.empty(len(order), int)
+    number[order] = np.arange(len(order))
+    return number

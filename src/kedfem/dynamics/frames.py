@@ -1,0 +1,137 @@
+"""Frames that follow a segment: its mean rotation, its deformation seen from there, and the force that belongs to it.
+
+With y the segment's position in the link's nominal frame, c the weights of the frame and K0 its stiffness,
+
+    Σ y_a ⊗ c_a = Q U,  Q a rotation, U symmetric          g = Qᵀ y − X          strain energy ½ gᵀ K0 g
+
+The force is the gradient of that energy: with f = K0 g and τ = Σ g_a × f_a, the moment that f has about the deformed
+segment, turning Q costs τ, and so F_a = f_a − (G⁻¹ τ) × c_a with G = tr(U) 1 − U; F has neither resultant nor moment.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import Nodal, accelerated
+from kedfem.links.record import Frame, Link
+
+TURNS = 50  # Newton's steps for a rotation, of which it takes 2 or 3
+SETTLED = 1e-15
+
+
+def frames_of(link: Link) -> tuple[Frame, ...]:
+    """The frames of a link: several, one, or none where it keeps the nominal frame."""
+    if link.frames or link.fit is None:
+        return link.frames
+    return (Frame(link.fit, link.K0, np.zeros((0, 0))),)
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """One frame at one time: Q (d, d), the angle of a planar link [rad], deformation g and its rates, (n, d) each."""
+
+    Q: Float[np.ndarray, "d d"]
+    angle: float
+    g: Nodal
+    g1: Nodal
+    g2: Nodal
+
+
+def rotation(
+    link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, before: Float[np.ndarray, "d d"], angle: float
+) -> tuple[Float[np.ndarray, "d d"], float]:
+    """Q of Σ y_a ⊗ fit_a, near an earlier one; of a planar link with its angle, which counts turns.
+
+    Parameters
+    ----------
+    before, angle : earlier Q; its angle
+    """
+    if link.planar:
+        A = y[:, :2].T @ fit[:, :2]
+        turn = np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1])
+        turn += 2 * np.pi * np.round((angle - turn) / (2 * np.pi))
+        return planar_rotation(float(turn), link.d), float(turn)
+    A, Q = y.T @ fit, before
+    for _ in range(TURNS):
+        U = Q.T @ A
+        axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
+        turn = np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)
+        Q = Q @ turned(turn)
+        if np.abs(turn).max() <= SETTLED:
+            break
+    return Q, 0.0
+
+
+def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
+    """A turn about z, of rows (u, v) or (u, v, ψ)."""
+    Q = np.eye(d)
+    Q[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    return Q
+
+
+def turned(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """The rotation by a vector w, Rodrigues."""
+    W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    size = float(np.linalg.norm(w))
+    a, b = (1.0, 0.5) if size < 1e-8 else (np.sin(size) / size, (1 - np.cos(size)) / size**2)
+    return np.asarray(np.eye(3) + a * W + b * W @ W)
+
+
+def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:
+    """g = Qᵀ y − X without its mean, which strains nothing; of a planar beam ψ less the frame's angle."""
+    g = y @ Q - link.X[:, : link.d]
+    if link.kind == "beam":
+        g[:, 2] = y[:, 2] - angle * link.one
+    k, m1 = 2 if link.planar else 3, link.m1[:, 0]
+    g[:, :k] -= np.outer(link.one, m1 @ g[:, :k] / (m1 @ link.one))
+    return np.asarray(g)
+
+
+def followed(
+    link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme
+) -> Followed:
+    """A frame at the end of a step, rates of g by the scheme's own formulas.
+
+    Parameters
+    ----------
+    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
+    before : at the beginning of the step
+    """
+    Q, angle = rotation(link, frame.fit, y, before.Q, before.angle)
+    g = deformation(link, y, Q, angle)
+    return Followed(Q, angle, g, *accelerated(scheme, g, before.g, before.g1, before.g2))
+
+
+def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:
+    """Internal force of a frame in the nominal frame: (∂g/∂y)ᵀ K0 (g + β g'), and its strain energy."""
+    Kg = _times(frame.K0, now.g)
+    energy = 0.5 * float(np.vdot(now.g, Kg))
+    f = Kg + beta * _times(frame.K0, now.g1) if beta else Kg
+    k = 2 if link.planar else 3
+    A = y[:, :k].T @ frame.fit[:, :k]
+    U = now.Q[:k, :k].T @ A
+    c, g = frame.fit[:, :k], now.g[:, :k]
+    if link.planar:
+        torque = float(g[:, 0] @ f[:, 1] - g[:, 1] @ f[:, 0]) / np.trace(U)
+        f = f.copy()
+        f[:, 0] += torque * c[:, 1]
+        f[:, 1] -= torque * c[:, 0]
+    else:
+        N = g.T @ f
+        axial = np.array([N[1, 2] - N[2, 1], N[2, 0] - N[0, 2], N[0, 1] - N[1, 0]])
+        f = f - np.cross(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial), c)
+    return np.asarray(f @ now.Q.T), energy
+
+
+def _times(K: np.ndarray, g: Nodal) -> Nodal:
+    return np.asarray((K @ g.ravel()).reshape(g.shape))
+
+
+def stress_deformation(link: Link, frames: Sequence[Frame], now: Sequence[Followed]) -> Nodal:
+    """The g from which stresses come: that of a single frame, or one with the strains that several frames see."""
+    if not link.frames:
+        return now[0].g
+    return np.asarray(sum(_times(frame.share, x.g) for frame, x in zip(frames, now, strict=True)))

@@ -1,0 +1,269 @@
+"""Geometric stiffening: M δ'' + C δ' + (K + K_σ) δ = P − M R0'', K_σ from the stresses of the nominal motion.
+
+The stresses are quasi-static: those of P − M R0'' and the joint forces that go with it, in balance on each link. In the
+link frame such loads are combinations of a few constant ones: six of turning, three in a plane (what deforms of −M R0''
+= −(m·1) ⊗ p'' − (m·X) R''ᵀ), the link's loads and its port forces. Their static states g_i are made orthonormal in strain
+energy; then K0 g = F has g = Σ s_i g_i with s_i = g_i · F, and K_σ = T (k ⊗ P) Tᵀ, k(t) = Σ s_i(t) k_i, k_i constant.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.condensed import (
+    Rotation,
+    Substructure,
+    coupled,
+    factored,
+    mass_matrix,
+    port_columns,
+)
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Forcing
+from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.state import Nodal, NodalOf, Nominal
+from kedfem.links.record import Link, Matrix
+from kedfem.links.reduced import rigid_modes
+from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+
+BALANCED = 1e-9  # of a load: what is left of one that only accelerates the link is rounding
+INDEPENDENT = 1e-10  # of the largest energy: loads below repeat others
+NEGLIGIBLE = 1e-12  # of the largest stress: rounding, as of what leaves the plane of a planar linkage
+SWEEPS = 30
+SETTLED = 1e-9  # what the sweeps left undone, of the displacement
+Turning = Callable[[Nodal], Nodal]
+"""k g P of a link at one time, from g."""
+
+
+@dataclass(frozen=True, slots=True)
+class StressModes:
+    """What the loads of the nominal motion can do to one link.
+
+    states : (m, n, d) g_i, without rigid motion, orthonormal in strain energy [1/√J times a state's unit]
+    k : (m, z) their stress stiffness, entries of one sparsity pattern or all n² of dense matrices [N/m, times 1/√J]
+    indices, indptr : of that pattern; None if dense
+    P : (d, d) `turned_directions`
+    """
+
+    states: Float[np.ndarray, "m n d"]
+    k: Float[np.ndarray, "m z"]
+    indices: Int[np.ndarray, " z"] | None
+    indptr: Int[np.ndarray, " n1"] | None
+    P: Rotation
+
+    def stiffness(self, s: Float[np.ndarray, " m"]) -> Matrix:
+        """k = Σ s_i k_i, (n, n) [N/m]."""
+        n, data = self.states.shape[1], s @ self.k
+        if self.indices is None:
+            return data.reshape(n, n)
+        return sp.csr_array((data, self.indices, self.indptr), shape=(n, n))
+
+    def turning(self, s: Float[np.ndarray, " m"]) -> Turning:
+        """g → k g P."""
+        k = self.stiffness(s)
+        return lambda g: np.asarray(k @ (g @ self.P))
+
+
+@dataclass(frozen=True, slots=True)
+class Stiffening:
+    """Stress modes of all links, and the static linkage that shares the loads out among the joints (A = K0)."""
+
+    parts: Sequence[Substructure]
+    modes: Sequence[StressModes]
+
+    def stressed(self, forcing: Sequence[Forcing]) -> list[Forcing]:
+        """The same over time with the factors s_i of the stress modes."""
+        R = [each.R for each in forcing]
+        loads = [each.F @ each.R for each in forcing]
+        forces = port_forces(self.parts, R, loads)
+        return [
+            replace(each, stress=_factors(modes, part, load, force))
+            for each, modes, part, load, force in zip(
+                forcing, self.modes, self.parts, loads, forces, strict=True
+            )
+        ]
+
+    def turnings(self, at: Sequence[Nominal]) -> list[Turning]:
+        """g → k g P of all links at one time."""
+        return [modes.turning(_given(now)) for modes, now in zip(self.modes, at, strict=True)]
+
+    def stiffness(self, at: Sequence[Nominal]) -> list[Matrix]:
+        """k ⊗ R P Rᵀ of all links at one time, world frame, (dn, dn)."""
+        return [
+            sp.kron(modes.stiffness(_given(now)), now.R @ modes.P @ now.R.T, format="csr")
+            for modes, now in zip(self.modes, at, strict=True)
+        ]
+
+
+def stiffening(model: Model) -> Stiffening:
+    """Stress modes of a model's links.
+
+    Raises
+    ------
+    SolveError
+        If nothing holds a link.
+    """
+    parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
+    modes = [
+        stress_modes(link, part, loads)
+        for link, part, loads in zip(model.links, parts, model.loads, strict=True)
+    ]
+    return Stiffening(parts, modes)
+
+
+def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> StressModes:
+    """Static states of a link under all loads in balance that the nominal motion can put on it, and their k.
+
+    Parameters
+    ----------
+    part : the link with A = K0
+    """
+    F = unit_loads(link, part.attachment, loads)
+    B = rigid_modes(link)
+    MB = mass_matrix(link) @ B
+    lever = np.linalg.solve(B.T @ MB, MB.T)
+    balanced = F - MB @ np.linalg.solve(B.T @ MB, B.T @ F)
+    deforming = np.linalg.norm(balanced, axis=0) > BALANCED * np.linalg.norm(F, axis=0)
+    balanced = balanced[:, deforming]
+    g = free_states(link, part, balanced)
+    g -= B @ (lever @ g)
+    energy = g.T @ balanced
+    size = np.sqrt(np.diag(energy))
+    values, vectors = np.linalg.eigh((energy + energy.T) / 2 / np.outer(size, size))
+    kept = values > INDEPENDENT * values.max(initial=0.0)
+    states = (g @ (vectors[:, kept] / size[:, None] / np.sqrt(values[kept]))).T.reshape(-1, link.n, link.d)
+    of = stress_stiffness(link)
+    return StressModes(states, *_stacked([of(each) for each in states], link.n), turned_directions(link))
+
+
+def unit_loads(link: Link, joint: Attachment, loads: Sequence[Pattern]) -> Float[np.ndarray, "k u"]:
+    """Loads, link frame, that those of the nominal motion are combinations of, but for accelerations of the link."""
+    space = 2 if link.planar else 3
+    columns: list[Nodal] = []
+
+    def along(weights: Float[np.ndarray, " n"], j: int) -> Nodal:
+        out = np.zeros((link.n, link.d))
+        out[:, j] = weights
+        return out
+
+    columns += [along(link.mX[:, j], i) + along(link.mX[:, i], j) for i in range(space) for j in range(i + 1)]
+    for load in loads:
+        if load.follows:
+            columns.append(load.forces)
+            continue
+        weights, sizes, _ = np.linalg.svd(load.forces[:, :space], full_matrices=False)
+        columns += [along(w, j) for w in weights.T[sizes > BALANCED * sizes[0]] for j in range(space)]
+        columns += [along(load.forces[:, j], j) for j in range(space, link.d)]
+    loaded = np.stack([x.ravel() for x in columns if x.any()], axis=1)
+    return np.concatenate([loaded, port_columns(joint, link.n)], axis=1)
+
+
+def free_states(link: Link, part: Substructure, F: Float[np.ndarray, "k u"]) -> Float[np.ndarray, "k u"]:
+    """g with K0 g = F of loads in balance, up to rigid motion.
+
+    y = Ã⁻¹ F leaves K0 y = F − E m at the anchors; what Ã⁻¹ E takes away there makes it good, in least squares because
+    anchors in balance can be told apart by what deforms only.
+    """
+    y = np.stack([part.solve(f.reshape(-1, link.d)).ravel().copy() for f in F.T], axis=1)
+    held = part.Y[:, len(part.attachment.keep) :]
+    m = (F - link.K0 @ y)[part.anchors]
+    D = (link.K0 @ held)[part.anchors]
+    return np.asarray(y + held @ np.linalg.lstsq(D, m, rcond=BALANCED)[0])
+
+
+def port_forces(
+    parts: Sequence[Substructure],
+    R: Sequence[Float[np.ndarray, "T d d"]],
+    loads: Sequence[Float[np.ndarray, "T n d"]],
+) -> list[Float[np.ndarray, "T _"]]:
+    """`coupled` for many times at once, port forces only: λ of all links, link frame."""
+    v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
+    RB = [_interface(part, each) for part, each in zip(parts, R, strict=True)]
+    if RB[0].shape[2]:
+        SRB = [part.S @ b for part, b in zip(parts, RB, strict=True)]
+        H = np.sum([b.transpose(0, 2, 1) @ x for b, x in zip(RB, SRB, strict=True)], axis=0)
+        f = np.sum([np.einsum("tck,tc->tk", x, y) for x, y in zip(SRB, v, strict=True)], axis=0)
+        z = np.linalg.solve(H, f[..., None])
+        v = [x - (b @ z)[..., 0] for x, b in zip(v, RB, strict=True)]
+    return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
+
+
+def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
+    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns."""
+    joint = part.attachment
+    (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
+    B = np.zeros((p * d, k))
+    B[joint.keep] = joint.B
+    turned = np.einsum("tba,pbk->tpak", R, B.reshape(p, d, k)).reshape(len(R), p * d, k)
+    out = np.zeros((len(R), len(part.S), k))
+    out[:, : len(joint.keep)] = turned[:, joint.keep]
+    return out
+
+
+def swept(
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], first: Sequence[NodalOf],
+    turnings: Sequence[Turning], share: float,
+) -> tuple[list[NodalOf], list[NodalOf], list[Float[np.ndarray, " _"]]]:  # fmt: skip
+    """Solve A g = r − share · k g P + Wᵀ λ by sweeps with the constant A.
+
+    Parameters
+    ----------
+    first : g to begin with
+    share : of the term at this time, 1 − α_f
+
+    Returns
+    -------
+    r − share · k g P as last used; g; λ. g is nan where the sweeps do not settle
+    """
+    before, g = 0.0, list(first)
+    for _ in range(SWEEPS):
+        full = [r - share * k(x) for r, k, x in zip(rhs, turnings, g, strict=True)]
+        new, forces = coupled(parts, R, full)
+        change = max(float(np.abs(x - y).max(initial=0.0)) for x, y in zip(new, g, strict=True))
+        size = max(float(np.abs(x).max(initial=0.0)) for x in new)
+        g = [x.copy() for x in new]
+        ratio = change / before if before else 1.0
+        if change == 0.0 or (ratio < 1 and change * ratio / (1 - ratio) <= SETTLED * size):
+            return full, g, forces
+        if not np.isfinite(change):
+            break
+        before = change
+    return full, [np.full_like(x, np.nan) for x in g], forces
+
+
+def _given(now: Nominal) -> Float[np.ndarray, " m"]:
+    if now.stress is None:
+        raise ValueError("stress factors must be there, got none")
+    return now.stress
+
+
+def _factors(
+    modes: StressModes, part: Substructure, load: Float[np.ndarray, "T n d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T m"]:
+    """s_i = g_i · (load + Wᵀ λ)."""
+    flat = modes.states.reshape(len(modes.states), -1)
+    at_ports = flat @ port_columns(part.attachment, modes.states.shape[1])
+    s = np.asarray(load.reshape(len(load), -1) @ flat.T + force @ at_ports.T)
+    share = np.abs(s).max(axis=0) * np.linalg.norm(modes.k, axis=1)
+    s[:, share < NEGLIGIBLE * share.max(initial=0.0)] = 0.0
+    return s
+
+
+def _stacked(
+    matrices: Sequence[Matrix], n: int
+) -> tuple[Float[np.ndarray, "m z"], Int[np.ndarray, " z"] | None, Int[np.ndarray, " n1"] | None]:
+    """Matrices (n, n) as rows of entries, and the sparsity pattern that holds them all."""
+    if not matrices or not sp.issparse(matrices[0]):
+        return np.array(matrices).reshape(len(matrices), n * n), None, None
+    rows = [sp.coo_array(each) for each in matrices]
+    places = [each.row.astype(np.int64) * n + each.col for each in rows]
+    found = np.unique(np.concatenate(places))
+    k = np.zeros((len(rows), len(found)))
+    for data, each, at in zip(k, rows, places, strict=True):
+        np.add.at(data, np.searchsorted(found, at), each.data)
+    indptr = np.searchsorted(found, n * np.arange(n + 1))
+    return k, (found % n).astype(np.int32), indptr.astype(np.int32)

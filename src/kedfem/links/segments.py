@@ -1,0 +1,230 @@
+"""Links cut into segments, each a link again, whose frames follow their own shape: large deflection.
+
+The segments of a beam are its elements, those of a solid or plane link slices of its mesh. Neighbours share the ports of
+the cut between them: of beams its node, of meshed links the affine field that fits the cut best, so that the two sides of
+a cut need not warp alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import cKDTree
+
+from kedfem.errors import MeshError
+from kedfem.links.beam import beam_link, strain_rows, tangent_fit
+from kedfem.links.beam_axis import Axis
+from kedfem.links.plane import plane_link
+from kedfem.links.record import Frame, Link
+from kedfem.links.seats import facet_seat, joint_seat, port_weights
+from kedfem.links.solid import solid_link
+from kedfem.links.spatial_beam import spatial_beam_link
+from kedfem.mesh import HexMesh, QuadMesh
+from kedfem.scene import Material
+
+SAME = 1e-9  # of a link's size: nodes and facets at the same place
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Ports that two segments share.
+
+    segments : their numbers
+    points : (k, 3) in the reference position [m]
+    weights : (k, n) of each
+    """
+
+    segments: tuple[int, int]
+    points: Float[np.ndarray, "k 3"]
+    weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """A link cut up.
+
+    parts, cuts : segments in order along the link, and where they meet
+    functions : of a meshed link, which functions of the whole are those of each segment
+    """
+
+    parts: tuple[Link, ...]
+    cuts: tuple[Cut, ...] = ()
+    functions: tuple[Int[np.ndarray, " _"], ...] = ()
+
+
+def following(link: Link) -> Link:
+    """The changed copy of a link whose frame is its own mean rotation: the one that fits its shape best, by mass.
+
+    Meant for links without attached bodies: a heavy one would pull the frame to it.
+    """
+    centre = (link.one @ link.mX) / float(link.one @ link.m1[:, 0])
+    return replace(link, fit=link.mX - np.outer(link.m1[:, 0], centre))
+
+
+def segmented(
+    link: Link, material: Material, count: int, ends: Float[np.ndarray, "p 3"], whole: Sequence[Interval]
+) -> Segments:
+    """A solid or plane link in slices across the line between the two of its joints that are furthest apart.
+
+    Parameters
+    ----------
+    link : without attached bodies
+    count : number of slices
+    ends : joints of the link, as drawn [m]
+    whole : ranges along `along(ends)` that no cut may divide, those of bores and other seats [m]
+
+    Raises
+    ------
+    MeshError
+        If the mesh has not so many layers of elements.
+    """
+    if count == 1:
+        return Segments((following(link),), functions=(np.arange(link.n),))
+    e = along(link, ends)
+    s = link.X[link.cells] @ e  # (e, m)
+    places = _places(count, ends @ e if len(ends) > 1 else s, whole)
+    slice_of = np.searchsorted(places, s.mean(axis=1))
+    found = [np.flatnonzero(slice_of == k) for k in range(count)]
+    parts = [_slice(link, material, elements) for elements in found if len(elements)]
+    cuts = [_cut(a, b, k) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
+    if len(parts) < count or None in cuts:
+        fewer = sum(cut is not None for cut in cuts) + 1
+        raise MeshError(
+            f"links.{link.name}.segments: must be at most {min(fewer, count - 1)} for this mesh, whose elements cannot be "
+            f"divided into more slices across the link, got {count}; take a finer mesh"
+        )
+    return Segments(
+        tuple(following(part) for part, _ in parts), tuple(cut for cut in cuts if cut), tuple(n for _, n in parts)
+    )
+
+
+def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
+    """Unit vector across which a link is cut: between its two joints that are furthest apart, else where it is longest."""
+    if len(ends) > 1:
+        distance = np.linalg.norm(ends[:, None] - ends, axis=2)
+        a, b = np.unravel_index(distance.argmax(), distance.shape)
+        if distance[a, b] > 0.1 * link.size:
+            return np.asarray((ends[b] - ends[a]) / distance[a, b])
+    return np.asarray(np.linalg.svd(link.X - link.X.mean(axis=0), full_matrices=False)[2][0])
+
+
+def _places(count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval]) -> Float[np.ndarray, " c"]:
+    """Where to cut: evenly, moved out of ranges that stay whole."""
+    places = np.linspace(s.min(), s.max(), count + 1)[1:-1]
+    for low, high in whole:
+        inside = (places > low) & (places < high)
+        places[inside] = np.where(places[inside] - low < high - places[inside], low, high)
+    return places
+
+
+def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> tuple[Link, Int[np.ndarray, " n"]]:
+    """A link of some elements of another, and which of its functions they are."""
+    used, cells = np.unique(link.cells[elements], return_inverse=True)
+    cells = cells.reshape(len(elements), -1)
+    if link.kind == "plane":
+        part = plane_link(link.name, QuadMesh(link.X[used], cells, link.thickness), material, link.axes)
+    else:
+        part = solid_link(link.name, HexMesh(link.X[used], cells), material, link.axes)
+    # the function space numbers its functions in its own way
+    distance, same = cKDTree(link.X).query(part.X)
+    assert distance.max() <= SAME * link.size  # noqa: S101
+    return part, same
+
+
+def _cut(a: Link, b: Link, number: int) -> Cut | None:
+    """The ports of the facets that two slices share, None if they share none: its middle, and points off it within it."""
+    middles = [_facet_middles(part) for part in (a, b)]
+    distance, nearest = cKDTree(middles[1]).query(middles[0])
+    here = np.flatnonzero(distance <= SAME * max(a.size, b.size))
+    if not len(here):
+        return None
+    seats = [
+        facet_seat(part, part.basis.mesh.boundary_facets()[facets]) for part, facets in ((a, here), (b, nearest[here]))
+    ]
+    first = seats[0]
+    points = first.origin + np.concatenate([np.zeros((1, 3)), first.spread[: a.d - 1, None] * first.directions[: a.d - 1]])
+    return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))
+
+
+def _facet_middles(part: Link) -> Float[np.ndarray, "f d"]:
+    mesh = part.basis.mesh
+    return np.asarray(mesh.p[:, mesh.facets[:, mesh.boundary_facets()]].mean(axis=1).T)
+
+
+def beam_segments(link: Link, material: Material) -> Segments:
+    """A planar beam element by element; a frame follows the tangent at each Gauss point, [KED, eqs. (21)(22)].
+
+    There the strains are exact, however much the element bends: ε = |x'| − 1, γ, ψ' along the turned axis.
+    """
+    nodes = link.cells.shape[1]
+    parts = []
+    for cell in link.cells:
+        section = link.section
+        if section is None:
+            raise TypeError(f"links.{link.name}: has no section")  # a beam has
+        part = beam_link(link.name, link.X[cell[:2]], section, material, 1, nodes)
+        parts.append(replace(following(part), axes=link.axes, frames=_gauss_frames(part, material)))
+    cuts = [
+        Cut((k, k + 1), link.X[link.cells[k][1:2]], (_unit(parts[k], -1), _unit(parts[k + 1], 0)))
+        for k in range(len(parts) - 1)
+    ]
+    return Segments(tuple(parts), tuple(cuts))
+
+
+def _unit(part: Link, node: int) -> Float[np.ndarray, "1 n"]:
+    """Weights of one end of an element: nodes are in order along it."""
+    return np.eye(part.n)[[node]]
+
+
+def _gauss_frames(part: Link, material: Material) -> tuple[Frame, ...]:
+    section, x = part.section, part.X[part.cells[0]][:, :2]
+    if section is None:
+        raise TypeError(f"links.{part.name}: has no section")  # a beam has
+    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
+    rigidity = np.array([E * A, section.shear_coefficient * G * A, E * section.second_moment])
+    place = np.argsort(part.cells[0])
+    strains, weights, fits = [], [], []
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) - 1), strict=True):
+        rows, det_J = strain_rows(x, float(r))
+        in_order = rows.reshape(3, -1, 3)[:, place].reshape(3, -1)
+        strains.append(in_order)
+        weights.append(w * det_J)
+        fits.append(tangent_fit(x, float(r))[place])
+    back = np.split(np.linalg.pinv(np.concatenate(strains)), len(strains), axis=1)
+    return tuple(
+        Frame(fit, w * (B.T * rigidity) @ B, P @ B) for fit, w, B, P in zip(fits, weights, strains, back, strict=True)
+    )
+
+
+def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
+    """A beam in space element by element; a cut shares the whole field of its node.
+
+    Parameters
+    ----------
+    axis : of the link
+    """
+    parts = [_space_part(link, axis, cell, material) for cell in axis.cells]
+    cuts = [_node_cut(parts[k], parts[k + 1], k, axis.frame[axis.cells[k][1], 0]) for k in range(len(parts) - 1)]
+    return Segments(tuple(parts), tuple(cuts))
+
+
+def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: Material) -> Link:
+    stations = np.sort(cell)
+    node = axis.node[stations] - axis.node[stations[0]]
+    hub = axis.hub[axis.node[stations]]
+    section = link.section
+    if section is None:
+        raise TypeError(f"links.{link.name}: has no section")  # a beam has
+    own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
+    return replace(following(spatial_beam_link(link.name, own, section, material)), axes=link.axes)
+
+
+def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:
+    seats = [joint_seat(part, f"links.{a.name}", point, None) for part in (a, b)]
+    known = [d for d, spread in zip(seats[0].directions, seats[0].spread, strict=True) if spread > 0]
+    off = seats[0].spread[0] * np.array(known)
+    points = np.concatenate([point[None], point + off])
+    return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))

@@ -1,0 +1,200 @@
+"""The energy and momentum of a run, kept account of step by step.
+
+With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], says exactly
+
+    d/dt (T + V) = loads + supports − g'ᵀ C0 g' − Σ ω · Σ δ × K δ − (damping on the nominal motion)
+
+because T K0 Tᵀ turns with the nominal motion, not with the bent link: its forces have the moment Σ δ × K δ, which a real
+link's inner forces do not have. That is the equation's geometric error, and is kept apart. What is left over is the
+integration's: of second order in the step, and what numerical damping takes (ρ∞ < 1).
+
+Work is the trapezoidal sum of powers; damping's is that of the means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.state import Rayleigh
+from kedfem.results.balance import Flow, carried_flow, link_flow
+from kedfem.results.moments import constants
+from kedfem.results.records import Channel
+from kedfem.results.resistance import Last, products, resistance
+
+Rows = Float[np.ndarray, "T c"]
+UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
+ENERGIES = (
+    ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
+    ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
+    ("work", ("loads", "supports"), "work done by the loads; by the drive and the other supports"),
+    ("dissipated", ("dissipated",), "energy that damping took"),
+    (
+        "neglected",
+        ("neglected",),
+        "work of the elastic forces' moment on bent links, which the equation neglects",
+    ),
+    ("residual", ("residual",), "energy that the integration leaves over"),
+)
+NO_PORTS = Attachment(
+    np.zeros(0, int), np.zeros((0, 0)), 3, np.zeros((0, 3)), (), np.zeros(0, int), np.zeros((0, 0))
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """What is left over at worst, of the largest energy or momentum that is exchanged.
+
+    energy : of the integration [-]
+    neglected : energy that the neglected turning of K exchanges [-]
+    linear, angular : of the integration's momentum, about the world's origin [-]
+    turned : angular momentum that K's neglected turning brings in [-]
+    """
+
+    energy: float = 0.0
+    neglected: float = 0.0
+    linear: float = 0.0
+    angular: float = 0.0
+    turned: float = 0.0
+
+
+@dataclass
+class _Sums:
+    """Time integrals that go on from block to block: by the trapezoidal rule of rates, and of what a step takes."""
+
+    t: float
+    rates: Float[np.ndarray, " r"]
+    work: Float[np.ndarray, " r"]
+    taken: Float[np.ndarray, " s"]
+
+    def add(
+        self, t: Float[np.ndarray, " T"], rates: Float[np.ndarray, "T r"], taken: Float[np.ndarray, "T s"]
+    ) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "T s"]]:
+        """Both, at the time points of one more block."""
+        before = np.concatenate([self.rates[None], rates[:-1]])
+        h = np.diff(t, prepend=self.t)
+        work = self.work + np.cumsum(0.5 * h[:, None] * (rates + before), axis=0)
+        total = self.taken + np.cumsum(taken, axis=0)
+        self.t, self.rates, self.work, self.taken = t[-1], rates[-1], work[-1], total[-1]
+        return work, total
+
+
+class Account:
+    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        joined = zip(model.links, model.joints, model.bodies, strict=True)
+        self.of = [constants(*each, model.damping) for each in joined]
+        self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
+        self._block: Block | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._next = -1
+        self._sums: _Sums | None = None
+        self._start: Float[np.ndarray, " 7"] = np.zeros(7)
+        self._last: list[Last | None] = [None] * len(self.of)
+        self._largest = np.zeros(8)
+
+    def rows(self, block: Block) -> dict[str, Rows]:
+        """The channels over a block; the same block again is not counted twice."""
+        if block is not self._block:
+            if block.step != self._next:
+                self._begin()
+            self._rows = self._added(block)
+            self._block, self._next = block, block.step + len(block)
+        return self._rows
+
+    @property
+    def balance(self) -> Balance:
+        """Up to now."""
+        exchanged, momentum, angular, *left = (float(x) for x in self._largest)
+        return Balance(*(_share(x, of) for x, of in zip(
+            left, (exchanged, exchanged, momentum, angular, angular), strict=True
+        )))  # fmt: skip
+
+    def _added(self, block: Block) -> dict[str, Rows]:
+        """Energies and sums of one more block."""
+        flows, taken = self._flows(block)
+        flow = sum(flows[1:], start=flows[0])
+        strain = np.sum([link.strain for link in block.links], axis=0)
+        state = np.column_stack([flow.kinetic + strain, flow.momentum, flow.angular])
+        rates = np.column_stack(
+            [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning]
+        )
+        if self._sums is None:
+            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(8))
+            self._start = state[0]
+        work, total = self._sums.add(block.motion.t, rates, taken)
+        change = state - self._start
+        left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
+        left += np.column_stack(
+            [total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]]
+        )
+        self._watch(flows, np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]), left, work)
+        return {
+            "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
+            "dissipated": total[:, :1], "neglected": (work[:, 2] + total[:, 1])[:, None], "residual": left[:, :1],
+        }  # fmt: skip
+
+    def _flows(self, block: Block) -> tuple[list[Flow], Float[np.ndarray, "T 8"]]:
+        """Of every link, and what damping takes in each step, all links together."""
+        motion, flows, taken = block.motion, [], np.zeros((len(block), 8))
+        for k, (of, history) in enumerate(zip(self.of, block.links, strict=True)):
+            made = products(of, history)
+            flows.append(link_flow(of, history, made, motion))
+            found = resistance(of, history, made, motion, self._last[k])
+            if found is not None:
+                lost, self._last[k] = found
+                taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
+        for of, x in zip(self.carried, self.model.carried, strict=True):
+            flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
+        return flows, taken
+
+    def _watch(self, flows: list[Flow], exchanged: Rows, left: Rows, work: Float[np.ndarray, "T 12"]) -> None:
+        """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
+        planar = any(of.link.planar for of in self.of)
+        linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
+        sizes = (
+            exchanged, sum(_size(x.momentum) for x in flows), sum(_size(x.angular) for x in flows),
+            left[:, 0], work[:, 2], _size(left[:, 1:4][:, linear]), _size(left[:, 4:7][:, angular]),
+            _size(work[:, 9:][:, angular]),
+        )  # fmt: skip
+        self._largest = np.maximum(self._largest, [float(np.abs(x).max()) for x in sizes])
+
+
+def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
+    """Energies over time, and what the integration leaves over."""
+
+    def rows(name: str) -> Callable[[Block], Rows]:
+        return lambda block: account.rows(block)[name]
+
+    return [
+        (Channel(f"energy/{name}", columns, "J", "", text), rows(name)) for name, columns, text in ENERGIES
+    ]
+
+
+def balance_warning(found: Balance) -> tuple[str, ...]:
+    """A warning where the integration loses or makes energy or momentum."""
+    left = {"energy": found.energy, "momentum": found.linear, "angular momentum": found.angular}
+    said = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
+    if not said:
+        return ()
+    return (
+        f"the balance leaves over {said}: the steps are too long for what moves, or numerical damping takes what they "
+        "do not resolve; take shorter ones",
+    )
+
+
+def _size(x: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:
+    return np.asarray(np.sqrt((x**2).sum(axis=1)))
+
+
+def _share(x: float, of: float) -> float:
+    return x / of if of else 0.0

@@ -1,0 +1,261 @@
+"""Geometric stiffening: the nominal stresses, three solvers, order in time, sweeps, and where they do not settle."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.histories import histories, relative_errors, worst
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics import stiffened_kernel, stiffening
+from kedfem.dynamics.condensed import CondensedSteps, add_port_forces, coupled
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
+from kedfem.dynamics.transient import forcings, steps_of, transient
+from kedfem.errors import SceneError, SolveError
+from kedfem.links.recovery import point_rows
+from kedfem.links.reduced import rigid_modes
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import drive_angle, scene_from, time_grid
+
+from .test_dynamics import four_bar, slider_crank
+from .test_steps import displacements, mixed
+
+
+def stiff(raw: dict[str, Any], **analysis: Any) -> dict[str, Any]:
+    raw["analysis"] |= {"stiffening": True, **analysis}
+    return raw
+
+
+def sliding() -> dict[str, Any]:
+    raw = slider_crank("rigid")
+    raw["analysis"] = {"turns": 0.25, "steps_per_turn": 120}
+    return raw
+
+
+def loaded() -> dict[str, Any]:
+    """Everything that can put stress on a link: gravity, forces that turn and that do not, bodies."""
+    raw = mixed()
+    raw["gravity"] = [3.0, -9.81, 0.0]
+    raw["loads"] = {
+        "a": {"kind": "force", "link": "rocker", "at": "C", "vector": [300, 200, 0], "frame": "link"},
+        "b": {"kind": "force", "link": "crank", "at": "B", "vector": [-100, 400, 0]},
+        "c": {"kind": "body", "link": "coupler", "vector": [1e5, 2e5, 0], "frame": "link"},
+        "d": {"kind": "body", "link": "rocker", "vector": [1e5, 2e5, 0]},
+    }
+    return raw
+
+
+@pytest.mark.parametrize("made", [loaded, sliding, lambda: four_bar("plate")])
+def test_stress_modes_hold_every_stress_of_the_nominal_motion(
+    made: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Port forces are those of `coupled`; Σ s_i g_i is the static deflection but for rigid motion."""
+    monkeypatch.setattr(stiffening, "NEGLIGIBLE", 0.0)  # bending of planar beams has no stress stiffness
+    ready = meshed(scene_from(made()))
+    model = ready.model
+    t = np.array([0.0, 0.013, 0.04])
+    motion = rigid_motion(ready.linkage, ready.path, t, drive_angle(ready.scene.drive.motion, t))
+    found = stiffening.stiffening(model)
+    forcing = forcings(model, motion)
+    stressed = found.stressed(forcing)
+    for k in range(len(t)):
+        R = [each.R[k] for each in forcing]
+        load = [each.F[k] @ each.R[k] for each in forcing]
+        g, forces = coupled(found.parts, R, load)
+        for i, (link, joint, modes) in enumerate(zip(model.links, model.joints, found.modes, strict=True)):
+            total = load[i].copy()
+            add_port_forces(total, joint, forces[i])
+            assert stressed[i].stress is not None
+            state = np.tensordot(stressed[i].stress[k], modes.states, 1)
+            left = (link.K0 @ state.ravel()).reshape(total.shape) - total
+            assert_allclose(
+                left, 0, rtol=0, atol=1e-6 * np.abs(total).max()
+            )  # of solids, held at three nodes
+            B = np.linalg.qr(rigid_modes(link))[0]
+            beside = (g[i] - state).ravel()
+            beside -= B @ (B.T @ beside)
+            # what remains beside rigid motion, of the deflection's size
+            assert np.abs(beside).max() < 1e-6 * np.abs(g[i]).max()
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.8])
+@pytest.mark.parametrize(("made", "effect"), [(loaded, 0.02), (sliding, 3e-4)])
+def test_dense_condensed_and_literal_stiffened_steps_are_one(
+    made: Any, effect: float, rho_inf: float
+) -> None:
+    ready = meshed(scene_from(stiff(made(), initial="quasi-static")))
+    model, scheme = ready.model, generalised_alpha(time_grid(ready.scene).step, rho_inf)
+    stresses = stiffening.stiffening(model)
+    dense, condensed, literal = (
+        displacements(ready, kind(model, scheme, stresses))
+        for kind in (StiffenedDense, StiffenedCondensed, StiffenedLiteral)
+    )
+    for other in (condensed, literal):
+        for got, wanted in zip(dense, other, strict=True):
+            # rounding, amplified by the stiffness of the links along their line, and what the sweeps leave
+            assert_allclose(got, wanted, rtol=0, atol=3e-7 * np.abs(wanted).max())
+    plain = displacements(ready, CondensedSteps(model.links, model.joints, scheme, model.damping))[0]
+    assert np.abs(plain - dense[0]).max() > effect * np.abs(plain).max()
+
+
+@pytest.mark.parametrize(
+    ("kind", "solver", "plain", "stiffened_kind"),
+    [
+        ("beam", "condensed", DenseSteps, StiffenedDense),
+        ("plate", "condensed", CondensedSteps, StiffenedCondensed),
+        ("beam", "literal", LiteralSteps, StiffenedLiteral),
+    ],
+)
+def test_a_scene_that_does_not_ask_for_stiffening_has_the_plain_solver(
+    kind: str, solver: str, plain: type, stiffened_kind: type
+) -> None:
+    raw = four_bar(kind, solver=solver)
+    ready = meshed(scene_from(raw))
+    assert type(steps_of(ready.scene, ready.model)) is plain
+    assert type(steps_of(scene_from(stiff(raw)), ready.model)) is stiffened_kind
+
+
+def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    ready = meshed(scene_from(stiff(loaded(), turns=0.05, rho_inf=0.8)))
+    fast = displacements(ready, steps_of(ready.scene, ready.model))
+    for name in ("advance_stiffened", "settled", "sweep", "combined", "add_turned", "predicted"):
+        monkeypatch.setattr(stiffened_kernel, name, getattr(stiffened_kernel, name).py_func)
+    slow = displacements(ready, steps_of(ready.scene, ready.model))
+    for got, wanted in zip(slow, fast, strict=True):
+        assert_allclose(got, wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())  # sums in another order
+
+
+def tip(ready: Prepared) -> np.ndarray:
+    """Displacements (T, k) of all links."""
+    blocks = transient(
+        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
+    )
+    return np.concatenate([np.hstack([x.u.reshape(len(b), -1) for x in b.links]) for b in blocks])
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.6])
+def test_stiffened_steps_are_of_second_order(rho_inf: float) -> None:
+    """At t = 0.02 s; beams soft enough for a step to resolve all of their motion that counts."""
+    raw = stiff(four_bar("beam", turns=0.2, rho_inf=rho_inf, initial="quasi-static"))
+    raw["drive"]["motion"]["speed"] = "300 rpm"
+    raw["damping"] = {"alpha": 0.0, "beta": 1e-4}
+    last = []
+    for steps in (1000, 2000, 4000, 8000):
+        raw["analysis"]["steps_per_turn"] = steps
+        last.append(tip(meshed(scene_from(raw)))[-1])
+    errors = [np.abs(x - y).max() for x, y in pairwise(last)]
+    slopes = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert_allclose(slopes, 2.0, atol=0.15)
+    assert errors[-1] < 1e-4 * np.abs(last[-1]).max()
+
+
+def test_what_stiffening_changes_grows_with_the_square_of_the_speed() -> None:
+    """Stresses and deflections are of the order of speed², so their product, of the deflection, is."""
+    effect = []
+    for rpm in (60, 120, 240):
+        raw = four_bar("beam", steps_per_turn=720, initial="quasi-static", rho_inf=0.9)
+        raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
+        raw["damping"] = {"alpha": 0.0, "beta": 1e-3}  # so that no vibration is left
+        plain, stiffened_ = tip(meshed(scene_from(raw))), tip(meshed(scene_from(stiff(raw))))
+        effect.append(np.abs(stiffened_ - plain).max() / np.abs(plain).max())
+    slopes = np.diff(np.log2(effect))
+    assert_allclose(slopes, 2.0, atol=0.3)
+    assert effect[0] < 2e-3
+
+
+def test_two_sweeps_a_step_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On average, with the predictor; 720 steps a turn at 600 rpm, from rest."""
+    solved = []
+    monkeypatch.setattr(stiffening, "coupled", lambda *given: (solved.append(1), coupled(*given))[1])
+    ready = meshed(scene_from(stiff(four_bar("beam", steps_per_turn=720, turns=0.5))))
+    scheme = generalised_alpha(time_grid(ready.scene).step, 0.95)
+    stresses = stiffening.stiffening(ready.model)
+    steps = len(displacements(ready, StiffenedCondensed(ready.model, scheme, stresses))[0]) - 1
+    assert steps == 360
+    assert 1.9 * steps < len(solved) < 2.2 * steps
+
+
+@pytest.mark.parametrize("kind", ["beam", "spatial"])
+def test_where_stiffening_is_no_small_term_the_run_ends_and_says_so(kind: str) -> None:
+    """A thin arm that turns fast, in steps far too long: what is done is kept."""
+    shape = {"kind": "bar", "between": ["A", "B"], "width": 0.002, "thickness": 0.002}
+    arm = {"material": "steel", "fidelity": "beam", "shape": shape, "mesh": {"elements": 6}}
+    arm |= {"beam": "spatial"} if kind == "spatial" else {}
+    raw = {
+        "points": {"A": [0, 0], "B": [1, 0]},
+        "links": {"arm": arm},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A", "axis": [0, 0, 1]}},
+        "drive": {"joint": "A", "motion": {"kind": "ramp", "speed": 200.0, "time": 0.5}},
+        "gravity": [0, -9.81, 0],
+        "analysis": {"end_time": 0.5, "step": 0.01, "stiffening": True},
+    }  # fmt: skip
+    ready = meshed(scene_from(raw))
+    solver, steps = steps_of(ready.scene, ready.model), 0
+
+    def all_of_it() -> None:
+        nonlocal steps
+        for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
+            assert np.isfinite(block.links[0].u).all()
+            steps += len(block)
+
+    with pytest.raises(
+        SolveError, match=r"at step \d+, t = 0\.\d+ s, .* take a smaller step, or frames = \"foll"
+    ):
+        all_of_it()
+    assert 1 < steps < 50
+
+
+def test_reduced_links_are_stiffened_as_full_ones_are() -> None:
+    raw = stiff(four_bar("bar", turns=0.5, steps_per_turn=240, initial="quasi-static"))
+    full = histories(meshed(scene_from(raw)))
+    for link in raw["links"].values():
+        link["reduced"] = True
+    ready, _ = prepared(scene_from(raw))
+    assert all(link.full is not None for link in ready.model.links)
+    assert worst(relative_errors(histories(ready), full)) < 2e-3
+    raw["analysis"]["stiffening"] = False
+    assert worst(relative_errors(histories(ready), full)) < worst(
+        relative_errors(histories(meshed(scene_from(raw))), full)
+    )
+
+
+def test_stiffening_is_true_or_false() -> None:
+    with pytest.raises(SceneError, match=r"analysis\.stiffening"):
+        scene_from(stiff(four_bar("beam"), stiffening="yes"))
+
+
+@pytest.mark.parametrize(("beam", "component", "mu"), [("planar", 1, 5.0), ("spatial", 2, 20.0)])
+def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int, mu: float) -> None:
+    """Stress stiffness is many times K0 across the arm there; a force that turns with it leaves it where it is."""
+    shape = {"kind": "bar", "between": ["A", "B"], "width": 0.02, "thickness": 0.02}
+    force = [0.0, 0.0, 0.0]
+    force[component] = 0.01
+    speed = mu * np.sqrt(1e9 * 0.02**2 / 12 / 1000)
+    raw = {
+        "points": {"A": [0, 0], "B": [1, 0]},
+        "materials": {"m": {"density": 1000, "youngs_modulus": 1e9, "poisson_ratio": 0.0}},
+        "links": {
+            "arm": {
+                "material": "m", "fidelity": "beam", "beam": beam, "shape": shape, "mesh": {"elements": 6}
+            }
+        },
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A", "axis": [0, 0, 1]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
+        "loads": {"tip": {"kind": "force", "link": "arm", "at": "B", "vector": force, "frame": "link"}},
+        "analysis": {"turns": 0.5, "steps_per_turn": 2000, "stiffening": True, "initial": "quasi-static"},
+    }  # fmt: skip
+    ready = meshed(scene_from(raw))
+    blocks = transient(
+        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
+    )
+    at = point_rows(ready.model.links[0], "tip", np.array([1.0, 0, 0])).value
+    g = np.concatenate([np.einsum("n,tnd->td", at, block.links[0].g) for block in blocks])
+    for c in {0, component}:
+        assert np.abs(g[0, c]) > 0
+        assert_allclose(g[:, c], g[0, c], rtol=2e-4)  # the start's rate is of second order in the step
