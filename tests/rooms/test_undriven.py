@@ -178,12 +178,12 @@ def test_a_scene_without_any_joint_can_be_built() -> None:
     }  # fmt: skip
     ready = meshed(scene_from(raw))
     assert ready.linkage.mobility == 6
-    assert ready.model.coordinates == ready.model.unknowns == 21
-    (rate,) = initial_rates(ready.scene, ready.linkage, ready.model)
-    X = ready.model.links[0].X
-    np.testing.assert_allclose(
-        rate, np.c_[1 - 0 * X[:, 0], 2 + 30 * (X[:, 0] - 0.5), 30 + 0 * X[:, 0]], atol=1e-12
-    )
+    assert ready.model.coordinates == 21  # of seven nodes
+    for link, rate in zip(
+        ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model), strict=True
+    ):
+        x, one = link.X[:, 0], np.ones(link.n)
+        np.testing.assert_allclose(rate, np.c_[one, 2 + 30 * (x - 0.5), 30 * one], atol=1e-12)
 
 
 def test_check_tells_what_moves_and_by_what(tmp_path: Path) -> None:

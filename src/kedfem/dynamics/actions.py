@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from kedfem.dynamics.action import (
     End,
     Vector,
 )
-from kedfem.dynamics.coupling import seat_of, slider_axis
+from kedfem.dynamics.coupling import on_part, seat_of, slider_axis
 from kedfem.dynamics.model import Model, Slider
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
@@ -29,44 +30,28 @@ from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
 
-Resolve = Callable[[str, Vector], int]
-"""The number in a model's links of the one, or the segment, of a name that holds a drawn point."""
+T = TypeVar("T")
 
 
-def actions(scene: Scene, model: Model, resolve: Resolve | None = None) -> tuple[Action, ...]:
+def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
     """All motors and springs of a scene.
-
-    Parameters
-    ----------
-    resolve : which of the links, or segments, of a name holds a drawn point; the nearest if not given
 
     Raises
     ------
     MeshError, SceneError
         If a point or joint is not on its link.
     """
-    find = _Ends(scene, model, resolve or nearest(model))
+    find = _Ends(scene, model)
     motors = [_motor(find, name, motor) for name, motor in scene.motors.items()]
     springs = [_spring(find, name, spring) for name, spring in scene.springs.items()]
     return (*motors, *springs)
 
 
-def hinges(scene: Scene, model: Model, resolve: Resolve | None = None) -> tuple[Action, ...]:
+def hinges(scene: Scene, model: Model) -> tuple[Action, ...]:
     """An action without a force for each revolute joint: its turn is looked at."""
-    find = _Ends(scene, model, resolve or nearest(model))
+    find = _Ends(scene, model)
     names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
-
-
-def nearest(model: Model) -> Resolve:
-    """Of several links of one name, the one with a node nearest to the point."""
-
-    def found(name: str, point: Vector) -> int:
-        here = [k for k, link in enumerate(model.links) if link.name == name]
-        nodes = {k: (model.links[k].full or model.links[k]).nodes for k in here}
-        return min(here, key=lambda k: float(np.linalg.norm(nodes[k] - point, axis=1).min()))
-
-    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +60,12 @@ class _Ends:
 
     scene: Scene
     model: Model
-    resolve: Resolve
+
+    def part(self, name: str, at: Vector, found: Callable[[Link], T]) -> tuple[int, T]:
+        """The number of the link or segment of a name that has something at a point, and what was found on it."""
+        parts = {str(k): link for k, link in enumerate(self.model.links)}
+        key, thing = on_part(parts, name, at, found)
+        return int(key), thing
 
     def body(self, name: str) -> int | None:
         """The body that a link without unknowns moves with; None of others."""
@@ -91,9 +81,8 @@ class _Ends:
         body = self.body(name)
         if body is not None:
             return End(-1, body, POINT, np.zeros((1, 0)), at[None])
-        k = self.resolve(name, at)
+        k, rows = self.part(name, at, lambda link: point_rows(link, where, at))
         link = self.model.links[k]
-        rows = point_rows(link, where, at)
         beside = float(np.linalg.norm(rows.X - at))
         if link.kind == "beam" and beside > 1e-6 * link.size:
             raise SceneError(f"{where}: must lie on the axis of beam '{name}', got {beside:.3g} m beside it")
@@ -114,9 +103,8 @@ class _Ends:
         body = self.body(name)
         if body is not None:
             return End(-1, body, PAIR, np.zeros((2, 0)), both)
-        k = self.resolve(name, at)
-        link = self.model.links[k]
-        seat, here = seat_of(self.scene, joint, link), self.model.bodies[k]
+        k, seat = self.part(name, at, lambda link: seat_of(self.scene, joint, link))
+        link, here = self.model.links[k], self.model.bodies[k]
         if link.kind == "beam":
             return End(k, here, ANGLE, seat.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
         if all(holds(seat, e) for e in both):
@@ -164,10 +152,10 @@ def _port(find: _Ends, joint: str, name: str, at: Vector) -> End:
     """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
     if find.body(name) is not None:
         return find.point(f"joints.{joint}", name, at)
-    k = find.resolve(name, at)
-    link = find.model.links[k]
-    weights = port_weights(seat_of(find.scene, joint, link), at[None])
-    return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
+    k, seat = find.part(name, at, lambda link: seat_of(find.scene, joint, link))
+    return End(
+        k, find.model.bodies[k], POINT, port_weights(seat, at[None]), at[None], _plane(find.model.links[k])
+    )
 
 
 def _motor(find: _Ends, name: str, motor: Motor) -> Action:
