@@ -331,6 +331,16 @@ def spring(link: str, at: list[float], to: list[float], **more: Any) -> dict[str
     }
 
 
+def test_a_joint_that_names_the_ground_first_turns_its_link_all_the_same() -> None:
+    raw = arm("beam")
+    raw["joints"]["A"]["links"] = ["ground", "arm"]
+    scene, model = built(raw)
+    (action,) = actions(scene, model)
+    f, values = found(action, state_of(action, model, turning(model, 0.5 * Z)))
+    assert values[0] == pytest.approx(-0.5)
+    np.testing.assert_allclose(f[0, 0], [0, 0, -2.5], atol=1e-12)  # about the axis, −z
+
+
 def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     springs = {
         "tip": spring("arm", [1, 0], [1, 2]),
