@@ -80,12 +80,12 @@ def balance_table(found: Balance, geometric: float) -> Table:
     """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
     table = Table(title="Balance and geometric error", show_header=False)
     for what, share in (
-        ("energy left over by the steps", found.energy),
+        ("energy, left over by the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
-        table.add_row(what, f"{_percent(share)} of the largest exchanged")
-    table.add_row("work that nominal frames neglect", f"{_percent(found.neglected)} of it")
+        table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
+    table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
     table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 

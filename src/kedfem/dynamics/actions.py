@@ -1,8 +1,6 @@
 """Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -20,8 +18,8 @@ from kedfem.dynamics.action import (
     End,
     Vector,
 )
-from kedfem.dynamics.coupling import on_part, seat_of, slider_axis
-from kedfem.dynamics.model import Model, Slider
+from kedfem.dynamics.coupling import seat_of, slider_axis
+from kedfem.dynamics.model import Model, Slider, on_segment
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
@@ -29,8 +27,6 @@ from kedfem.links.seats import Seat, face_normal, holds, port_weights
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
-
-T = TypeVar("T")
 
 
 def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
@@ -61,12 +57,6 @@ class _Ends:
     scene: Scene
     model: Model
 
-    def part(self, name: str, at: Vector, found: Callable[[Link], T]) -> tuple[int, T]:
-        """The number of the link or segment of a name that has something at a point, and what was found on it."""
-        parts = {str(k): link for k, link in enumerate(self.model.links)}
-        key, thing = on_part(parts, name, at, found)
-        return int(key), thing
-
     def body(self, name: str) -> int | None:
         """The body that a link without unknowns moves with; None of others."""
         if name == GROUND or slider_axis(self.scene, name) is not None:
@@ -81,7 +71,7 @@ class _Ends:
         body = self.body(name)
         if body is not None:
             return End(-1, body, POINT, np.zeros((1, 0)), at[None])
-        k, rows = self.part(name, at, lambda link: point_rows(link, where, at))
+        k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
         link = self.model.links[k]
         beside = float(np.linalg.norm(rows.X - at))
         if link.kind == "beam" and beside > 1e-6 * link.size:
@@ -103,7 +93,7 @@ class _Ends:
         body = self.body(name)
         if body is not None:
             return End(-1, body, PAIR, np.zeros((2, 0)), both)
-        k, seat = self.part(name, at, lambda link: seat_of(self.scene, joint, link))
+        k, seat = on_segment(self.model, name, at, lambda link: seat_of(self.scene, joint, link))
         link, here = self.model.links[k], self.model.bodies[k]
         if link.kind == "beam":
             return End(k, here, ANGLE, seat.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
@@ -152,10 +142,9 @@ def _port(find: _Ends, joint: str, name: str, at: Vector) -> End:
     """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
     if find.body(name) is not None:
         return find.point(f"joints.{joint}", name, at)
-    k, seat = find.part(name, at, lambda link: seat_of(find.scene, joint, link))
-    return End(
-        k, find.model.bodies[k], POINT, port_weights(seat, at[None]), at[None], _plane(find.model.links[k])
-    )
+    k, seat = on_segment(find.model, name, at, lambda link: seat_of(find.scene, joint, link))
+    link, weights = find.model.links[k], port_weights(seat, at[None])
+    return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
 
 
 def _motor(find: _Ends, name: str, motor: Motor) -> Action:

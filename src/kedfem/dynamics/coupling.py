@@ -271,7 +271,7 @@ def on_part(
         That of the nearest segment, if none has it.
     """
     parts = {key: link for key, link in links.items() if link.name == name}
-    gap = {key: float(np.linalg.norm(link.nodes - at, axis=1).min()) for key, link in parts.items()}
+    gap = {key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min()) for key, link in parts.items()}
     first: KedfemError | None = None
     for key in sorted(parts, key=lambda key: gap[key]):
         try:

@@ -10,11 +10,13 @@ constant and factored once, in the segment's frame as predicted: [KED, eqs. (12)
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
+from kedfem.dynamics.acting import Acting, for_kernel, weights
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.coupling import Attachment
@@ -23,11 +25,13 @@ from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link, mass_times
+from kedfem.motion.rigid import RigidMotion
 
 DEBUG=0
 DEPTH = 4  # sweeps that are remembered
+LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
-CONVERGED = 1e-8  # change of a sweep, of the largest displacement
+CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made; what is left of each step adds up
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,13 +149,18 @@ class FollowingSteps:
     """Advances all segments by generalised-α steps; their effective matrices are factored once, here."""
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
-        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        acting: Acting,
+    ) -> None:  # fmt: skip
+        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
-        self.factorisations, self.sweeps, self.scale = len(self.parts), 0, 0.0
+        self.factorisations, self.sweeps = len(self.parts), 0
+        self.scale = rounding(links)
         self.mixing = Mixing()
+        self._shape = max(link.d for link in links), max(link.n for link in links)
+        self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
+        self._turned = np.zeros(len(acting.every))
 
     def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
         """The state of the first time point."""
@@ -160,8 +169,12 @@ class FollowingSteps:
             for link, joint, s in zip(self.links, self.joints, states, strict=True)
         ]
 
+    def copied(self, state: list[SegmentState]) -> list[SegmentState]:
+        """A state that a solver may use up."""
+        return list(state)
+
     def advance(
-        self, state: list[SegmentState], forcing: Sequence[Forcing]
+        self, state: list[SegmentState], forcing: Sequence[Forcing], motion: RigidMotion
     ) -> tuple[list[LinkHistory], list[SegmentState]]:
         """All time points of a block; see `DenseSteps.advance`.
 
@@ -171,15 +184,18 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[list[SegmentState]] = []
+        acting = for_kernel(self.acting, self._weights, motion)
         for t in range(len(forcing[0].R)):
-            now = self.step(state, [Nominal(each.R[t], each.F[t]) for each in forcing])
+            now = self.step(state, [each.at(t) for each in forcing], acting, t)
             if isinstance(now, str):
                 raise NotConverged(t, self._histories(taken), state, now)
             state = now
             taken.append(now)
         return self._histories(taken), state
 
-    def step(self, states: Sequence[SegmentState], at: Sequence[Nominal]) -> list[SegmentState] | str:
+    def step(
+        self, states: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
+    ) -> list[SegmentState] | str:
         """States of all segments one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle."""
         now = [self._predicted(k, s, nominal) for k, (s, nominal) in enumerate(zip(states, at, strict=True))]
         R = [s.R for s in now]
@@ -188,6 +204,7 @@ class FollowingSteps:
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
         for _ in range(SWEEPS):
+            now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = self._solved(rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
@@ -199,15 +216,31 @@ class FollowingSteps:
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
                 for k, (s, n, x, nominal) in enumerate(zip(states, now, np.split(taken, ends), at, strict=True))
             ]
-            self.scale = max(self.scale, sum(float(np.vdot(n.u, n.Mu)) for n in now))
+            self.scale = max(self.scale, sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)))
             if not np.isfinite(sizes).all():
                 break
             if sum(sizes) <= CONVERGED**2 * self.scale:
+                now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)
                     for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
                 ]
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
+
+    def _acted(
+        self, now: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
+    ) -> tuple[list[SegmentState], Float[np.ndarray, " A"]]:
+        """States with the forces of motors and springs where they are now, and the coordinates of these."""
+        if acting is None:
+            return list(now), self._turned
+        from kedfem.dynamics.acting_kernel import external
+
+        u, v, F = np.zeros((3, len(self.links), *self._shape))
+        for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
+            for each, x in zip(padded, rows, strict=True):
+                each[: x.shape[1], : len(x)] = x.T
+        turned = external(acting, t, u, v, self._turned, F).copy()
+        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, F, strict=True)], turned
 
     def _predicted(self, k: int, s: SegmentState, at: Nominal) -> SegmentState:
         """The end of the step with an acceleration that stays, seen from frames there."""
@@ -289,6 +322,12 @@ def position(link: Link, u: Nodal) -> Nodal:
     """Position of a segment displaced by u, both in the nominal frame; of a planar beam (x, y, ψ)."""
     X = link.X[:, : link.d]
     return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
+
+
+def rounding(links: Sequence[Link]) -> float:
+    """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
+    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    return float(LEAST**2 * sum(sizes))
 
 
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:

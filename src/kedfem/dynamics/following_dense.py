@@ -7,15 +7,17 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from kedfem.dynamics.acting import Acting, for_kernel, weights
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
-from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state
+from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
 from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
 from kedfem.links.record import Link
+from kedfem.motion.rigid import RigidMotion
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
 State = tuple[np.ndarray, ...]
@@ -25,9 +27,10 @@ class FollowingDense:
     """`FollowingSteps` of small segments; everything constant is made here, once."""
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
-        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        acting: Acting,
+    ) -> None:  # fmt: skip
+        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
@@ -35,13 +38,14 @@ class FollowingDense:
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
-        self._counts = np.zeros(3)
+        self._counts = np.array([0.0, rounding(links), 0.0])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]
         self._memory = np.zeros((2, DEPTH, size)), np.zeros((2, size))
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
+        self._weights = weights(acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
     @property
@@ -72,9 +76,15 @@ class FollowingDense:
                 g[0, i, e].reshape(D, n)[: link.d, : link.n] = x
             if link.fit is not None:
                 Q[i, -1], angle[i, -1] = Q[i, 0], angle[i, 0]
-        return u, v, a, F, f, C, force, Q, angle, g
+        return u, v, a, F, f, C, force, Q, angle, g, np.zeros(len(self.acting.every))
 
-    def advance(self, state: State, forcing: Sequence[Forcing]) -> tuple[list[LinkHistory], State]:
+    def copied(self, state: State) -> State:
+        """A state that a solver may use up."""
+        return tuple(x.copy() for x in state)
+
+    def advance(
+        self, state: State, forcing: Sequence[Forcing], motion: RigidMotion
+    ) -> tuple[list[LinkHistory], State]:
         """All time points of a block, one step after the other, [KED, eq. (20)]; see `DenseSteps.advance`.
 
         Raises
@@ -94,8 +104,8 @@ class FollowingDense:
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
         history = (u, v, a, g, np.empty((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
-            self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F), state,
-            history, self._memory, self._counts,
+            self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F),
+            for_kernel(self.acting, self._weights, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
         histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
         if taken < T:

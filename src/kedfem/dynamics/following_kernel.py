@@ -10,10 +10,12 @@ H = Σ Bᵀ R S Rᵀ B has its entries near the diagonal: from column `first` of
     frames : number (L,), fit (L, E, D, S), K (L, E, N, N), share (L, E, N, N)
     kinds : (L,) 0: rows (u, v, w), 1: (u, v), 2: (u, v, ψ)
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components, Q (L, E + 1, 3, 3), angle (L, E + 1),
-        g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one
+        g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one;
+        turned (A,) coordinates of the actions
+    acting : of `dynamics.acting_kernel`; None without motors and springs, whose code is then not compiled
     history : u, v, a, g (T, L, D, S), R (T, L, D, D), port forces (T, L, Q) in that frame, strain energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed; last step and change (2, L·D·S)
-    counts : sweeps, scale², pairs that are known
+    counts : sweeps, square of what counts as a step, pairs that are known
 
 Imported when it is first needed. Plain loops, so that nothing is allocated in a step.
 """
@@ -22,6 +24,8 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+
+from kedfem.dynamics.acting_kernel import external
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
@@ -33,13 +37,14 @@ TURNS = 20
 
 @compiled
 def follow_block(  # type: ignore[no-untyped-def]
-    coefficients, matrices, unknowns, shapes, frames, kinds, forcing, state, history, memory, counts
+    coefficients, matrices, unknowns, shapes, frames, kinds, forcing, acting, state, history, memory, counts
 ):
     """Take up to T steps in place, [KED, eq. (20)]; the number that settled, and the segment that did not or -1."""
     G, Yt, S, B = matrices
     columns, count, first = unknowns
     Rs, Fs = forcing
-    u, v, a, F0, f0, C, force0, Q0, angle0, g0 = state
+    F = np.zeros(Fs.shape[1:])
+    u, v, a, F0, f0, C, force0, Q0, angle0, g0, turned = state
     T, L, D, n = Fs.shape
     Qn, c, k = B.shape[1], B.shape[2], len(first)
     h, tolerance = coefficients[7], coefficients[12]
@@ -70,7 +75,10 @@ def follow_block(  # type: ignore[no-untyped-def]
         settled, worst = False, -1
         for sweep in range(SWEEPS):
             counts[0] += 1
-            residuals(coefficients, Fs[t], Rp, state, end, rhs)
+            F[:] = Fs[t]
+            if acting is not None:
+                external(acting, t, u1, v1, turned, F)
+            residuals(coefficients, F, Rp, state, end, rhs)
             worst = swept(parts, Rp, rhs, H, first, z, reaction, force, change)
             moved = squares(change)
             mixed(memory, counts, sweep, change.ravel())
@@ -81,14 +89,17 @@ def follow_block(  # type: ignore[no-untyped-def]
             end_of_step(coefficients, shapes, frames, kinds, Rs[t], state, end, work)
             if not np.isfinite(moved):
                 break
-            counts[1] = max(counts[1], squares(u1))
+            counts[1] = max(counts[1], difference(u1, u))
             if moved <= tolerance * tolerance * counts[1]:
                 settled = True
                 break
         if not settled:
             return t, worst
         mean_frames(shapes, frames, kinds, Rs[t], u1, Q1, angle1, work)
-        recorded(coefficients, t, frames, kinds, Rs[t], Fs[t], Rp, force, state, end, history)
+        F[:] = Fs[t]
+        if acting is not None:
+            turned[:] = external(acting, t, u1, v1, turned, F)
+        recorded(coefficients, t, frames, kinds, Rs[t], F, Rp, force, state, end, history)
     return T, -1
 
 
@@ -100,6 +111,17 @@ def squares(x):  # type: ignore[no-untyped-def]
         for b in range(x.shape[1]):
             for j in range(x.shape[2]):
                 total += x[i, b, j] * x[i, b, j]
+    return total
+
+
+@compiled
+def difference(x, y):  # type: ignore[no-untyped-def]
+    """Sum of squares of x − y, (L, D, S)."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for b in range(x.shape[1]):
+            for j in range(x.shape[2]):
+                total += (x[i, b, j] - y[i, b, j]) ** 2
     return total
 
 
@@ -189,7 +211,7 @@ def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
 def end_of_step(coefficients, shapes, frames, kinds, R, state, end, work):  # type: ignore[no-untyped-def]
     """Rates, frames and internal force of all segments at the end of the step, from their displacement."""
     n0, n1, n2, _, h1, h0, alpha, beta = coefficients[4:12]
-    u, v, a, _, _, C, _, _, _, g0 = state
+    u, v, a, C, g0 = state[0], state[1], state[2], state[5], state[9]
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     X, one, _ = shapes
     number, fit, K, _ = frames
@@ -520,7 +542,7 @@ def solved(H, first, x):  # type: ignore[no-untyped-def]
 def recorded(coefficients, t, frames, kinds, R, F, Rp, force, state, end, history):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and a row of the history."""
     alpha_f = coefficients[2]
-    u, v, a, F0, f0, C, force0, Q0, angle0, g0 = state
+    u, v, a, F0, f0, C, force0, Q0, angle0, g0, _ = state
     u1, v1, a1, f1, C1, Q1, angle1, g1 = end
     us, vs, as_, gs, Rs, forces, energies = history
     number, _, K, share = frames

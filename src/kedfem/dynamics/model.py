@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -19,6 +20,9 @@ from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +168,20 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
     return replace(
         model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders)
     )
+
+
+def on_segment(
+    model: Model, name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
+) -> tuple[int, T]:
+    """The number of the link of a name, or of its segment, that has something at a drawn point, and what was found.
+
+    Raises
+    ------
+    MeshError, SceneError
+        That of the nearest segment, if none has it.
+    """
+    key, thing = on_part({str(k): link for k, link in enumerate(model.links)}, name, at, found)
+    return int(key), thing
 
 
 def stored_model(model: Model) -> Model | None:

@@ -7,8 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acting import acting_on
+from kedfem.dynamics.actions import actions
+from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
+from kedfem.dynamics.following import FollowingSteps
+from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
@@ -19,7 +24,8 @@ from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
-from kedfem.links.record import Link
+from kedfem.links.record import Link, as_rows
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -32,7 +38,7 @@ KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
 StiffenedSteps = StiffenedCondensed | StiffenedLiteral | StiffenedDense
-Steps = CondensedSteps | LiteralSteps | DenseSteps
+Steps = CondensedSteps | LiteralSteps | DenseSteps | FollowingSteps | FollowingDense
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
     'take a smaller step, or frames = "following"'
@@ -47,9 +53,11 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     SolveError
         If an effective matrix is not positive definite.
     """
-    if following(scene):
-        raise SolveError("analysis.frames: must be 'nominal' so far, got frames that follow")
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    if following(scene):
+        dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
+        follower = FollowingDense if dense else FollowingSteps
+        return follower(model.links, model.joints, scheme, model.damping, acting_on(actions(scene, model)))
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -89,13 +97,39 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
     length = block_length(model)
+    bridge = _bridge(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
         for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
-            forcing = forcings(model, part)
-            links, state = solver.advance(state, forcing)
-            block = Block(first + k, part, links)
-            yield from _finite(block, UNSETTLED if stresses else "")
+            if isinstance(solver, FollowingSteps | FollowingDense):
+                try:
+                    links, state = bridge.block(solver, state, part)
+                except Stuck as stuck:
+                    if stuck.taken:
+                        yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
+                    raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
+            else:
+                links, state = solver.advance(state, forcings(model, part))
+            yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def _bridge(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
+    """Smaller steps for where those of the analysis do not settle."""
+    return Bridge(
+        time_grid(scene).step, scene.analysis.rho_inf,
+        lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
+        lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
+    )  # fmt: skip
+
+
+def _stuck(step: int, part: RigidMotion, stuck: Stuck) -> str:
+    """What to do about a step that does not settle."""
+    k = stuck.taken
+    return (
+        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive angle "
+        f"{np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from sweep to "
+        "sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
+    )
 
 
 def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
@@ -153,7 +187,7 @@ def first_states(
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
     moments = instants(model, motion, stresses)
     if at_rest:
-        start = [Deflected(*(np.zeros((link.n, link.d)) for _ in range(3))) for link in model.links]
+        start = _undeformed(scene, linkage, model)
         return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
     u = quasi_static(model.links, model.joints, moments)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
@@ -164,6 +198,19 @@ def first_states(
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+
+
+def _undeformed(scene: Scene, linkage: Linkage, model: Model) -> list[Deflected]:
+    """No deflection, and the speeds at the start that the scene asks for beside those of the drive."""
+    v, omega = initial_twists(scene, linkage)
+    start = []
+    for link, body in zip(model.links, model.bodies, strict=True):
+        rate = as_rows(link, np.outer(link.one, v[body]) + np.cross(omega[body], link.X))
+        if link.kind == "beam":
+            rate[:, 2] = omega[body, 2] * link.one
+        none = np.zeros_like(rate)
+        start.append(Deflected(none, rate, none))
+    return start
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:

@@ -11,7 +11,7 @@ from kedfem.dynamics.condensed import turned_ports
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.model import Carried, Model, Slider
+from kedfem.dynamics.model import Carried, Model, Slider, on_segment
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
@@ -21,7 +21,7 @@ from kedfem.results.acting import acting
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
-from kedfem.scene import Probe, Scene
+from kedfem.scene import ForceLoad, Probe, Scene
 
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
@@ -54,9 +54,10 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
 
 
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
-    k = _number(model, probe.link)
+    where, drawn = f"output.probes.{name}.at", np.asarray(probe.at)
+    kinks = _kinks(scene, probe.link)
+    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
     link = model.links[k]
-    at = point_rows(link, f"output.probes.{name}.at", np.asarray(probe.at))
     key = f"probes/{name}/{probe.quantity}"
     place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
     if probe.quantity == "stress":
@@ -83,11 +84,20 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
         history = block.links[k]
         x = np.tensordot(getattr(history, field)[:, nodes], weights, (1, 0))
         if probe.frame == "link":
-            x = (x[:, None] @ history.R)[:, 0] @ link.axes[: link.d, : link.d]
+            R = block.motion.R[:, model.bodies[k], : link.d, : link.d]
+            x = (x[:, None] @ R)[:, 0] @ link.axes[: link.d, : link.d]
         return np.asarray(x[:, : len(columns)])
 
     description = f"elastic {probe.quantity} {place}"
     return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
+
+
+def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
+    """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
+    joints = [joint.at for joint in scene.joints.values() if link in joint.links]
+    bodies = [body.at for body in scene.bodies.values() if body.link == link]
+    forces = [load.at for load in scene.loads.values() if isinstance(load, ForceLoad) and load.link == link]
+    return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
 
 
 def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
@@ -101,7 +111,7 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
-    k = _number(model, held[0])
+    k = _holder(model, held[0], name)
     first, second = scene.joints[name].links
     opposite = first in {x.link.name for x in model.carried}  # it has no ports of its own
     on, other = (first, second) if held[0] == first or opposite else (second, first)
@@ -154,7 +164,7 @@ def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, l
     for name, joint in scene.joints.items():
         elastic = [x.name for x in model.links if x.name in joint.links]
         if link.name in joint.links and elastic:
-            held.append((_number(model, elastic[0]), name, np.asarray(joint.at)))
+            held.append((_holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(_wrench(model, *each), each[2]) for each in held]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
@@ -188,7 +198,8 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wre
         for j, share in shares:
             history = block.links[j]
             f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
-        R = block.motion.R[:, model.bodies[k]]
+        R = np.tile(np.eye(3), (len(block), 1, 1))
+        R[:, : link.d, : link.d] = block.links[k].R
         return _resultant(link, arms @ R.transpose(0, 2, 1), f.reshape(len(f), len(arms), link.d))
 
     return wrench
@@ -275,7 +286,7 @@ def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
     channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
-        wrench = _wrench(model, _number(model, name), driven, at)
+        wrench = _wrench(model, _holder(model, name, driven), driven, at)
     else:
         wrench, others = _hub_wrench(scene, model, carried)
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
@@ -305,8 +316,9 @@ def _rigid_torque(model: Model) -> Recorded:
     return Recorded(channel, torque)
 
 
-def _number(model: Model, name: str) -> int:
-    return next(k for k, link in enumerate(model.links) if link.name == name)
+def _holder(model: Model, name: str, joint: str) -> int:
+    """The link of a name, or its segment, that a joint holds."""
+    return next(k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints)
 
 
 def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:
