@@ -94,6 +94,24 @@ def borne(owners, weights, forces, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
+    """Add the forces of all actions to F (L, D, n), u and v being the states and their rates; coordinates (A,).
+
+    Parameters
+    ----------
+    acting : of `dynamics.acting.over_block`
+    t : number of the time point in the block
+    turned : (A,) coordinates at the time point before
+    """
+    owners, weights, table, times, x0, v0, x, x1, forces, values = acting
+    seen(owners, weights, x0[t], u, x)
+    seen(owners, weights, v0[t], v, x1)
+    evaluate(times[t], x, x1, turned, table, forces, values)
+    borne(owners, weights, forces, F)
+    return values[:, 0]
+
+
+@compiled
 def evaluate_all(t, x, v, before, table, values):  # type: ignore[no-untyped-def]
     """Values (T, A, 4) at successive times; x, v (T, A, 2, 2, 3); before (A,) is moved on to the last."""
     forces = np.zeros(x.shape[1:])

@@ -19,10 +19,12 @@ from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
-from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh
+from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh, time_grid
 
 
 T = TypeVar("T")
+
+RESOLVED = 60.0  # ω h of a rigid link whose frame follows: it bends by a h²/3600, a step errs by a h²/12
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +128,7 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = {key: rigid(x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()}
+    links = {key: _rigid(scene, x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()}
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     joined = attachments(scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)])
     loads = patterns(scene, links)
@@ -137,6 +139,11 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
         joints=tuple(joined[key] for key in links), loads=tuple(loads[key] for key in links),
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
     )  # fmt: skip
+
+
+def _rigid(scene: Scene, link: Link) -> Link:
+    """A rigid link, no stiffer than what bends it less by far in a step than the step's own error."""
+    return rigid(link) if link.fit is None else rigid(link, RESOLVED / time_grid(scene).step)
 
 
 def keys(name: str, link: Segments) -> list[str]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.acting import acting_on
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
@@ -19,13 +18,12 @@ from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
+from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
-from kedfem.links.record import Link, as_rows
-from kedfem.motion.initial import initial_twists
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -57,7 +55,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
-        return follower(model.links, model.joints, scheme, model.damping, acting_on(actions(scene, model)))
+        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model))
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -187,7 +185,7 @@ def first_states(
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
     moments = instants(model, motion, stresses)
     if at_rest:
-        start = _undeformed(scene, linkage, model)
+        start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
         return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
     u = quasi_static(model.links, model.joints, moments)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
@@ -198,19 +196,6 @@ def first_states(
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
-
-
-def _undeformed(scene: Scene, linkage: Linkage, model: Model) -> list[Deflected]:
-    """No deflection, and the speeds at the start that the scene asks for beside those of the drive."""
-    v, omega = initial_twists(scene, linkage)
-    start = []
-    for link, body in zip(model.links, model.bodies, strict=True):
-        rate = as_rows(link, np.outer(link.one, v[body]) + np.cross(omega[body], link.X))
-        if link.kind == "beam":
-            rate[:, 2] = omega[body, 2] * link.one
-        none = np.zeros_like(rate)
-        start.append(Deflected(none, rate, none))
-    return start
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
