@@ -157,7 +157,13 @@ class Account:
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
         return flows, taken
 
-    def _watch(self, flows: list[Flow], exchanged: Rows, left: Rows, work: Float[np.ndarray, "T 12"]) -> None:
+    def _watch(
+        self,
+        flows: list[Flow],
+        exchanged: Float[np.ndarray, "T 5"],
+        left: Float[np.ndarray, "T 7"],
+        work: Float[np.ndarray, "T 12"],
+    ) -> None:
         """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
         planar = any(of.link.planar for of in self.of)
         linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
