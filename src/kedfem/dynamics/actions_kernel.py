@@ -63,37 +63,6 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
 
 
 @compiled
-def seen(owners, weights, nominal, u, out):  # type: ignore[no-untyped-def]
-    """Vectors of all ends, nominal + Σ w u, from padded states u (L, D, n); see `action.end_weights`."""
-    A, _, M, D, n = weights.shape
-    out[:] = nominal
-    for i in range(A):
-        for e in range(2):
-            k = owners[i, e]
-            if k >= 0:
-                for m in range(M):
-                    for c in range(D):
-                        for j in range(n):
-                            out[i, e, m, c] += weights[i, e, m, c, j] * u[k, c, j]
-
-
-@compiled
-def borne(owners, weights, forces, out):  # type: ignore[no-untyped-def]
-    """Add to padded forces (L, D, n) on the links what forces on the ends are on their states: Σ w f."""
-    A, _, M, D, n = weights.shape
-    for i in range(A):
-        for e in range(2):
-            k = owners[i, e]
-            if k >= 0:
-                for m in range(M):
-                    for c in range(D):
-                        f = forces[i, e, m, c]
-                        if f != 0.0:
-                            for j in range(n):
-                                out[k, c, j] += weights[i, e, m, c, j] * f
-
-
-@compiled
 def evaluate_all(t, x, v, before, table, values):  # type: ignore[no-untyped-def]
     """Values (T, A, 4) at successive times; x, v (T, A, 2, 2, 3); before (A,) is moved on to the last."""
     forces = np.zeros(x.shape[1:])

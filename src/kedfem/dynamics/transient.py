@@ -19,13 +19,12 @@ from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.start import Deflected, Instant, initial_states, quasi_static
+from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
-from kedfem.links.record import Link, as_rows
-from kedfem.motion.initial import initial_twists
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -202,15 +201,8 @@ def first_states(
 
 def _undeformed(scene: Scene, linkage: Linkage, model: Model) -> list[Deflected]:
     """No deflection, and the speeds at the start that the scene asks for beside those of the drive."""
-    v, omega = initial_twists(scene, linkage)
-    start = []
-    for link, body in zip(model.links, model.bodies, strict=True):
-        rate = as_rows(link, np.outer(link.one, v[body]) + np.cross(omega[body], link.X))
-        if link.kind == "beam":
-            rate[:, 2] = omega[body, 2] * link.one
-        none = np.zeros_like(rate)
-        start.append(Deflected(none, rate, none))
-    return start
+    rates = initial_rates(scene, linkage, model)
+    return [Deflected(np.zeros_like(rate), rate, np.zeros_like(rate)) for rate in rates]
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
