@@ -19,9 +19,17 @@ from jaxtyping import Float
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
-from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.frames import Followed, deformation, followed, frame_force, frames_of, rotation, stress_deformation
+from kedfem.dynamics.dense import SMALL, dense_part
+from kedfem.dynamics.frames import (
+    Followed,
+    deformation,
+    followed,
+    frame_force,
+    frames_of,
+    rotation,
+    stress_deformation,
+)
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated

@@ -12,7 +12,7 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
 from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
 from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.history import Forcing, LinkHistory
