@@ -32,7 +32,11 @@ UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long s
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
-    ("work", ("loads", "supports"), "work done by the loads; by the drive and the other supports"),
+    (
+        "work",
+        ("loads", "supports"),
+        "work done by the loads, motors and springs; by the drive and the other supports",
+    ),
     ("dissipated", ("dissipated",), "energy that damping took"),
     (
         "neglected",
@@ -85,10 +89,13 @@ class _Sums:
 
 
 class Account:
-    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
+    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew.
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    acting : what motors and springs do, `acting.action_flow`
+    """
+
+    def __init__(self, model: Model, acting: Callable[[Block], Flow] | None = None) -> None:
+        self.model, self.acting = model, acting
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
@@ -155,6 +162,8 @@ class Account:
                 taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
         for of, x in zip(self.carried, self.model.carried, strict=True):
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
+        if self.acting is not None:
+            flows.append(self.acting(block))
         return flows, taken
 
     def _watch(
