@@ -31,7 +31,7 @@ from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
 
-POINTS = 256  # time points of rigid motion found together
+POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 SMOOTH = 4  # steps that take away what no step resolves, where links start that are rigid or move
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
