@@ -14,8 +14,8 @@ Equation (20) turns K with the nominal rigid motion, which leaves two things out
 
 All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
 factor of e is measured, on the four-bar of [KED] (docs/theory.md): 1.8. One is the change of stiffness itself; the rest
-is the joint forces, which change as the deflected links pass them on. An arm alone on its foot does not have that, and the
-estimate is then up to twice too large. c is that of the elastica under a load across its tip.
+is the joint forces, which change as the deflected links pass them on. An arm alone on its foot does not have that, and
+the estimate is then up to twice too large. c is that of the elastica under a load across its tip.
 
 N comes from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean
 displacements of slices across the link's axis; so both take scalar weights only.

@@ -92,7 +92,7 @@ class Bridge:
         if level not in self.finer:
             scheme = generalised_alpha(self.h / 2**level, self.rho_inf)
             self.finer[level] = type(solver)(
-                solver.links, solver.joints, scheme, solver.damping, solver.acting
+                solver.links, solver.joints, scheme, solver.damping, solver.actions
             )
         return self.finer[level]
 

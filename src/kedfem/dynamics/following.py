@@ -16,7 +16,8 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.acting import Acting, for_kernel, weights
+from kedfem.dynamics.acting import acting_on, over_block
+from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
@@ -158,17 +159,16 @@ class FollowingSteps:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        acting: Acting,
+        actions: Sequence[Action] = (),
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
+        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
         self.scale = rounding(links)
         self.mixing = Mixing()
-        self._shape = max(link.d for link in links), max(link.n for link in links)
-        self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
-        self._turned = np.zeros(len(acting.every))
+        self._acting = acting_on(actions, links)
+        self._turned = np.zeros(len(actions))
 
     def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
         """The state of the first time point."""
@@ -192,7 +192,7 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[list[SegmentState]] = []
-        acting = for_kernel(self.acting, self._weights, motion)
+        acting = over_block(self._acting, motion)
         for t in range(len(forcing[0].R)):
             now = self.step(state, [each.at(t) for each in forcing], acting, t)
             if isinstance(now, str):
@@ -241,9 +241,9 @@ class FollowingSteps:
         """States with the forces of motors and springs where they are now, and the coordinates of these."""
         if acting is None:
             return list(now), self._turned
-        from kedfem.dynamics.acting_kernel import external
+        from kedfem.dynamics.actions_kernel import external
 
-        u, v, F = np.zeros((3, len(self.links), *self._shape))
+        u, v, F = np.zeros((3, len(self.links), *self._acting.weights.shape[3:]))
         for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
             for each, x in zip(padded, rows, strict=True):
                 each[: x.shape[1], : len(x)] = x.T

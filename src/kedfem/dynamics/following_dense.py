@@ -1,13 +1,15 @@
 """Steps of small segments whose frames follow them: dense constant matrices and one compiled loop. Needs numba."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from kedfem.dynamics.acting import Acting, for_kernel, weights
+from kedfem.dynamics.acting import acting_on, over_block
+from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
@@ -28,9 +30,9 @@ class FollowingDense:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        acting: Acting,
+        actions: Sequence[Action] = (),
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
+        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
@@ -45,7 +47,7 @@ class FollowingDense:
         self._memory = np.zeros((2, DEPTH, size)), np.zeros((2, size))
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
-        self._weights = weights(acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2])
+        self._acting = acting_on(actions, links, [part.T for part in self.parts])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
     @property
@@ -76,7 +78,7 @@ class FollowingDense:
                 g[0, i, e].reshape(D, n)[: link.d, : link.n] = x
             if link.fit is not None:
                 Q[i, -1], angle[i, -1] = Q[i, 0], angle[i, 0]
-        return u, v, a, F, f, C, force, Q, angle, g, np.zeros(len(self.acting.every))
+        return u, v, a, F, f, C, force, Q, angle, g, np.zeros(len(self.actions))
 
     def copied(self, state: State) -> State:
         """A state that a solver may use up."""
@@ -105,8 +107,10 @@ class FollowingDense:
         history = (u, v, a, g, np.empty((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
             self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F),
-            for_kernel(self.acting, self._weights, motion), state, history, self._memory, self._counts,
+            over_block(self._acting, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
+        if self.actions:
+            forcing = [self._acted(i, each, F[:, i]) for i, each in enumerate(forcing)]
         histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
         if taken < T:
             raise NotConverged(taken, histories, state, self.links[worst].name)
@@ -118,6 +122,12 @@ class FollowingDense:
         R = history[4][:taken, i, : link.d, : link.d].copy()
         forces, strain = history[5][:taken, i, held], history[6][:taken, i].copy()
         return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces, strain)
+
+    def _acted(self, i: int, forcing: Forcing, F: Float[np.ndarray, "T D n"]) -> Forcing:
+        """The loads of a segment with the forces of motors and springs on it."""
+        link, part = self.links[i], self.parts[i]
+        rows = [F[:, c, : link.n] @ (part.T[c].T @ link.mass[c]) for c in range(link.d)]  # T⁻¹ = Tᵀ m
+        return replace(forcing, F=np.stack(rows, axis=2))
 
     def _coupled(self) -> tuple[State, State]:
         D, n, P = self._sizes

@@ -12,7 +12,7 @@ H = Σ Bᵀ R S Rᵀ B has its entries near the diagonal: from column `first` of
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components, Q (L, E + 1, 3, 3), angle (L, E + 1),
         g (3, L, E, N): deformation seen from each frame and its rates; the last frame is the segment's mean one;
         turned (A,) coordinates of the actions
-    acting : of `dynamics.acting_kernel`; None without motors and springs, whose code is then not compiled
+    acting : of `dynamics.acting.over_block`, whose forces are added to F; None without motors and springs, whose code is then not compiled
     history : u, v, a, g (T, L, D, S), R (T, L, D, D), port forces (T, L, Q) in that frame, strain energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed; last step and change (2, L·D·S)
     counts : sweeps, square of what counts as a step, pairs that are known
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from kedfem.dynamics.acting_kernel import external
+from kedfem.dynamics.actions_kernel import external
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
@@ -99,6 +99,7 @@ def follow_block(  # type: ignore[no-untyped-def]
         F[:] = Fs[t]
         if acting is not None:
             turned[:] = external(acting, t, u1, v1, turned, F)
+            Fs[t] = F
         recorded(coefficients, t, frames, kinds, Rs[t], F, Rp, force, state, end, history)
     return T, -1
 

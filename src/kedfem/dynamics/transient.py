@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.acting import acting_on
+from kedfem.dynamics.acting import first_forces
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
@@ -56,7 +56,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
-        return follower(model.links, model.joints, scheme, model.damping, acting_on(actions(scene, model)))
+        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model))
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -186,8 +186,11 @@ def first_states(
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
     moments = instants(model, motion, stresses)
     if at_rest:
-        start = _undeformed(scene, linkage, model)
-        return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
+        forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
+        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
+        return [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
     u = quasi_static(model.links, model.joints, moments)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
@@ -197,12 +200,6 @@ def first_states(
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
-
-
-def _undeformed(scene: Scene, linkage: Linkage, model: Model) -> list[Deflected]:
-    """No deflection, and the speeds at the start that the scene asks for beside those of the drive."""
-    rates = initial_rates(scene, linkage, model)
-    return [Deflected(np.zeros_like(rate), rate, np.zeros_like(rate)) for rate in rates]
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:

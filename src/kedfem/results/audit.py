@@ -89,13 +89,10 @@ class _Sums:
 
 
 class Account:
-    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew.
+    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
 
-    acting : what motors and springs do, `acting.action_flow`
-    """
-
-    def __init__(self, model: Model, acting: Callable[[Block], Flow] | None = None) -> None:
-        self.model, self.acting = model, acting
+    def __init__(self, model: Model) -> None:
+        self.model = model
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
@@ -162,11 +159,15 @@ class Account:
                 taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
         for of, x in zip(self.carried, self.model.carried, strict=True):
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
-        if self.acting is not None:
-            flows.append(self.acting(block))
         return flows, taken
 
-    def _watch(self, flows: list[Flow], exchanged: Rows, left: Rows, work: Float[np.ndarray, "T 12"]) -> None:
+    def _watch(
+        self,
+        flows: list[Flow],
+        exchanged: Float[np.ndarray, "T 5"],
+        left: Float[np.ndarray, "T 7"],
+        work: Float[np.ndarray, "T 12"],
+    ) -> None:
         """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
         planar = any(of.link.planar for of in self.of)
         linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
