@@ -23,11 +23,11 @@ from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import (
     Followed,
-    deformation,
     followed,
     frame_force,
     frames_of,
     rotation,
+    seen_from,
     stress_deformation,
 )
 from kedfem.dynamics.history import Forcing, LinkHistory
@@ -214,7 +214,7 @@ class FollowingSteps:
         for _ in range(SWEEPS):
             now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
-            frame_change, forces = self._solved(rhs, RB, factor)
+            frame_change, forces = solved(self.parts, rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
             sizes = [float(np.vdot(x, mass_times(link.mass, x))) for link, x in zip(self.links, change, strict=True)]
             self.sweeps += 1
@@ -260,11 +260,9 @@ class FollowingSteps:
     def _mean(self, k: int, now: SegmentState, at: Nominal) -> Float[np.ndarray, "d d"]:
         """Mean orientation of a segment, link to world."""
         link = self.links[k]
-        if link.fit is None:
-            return at.R
-        if not link.frames:
-            return at.R @ now.frames[0].Q
-        return at.R @ rotation(link, link.fit, position(link, now.u @ at.R), np.eye(link.d), now.frames[0].angle)[0]
+        if link.frames or link.fit is None:
+            return mean_orientation(link, now.u, at.R)
+        return at.R @ now.frames[0].Q
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -291,19 +289,6 @@ class FollowingSteps:
             r += self.scheme.alpha_f * (s.F - s.f)
         return np.asarray(r - self.scheme.alpha_m * s.Ma)
 
-    def _solved(
-        self, rhs: Sequence[NodalOf], RB: Sequence[NodalOf], factor: tuple[np.ndarray, bool] | None
-    ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """Changes in the predicted frames, and port forces: Σ Bᵀ R λ = 0, R W Δ = B z."""
-        held, reactions = zip(*(part.held(r) for part, r in zip(self.parts, rhs, strict=True)), strict=True)
-        z = np.zeros(RB[0].shape[1])
-        if factor is not None:
-            f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
-            z = scipy.linalg.cho_solve(factor, f, check_finite=False)
-        w = [b @ z for b in RB]
-        forces = [part.S @ x - y for part, x, y in zip(self.parts, w, reactions, strict=True)]
-        return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(self.parts, held, w, strict=True)], forces
-
     def _ended(
         self, k: int, s: SegmentState, now: SegmentState, at: Nominal, force: Float[np.ndarray, " q"]
     ) -> SegmentState:
@@ -326,6 +311,34 @@ class FollowingSteps:
         )
 
 
+def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
+    """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
+    if link.fit is None:
+        return R
+    return R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0]
+
+
+def solved(
+    parts: Sequence[HeldPart], rhs: Sequence[NodalOf], RB: Sequence[NodalOf], factor: tuple[np.ndarray, bool] | None
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
+    """Changes of all segments in their frames, and port forces: A Δ = r + Wᵀ λ, Σ Bᵀ R λ = 0, R W Δ = B z.
+
+    Parameters
+    ----------
+    rhs : r per segment (n, d)
+    RB : Rᵀ B
+    factor : of H = Σ Bᵀ R S Rᵀ B, None without interface unknowns
+    """
+    held, reactions = zip(*(part.held(r) for part, r in zip(parts, rhs, strict=True)), strict=True)
+    z = np.zeros(RB[0].shape[1])
+    if factor is not None:
+        f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
+        z = scipy.linalg.cho_solve(factor, f, check_finite=False)
+    w = [b @ z for b in RB]
+    forces = [part.S @ x - y for part, x, y in zip(parts, w, reactions, strict=True)]
+    return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(parts, held, w, strict=True)], forces
+
+
 def position(link: Link, u: Nodal) -> Nodal:
     """Position of a segment displaced by u, both in the nominal frame; of a planar beam (x, y, ψ)."""
     X = link.X[:, : link.d]
@@ -341,11 +354,7 @@ def rounding(links: Sequence[Link]) -> float:
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:
     """A segment's state at the first time point."""
     y = position(link, s.u @ s.R)
-    start = Followed(np.eye(link.d), 0.0, *(np.zeros_like(y) for _ in range(3)))
-    frames = []
-    for frame in frames_of(link):
-        Q, angle = rotation(link, frame.fit, y, start.Q, start.angle)
-        frames.append(replace(start, Q=Q, angle=angle, g=deformation(link, y, Q, angle)))
+    frames = [seen_from(link, frame, y) for frame in frames_of(link)]
     damped = np.zeros((3, *y.shape))
     damped[0] = damping.alpha * (s.Mu @ s.R)
     f, strain = internal_force(link, y, s.R, frames, damped, damping.beta)

@@ -12,13 +12,12 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
 from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
-from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
-from kedfem.links.record import Link
+from kedfem.links.record import BeamPoint, Link
 from kedfem.motion.rigid import RigidMotion
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
@@ -40,13 +39,14 @@ class FollowingDense:
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
-        self._counts = np.array([0.0, rounding(links), 0.0])
+        self._counts = np.array([0.0, rounding(links), 0.0, 0.0])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]
-        self._memory = np.zeros((2, DEPTH, size)), np.zeros((2, size))
+        self._memory = np.zeros((2, DEPTH, size)), np.zeros((DEPTH, DEPTH)), np.zeros((2, size))
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
+        self._beams = self._points()
         self._acting = acting_on(actions, links, [part.T for part in self.parts])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
@@ -58,11 +58,11 @@ class FollowingDense:
     def begin(self, states: Sequence[LinkState]) -> State:
         """The loop's own state, from link states."""
         D, n, P = self._sizes
-        L, E = len(self.links), self._frames[1].shape[1]
+        L, E = len(self.links), self._beams[0].shape[3]
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
-        C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, E + 1, 3, 3)), np.zeros((L, E + 1))
-        g = np.zeros((3, L, E, D * n))
-        Q[:] = np.eye(3)
+        C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, 3, 3)), np.zeros(L)
+        g, strain, direction, turn = np.zeros((3, L, D * n)), np.zeros((3, L, 3, E)), np.zeros((L, 2, E)), np.zeros((L, E))
+        Q[:], direction[:, 0] = np.eye(3), 1.0
         general = [first_state(*each, s) for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)]
         for i, (link, joint, part, s) in enumerate(zip(self.links, self.joints, self.parts, general, strict=True)):
             for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
@@ -72,13 +72,14 @@ class FollowingDense:
             for m in range(3):
                 C[m, i, : link.d, : link.n] = work_on(part, s.damped[m])
             force[i] = self._padded_ports(joint, s.port_forces)
-            for e, frame in enumerate(s.frames):
-                Q[i, e, : link.d, : link.d], angle[i, e] = frame.Q, frame.angle
-                x = coordinates(link, part, frame.g)
-                g[0, i, e].reshape(D, n)[: link.d, : link.n] = x
-            if link.fit is not None:
-                Q[i, -1], angle[i, -1] = Q[i, 0], angle[i, 0]
-        return u, v, a, F, f, C, force, Q, angle, g, np.zeros(len(self.actions))
+            points = points_of(link)
+            for e, (point, seen) in enumerate(zip(points, s.frames, strict=False)):
+                strain[0, i, :, e] = point.strains @ seen.g.ravel()
+                direction[i, :, e], turn[i, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
+            for seen in s.frames if not points else ():
+                Q[i, : link.d, : link.d], angle[i] = seen.Q, seen.angle
+                g[0, i].reshape(D, n)[: link.d, : link.n] = coordinates(link, part, seen.g)
+        return u, v, a, F, f, C, force, Q, angle, g, strain, direction, turn, np.zeros(len(self.actions))
 
     def copied(self, state: State) -> State:
         """A state that a solver may use up."""
@@ -104,10 +105,11 @@ class FollowingDense:
             for c in range(link.d):
                 F[:, i, c, : link.n] = each.F[:, :, c] @ part.T[c]
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
-        history = (u, v, a, g, np.empty((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
+        strains = np.empty((T, *state[10].shape[1:]))
+        history = (u, v, a, g, strains, np.zeros((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
-            self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._kinds, (R, F),
-            over_block(self._acting, motion), state, history, self._memory, self._counts,
+            self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._beams, self._kinds,
+            (R, F), over_block(self._acting, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
         if self.actions:
             forcing = [self._acted(i, each, F[:, i]) for i, each in enumerate(forcing)]
@@ -118,10 +120,17 @@ class FollowingDense:
 
     def _history(self, i: int, forcing: Forcing, history: State, taken: int) -> LinkHistory:
         link, part, held = self.links[i], self.parts[i], self._held(self.joints[i])
-        u, v, a, g = (rows_of(link, part, x[:taken, i]) for x in history[:4])
-        R = history[4][:taken, i, : link.d, : link.d].copy()
-        forces, strain = history[5][:taken, i, held], history[6][:taken, i].copy()
-        return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces, strain)
+        us, vs, as_, gs, strains, Rs, forces, energies = (x[:taken, i] for x in history)
+        u, v, a = (rows_of(link, part, x) for x in (us, vs, as_))
+        points = points_of(link)
+        if points:
+            share = np.concatenate([point.share.T for point in points])  # (3E, 3n)
+            seen = strains[:, :, : len(points)].transpose(0, 2, 1).reshape(taken, -1)
+            g = (seen @ share).reshape(u.shape)
+        else:
+            g = rows_of(link, part, gs)
+        R = Rs[:, : link.d, : link.d].copy()
+        return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces[:, held], energies.copy())
 
     def _acted(self, i: int, forcing: Forcing, F: Float[np.ndarray, "T D n"]) -> Forcing:
         """The loads of a segment with the forces of motors and springs on it."""
@@ -151,27 +160,37 @@ class FollowingDense:
         return (G, Yt, S, B), (numbers, count, first)
 
     def _fitted(self) -> tuple[State, State]:
+        """What frames need of all segments but those that know their strains, of which the mean rotation is enough."""
         D, n, _ = self._sizes
-        every = [frames_of(link) for link in self.links]
-        L, E = len(self.links), max(1, *(len(frames) for frames in every))
-        X, one, mean = (np.zeros((L, D, n)) for _ in range(3))
-        fit, K, share = np.zeros((L, E, D, n)), np.zeros((L, E, D * n, D * n)), np.zeros((L, E, D * n, D * n))
-        for i, (link, part, frames) in enumerate(zip(self.links, self.parts, every, strict=True)):
+        L = len(self.links)
+        X, one, fit = (np.zeros((L, D, n)) for _ in range(3))
+        K, bends, follows = np.zeros((L, D * n, D * n)), np.zeros(L, bool), np.zeros(L, bool)
+        for i, (link, part) in enumerate(zip(self.links, self.parts, strict=True)):
             rows = link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
             X[i, : link.d, : link.n] = coordinates(link, part, rows)
             one[i, : link.d, : link.n] = coordinates(link, part, np.repeat(link.one[:, None], link.d, axis=1))
-            x = self._places(link)
+            bends[i], follows[i] = bool(points_of(link)), link.fit is not None
             if link.fit is not None:
-                mean[i, : link.d, : link.n] = work_on(part, link.fit[:, : link.d])
-            if not frames:
-                K[i, 0][np.ix_(x, x)] = component_first(part.T, link.K0)
-            for e, frame in enumerate(frames):
-                fit[i, e, : link.d, : link.n] = work_on(part, frame.fit[:, : link.d])
-                K[i, e][np.ix_(x, x)] = component_first(part.T, frame.K0)
-                if len(frames) > 1:
-                    there = component_first(part.T, _mass(link) @ frame.share)  # T⁻¹ = Tᵀ m
-                    share[i, e][np.ix_(x, x)] = there
-        return (X, one, mean), (np.array([len(frames) for frames in every]), fit, K, share)
+                fit[i, : link.d, : link.n] = work_on(part, link.fit[:, : link.d])
+            if not bends[i]:
+                x = self._places(link)
+                K[i][np.ix_(x, x)] = component_first(part.T, link.K0)
+        return (X, one), (bends, follows, fit, K)
+
+    def _points(self) -> State:
+        """Rows, tangents and rigidities of the planar beams that know their strains, see `dynamics.beams_kernel`."""
+        every = [points_of(link) for link in self.links]
+        L, E = len(every), max(1, *(len(points) for points in every))
+        rows, tangent, rigidity = np.zeros((L, 3, self._sizes[1], E)), np.zeros((L, 2, E)), np.zeros((L, 3, E))
+        tangent[:, 0] = 1.0
+        for i, (link, part, points) in enumerate(zip(self.links, self.parts, every, strict=True)):
+            for e, point in enumerate(points):
+                of_u, of_psi = point.strains.reshape(3, -1, 3)[:, :, :2], point.strains.reshape(3, -1, 3)[:, :, 2]
+                rows[i, 0, : link.n, e] = part.T[0].T @ of_u[0] @ point.tangent
+                rows[i, 1, : link.n, e] = part.T[2].T @ -of_psi[1]
+                rows[i, 2, : link.n, e] = part.T[2].T @ of_psi[2]
+                tangent[i, :, e], rigidity[i, :, e] = point.tangent, point.rigidity
+        return rows, tangent, rigidity
 
     def _places(self, link: Link) -> Int[np.ndarray, " x"]:
         """Where the coordinates of a link stand among the padded ones."""
@@ -189,10 +208,9 @@ class FollowingDense:
         return out.ravel()
 
 
-def _mass(link: Link) -> sp.csr_array:
-    from kedfem.dynamics.condensed import mass_matrix
-
-    return mass_matrix(link)
+def points_of(link: Link) -> tuple[BeamPoint, ...]:
+    """The Gauss points whose frames a planar beam's segment has."""
+    return tuple(frame.point for frame in link.frames if frame.point)
 
 
 def near_diagonal(joints: Sequence[Attachment]) -> Int[np.ndarray, " k"]:

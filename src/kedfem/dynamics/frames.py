@@ -26,7 +26,7 @@ def frames_of(link: Link) -> tuple[Frame, ...]:
     """The frames of a link: several, one, or none where it keeps the nominal frame."""
     if link.frames or link.fit is None:
         return link.frames
-    return (Frame(link.fit, link.K0, np.zeros((0, 0))),)
+    return (Frame(link.fit, link.K0),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +90,18 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
     return np.asarray(g)
 
 
+def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
+    """A frame that stands still, within half a turn of the nominal one.
+
+    Parameters
+    ----------
+    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
+    """
+    Q, angle = rotation(link, frame.fit, y, np.eye(link.d), 0.0)
+    g = deformation(link, y, Q, angle)
+    return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
+
+
 def followed(
     link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme
 ) -> Followed:
@@ -131,7 +143,9 @@ def _times(K: np.ndarray, g: Nodal) -> Nodal:
 
 
 def stress_deformation(link: Link, frames: Sequence[Frame], now: Sequence[Followed]) -> Nodal:
-    """The g from which stresses come: that of a single frame, or one with the strains that several frames see."""
-    if not link.frames:
+    """The g from which stresses come: that of a single frame, or of a beam one with the strains that its points see."""
+    points = [frame.point for frame in frames if frame.point]
+    if not points:
         return now[0].g
-    return np.asarray(sum(_times(frame.share, x.g) for frame, x in zip(frames, now, strict=True)))
+    strains = (point.share @ (point.strains @ x.g.ravel()) for point, x in zip(points, now, strict=True))
+    return np.asarray(sum(strains)).reshape(link.n, link.d)

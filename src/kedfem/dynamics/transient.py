@@ -14,6 +14,7 @@ from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
+from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
@@ -33,6 +34,7 @@ from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following
 
 POINTS = 256  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
+SMOOTH = 4  # steps that take away what no step resolves, where links start that are rigid or move
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
@@ -96,7 +98,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
     length = block_length(model)
-    bridge = _bridge(scene, linkage, along, model)
+    bridge = bridged(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
         for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
@@ -112,10 +114,12 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
 
 
-def _bridge(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
-    """Smaller steps for where those of the analysis do not settle."""
+def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
+    """Smaller steps for where those of the analysis do not settle, and smooth ones where a start jerks."""
+    analysis = scene.analysis
+    jerks = any(link.rigid for link in model.links) or analysis.initial_speeds or analysis.initial_motions
     return Bridge(
-        time_grid(scene).step, scene.analysis.rho_inf,
+        time_grid(scene).step, analysis.rho_inf, SMOOTH if jerks else 0,
         lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
         lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
     )  # fmt: skip
@@ -192,12 +196,19 @@ def first_states(
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
         return [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
     u = quasi_static(model.links, model.joints, moments)
+    if following(scene):
+        u = far_deflected(model.links, model.joints, moments, u)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
     if moments[0].turnings is not None:
         start = [
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
+        ]
+    if following(scene):
+        start = [
+            replace(x, stressed=static_excess(link, x.u, now.R))
+            for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
 

@@ -19,17 +19,33 @@ Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 
 
 @dataclass(frozen=True, slots=True)
+class BeamPoint:
+    """A Gauss point of a planar beam, whose frame follows the tangent there.
+
+    tangent : (2,) as drawn
+    strains : (3, 3n) rows of ε, γ, κ from what is seen in the frame
+    rigidity : (3,) EA, κGA, EI times the length that belongs to the point
+    share : (3n, 3) what ε, γ, κ here add to the deformation of the segment from which stresses come
+    """
+
+    tangent: Float[np.ndarray, "2"]
+    strains: Float[np.ndarray, "3 k"]
+    rigidity: Float[np.ndarray, "3"]
+    share: Float[np.ndarray, "k 3"]
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A part of a segment's strain energy, ½ gᵀ K0 g, seen from a frame that follows a part of the segment's shape.
 
     fit : (n, 3) weights of the frame's rotation: that of Σ x_a ⊗ fit_a
     K0 : (dn, dn) [N/m]
-    share : (dn, dn) what g in this frame adds to the deformation of the segment from which stresses come [-]
+    point : of a planar beam, one of its Gauss points
     """
 
     fit: Float[np.ndarray, "n 3"]
     K0: Matrix
-    share: Float[np.ndarray, "k k"]
+    point: BeamPoint | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,10 @@ from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
 from kedfem.errors import MeshError
-from kedfem.links.beam import beam_link, strain_rows, tangent_fit
+from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beam_axis import Axis
 from kedfem.links.plane import plane_link
-from kedfem.links.record import Frame, Link
+from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
@@ -186,16 +186,17 @@ def _gauss_frames(part: Link, material: Material) -> tuple[Frame, ...]:
     E, G, A = material.youngs_modulus, material.shear_modulus, section.area
     rigidity = np.array([E * A, section.shear_coefficient * G * A, E * section.second_moment])
     place = np.argsort(part.cells[0])
-    strains, weights, fits = [], [], []
+    rows, rigidities, fits, tangents = [], [], [], []
     for r, w in zip(*np.polynomial.legendre.leggauss(len(x) - 1), strict=True):
-        rows, det_J = strain_rows(x, float(r))
-        in_order = rows.reshape(3, -1, 3)[:, place].reshape(3, -1)
-        strains.append(in_order)
-        weights.append(w * det_J)
+        B, det_J = strain_rows(x, float(r))
+        rows.append(B.reshape(3, -1, 3)[:, place].reshape(3, -1))
+        rigidities.append(w * det_J * rigidity)
         fits.append(tangent_fit(x, float(r))[place])
-    back = np.split(np.linalg.pinv(np.concatenate(strains)), len(strains), axis=1)
+        tangents.append(shape_functions(float(r), len(x))[1] @ x / det_J)
+    shares = np.split(np.linalg.pinv(np.concatenate(rows)), len(rows), axis=1)
     return tuple(
-        Frame(fit, w * (B.T * rigidity) @ B, P @ B) for fit, w, B, P in zip(fits, weights, strains, back, strict=True)
+        Frame(fit, (B.T * c) @ B, BeamPoint(t, B, c, share))
+        for fit, t, c, B, share in zip(fits, tangents, rigidities, rows, shares, strict=True)
     )
 
 

@@ -1,0 +1,243 @@
+"""Segments with one frame that follows them, or a nominal one, compiled by numba: as `dynamics.frames` has it."""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+
+SPACE, PLANE, BEAM = 0, 1, 2
+TURNS = 20
+
+
+@compiled
+def held_together(rates, i, kind, follows, shapes, fit, K, R, u, before, now, Q, angle, f, work):  # type: ignore[no-untyped-def]
+    """Internal force of segment i at the displacement u, added to f, world components.
+
+    Parameters
+    ----------
+    rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
+    before, now : g (3, L, N) seen from the frame, and its rates, at the beginning and at the end of the step
+    Q, angle : (L, 3, 3) and (L,) of the frame in the nominal one; at the beginning an earlier one
+    """
+    n0, n1, n2, h1, h0, beta = rates
+    X, one = shapes
+    y, turned, strained, A, U, change = work
+    D, n = u.shape[1:]
+    d = 2 if kind == PLANE else D
+    for b in range(d):
+        for j in range(n):
+            x = X[i, b, j]
+            for m in range(d):
+                x += R[i, m, b] * u[i, m, j]
+            y[b, j] = x
+    if follows:
+        rotation(i, kind, fit, y, Q, angle, A, U, change)
+    deformation(i, kind, y, X, one, Q[i], angle[i], now[0, i], follows)
+    for r in range(D * n):
+        x = now[0, i, r]
+        strained[r] = x
+        if beta != 0.0:
+            x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
+            x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
+            now[1, i, r], now[2, i, r] = x1, x2
+            strained[r] += beta * x1
+    for b in range(d):
+        for j in range(n):
+            x = 0.0
+            for r in range(D * n):
+                x += K[i, b * n + j, r] * strained[r]
+            turned[b, j] = x
+    if follows and kind == SPACE:
+        balanced_space(fit[i], y, Q[i], now[0, i], turned, U, change)
+    elif follows:
+        balanced_plane(fit[i], y, Q[i], now[0, i], turned)
+    for b in range(d):  # R Q: from the frame to the world
+        for m in range(d):
+            x = 0.0
+            for k in range(d):
+                x += R[i, b, k] * entry(kind, Q[i], k, m)
+            for j in range(n):
+                f[i, b, j] += x * turned[m, j]
+
+
+@compiled
+def elastic_energy(i, K, g):  # type: ignore[no-untyped-def]
+    """½ gᵀ K g of segment i."""
+    total = 0.0
+    for r in range(g.shape[2]):
+        x = 0.0
+        for m in range(g.shape[2]):
+            x += K[i, r, m] * g[0, i, m]
+        total += x * g[0, i, r]
+    return 0.5 * total
+
+
+@compiled
+def mean_rotation(i, fit, X, R, u, Q):  # type: ignore[no-untyped-def]
+    """Q of a planar beam's segment in the nominal frame: that of Σ y_a ⊗ fit_a; its angle is not needed."""
+    c, s = 0.0, 0.0
+    for j in range(u.shape[2]):
+        x = X[i, 0, j] + R[i, 0, 0] * u[i, 0, j] + R[i, 1, 0] * u[i, 1, j]
+        y = X[i, 1, j] + R[i, 0, 1] * u[i, 0, j] + R[i, 1, 1] * u[i, 1, j]
+        c += x * fit[i, 0, j] + y * fit[i, 1, j]
+        s += y * fit[i, 0, j] - x * fit[i, 1, j]
+    size = np.sqrt(c * c + s * s)
+    c, s = c / size, s / size
+    Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
+
+
+@compiled
+def oriented(kinds, R, Q, out):  # type: ignore[no-untyped-def]
+    """R Q of each segment's frame: link to world."""
+    L, D = R.shape[:2]
+    for i in range(L):
+        if kinds[i] != SPACE:
+            for b in range(2):
+                for m in range(2):
+                    out[i, b, m] = R[i, b, 0] * Q[i, 0, m] + R[i, b, 1] * Q[i, 1, m]
+            if D == 3:
+                out[i, 2, 2] = R[i, 2, 2]
+        else:
+            for b in range(3):
+                for m in range(3):
+                    out[i, b, m] = R[i, b, 0] * Q[i, 0, m] + R[i, b, 1] * Q[i, 1, m] + R[i, b, 2] * Q[i, 2, m]
+
+
+@compiled
+def entry(kind, Q, b, m):  # type: ignore[no-untyped-def]
+    """Entry of a frame's rotation on rows: ψ does not turn."""
+    if kind == SPACE or (b < 2 and m < 2):
+        return Q[b, m]
+    return 1.0 if b == m else 0.0
+
+
+@compiled
+def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untyped-def]
+    """Q of Σ y_a ⊗ fit_a in place, from an earlier one; of a planar segment its angle, which counts turns."""
+    n = y.shape[1]
+    if kind != SPACE:
+        c, s = 0.0, 0.0
+        for j in range(n):
+            c += y[0, j] * fit[i, 0, j] + y[1, j] * fit[i, 1, j]
+            s += y[1, j] * fit[i, 0, j] - y[0, j] * fit[i, 1, j]
+        turn = np.arctan2(s, c)
+        turn += 2 * np.pi * np.round((angle[i] - turn) / (2 * np.pi))
+        angle[i] = turn
+        size = np.sqrt(c * c + s * s)
+        c, s = c / size, s / size
+        Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
+        return
+    for b in range(3):
+        for m in range(3):
+            x = 0.0
+            for j in range(n):
+                x += y[b, j] * fit[i, m, j]
+            A[b, m] = x
+    for _ in range(TURNS):
+        for b in range(3):
+            for m in range(3):
+                U[b, m] = Q[i, 0, b] * A[0, m] + Q[i, 1, b] * A[1, m] + Q[i, 2, b] * A[2, m]
+        change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
+        turn_of(U, change)
+        size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+        rodrigues(change, Q[i], U)
+        if size <= 1e-8:  # the next, quadratically smaller, is rounding
+            break
+
+
+@compiled
+def turn_of(U, x):  # type: ignore[no-untyped-def]
+    """x becomes (tr(U) 1 − sym U)⁻¹ x."""
+    trace = U[0, 0] + U[1, 1] + U[2, 2]
+    a, b, c = trace - U[0, 0], trace - U[1, 1], trace - U[2, 2]
+    d, e, f = -(U[0, 1] + U[1, 0]) / 2, -(U[1, 2] + U[2, 1]) / 2, -(U[2, 0] + U[0, 2]) / 2
+    A, B, C = b * c - e * e, e * f - d * c, d * e - b * f
+    det = a * A + d * B + f * C
+    x0, x1, x2 = x[0], x[1], x[2]
+    x[0] = (A * x0 + B * x1 + C * x2) / det
+    x[1] = (B * x0 + (a * c - f * f) * x1 + (d * f - a * e) * x2) / det
+    x[2] = (C * x0 + (d * f - a * e) * x1 + (a * b - d * d) * x2) / det
+
+
+@compiled
+def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
+    """Q becomes Q times the rotation by w."""
+    x, y, z = w
+    t = np.sqrt(x * x + y * y + z * z)
+    a, b = 1.0, 0.5
+    if t > 1e-8:
+        a, b = np.sin(t) / t, (1 - np.cos(t)) / (t * t)
+    W[0, 0], W[1, 1], W[2, 2] = 1 - b * (y * y + z * z), 1 - b * (x * x + z * z), 1 - b * (x * x + y * y)
+    W[0, 1], W[1, 0] = b * x * y - a * z, b * x * y + a * z
+    W[0, 2], W[2, 0] = b * x * z + a * y, b * x * z - a * y
+    W[1, 2], W[2, 1] = b * y * z - a * x, b * y * z + a * x
+    for r in range(3):
+        p, q, s = Q[r, 0], Q[r, 1], Q[r, 2]
+        for m in range(3):
+            Q[r, m] = p * W[0, m] + q * W[1, m] + s * W[2, m]
+
+
+@compiled
+def deformation(i, kind, y, X, one, Q, angle, g, follows):  # type: ignore[no-untyped-def]
+    """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle. In the nominal frame y − X."""
+    D, n = y.shape
+    if not follows:
+        for b in range(D):
+            for j in range(n):
+                g[b * n + j] = y[b, j] - X[i, b, j]
+        return
+    k = 3 if kind == SPACE else 2
+    for b in range(k):
+        mean, total = 0.0, 0.0
+        for j in range(n):
+            x = -X[i, b, j]
+            for m in range(k):
+                x += Q[m, b] * y[m, j]
+            g[b * n + j] = x
+            mean += x * one[i, b, j]
+            total += one[i, b, j] * one[i, b, j]
+        mean /= total
+        for j in range(n):
+            g[b * n + j] -= mean * one[i, b, j]
+    if kind == BEAM:
+        for j in range(n):
+            g[2 * n + j] = y[2, j] - angle * one[i, 2, j]
+
+
+@compiled
+def balanced_plane(fit, y, Q, g, f):  # type: ignore[no-untyped-def]
+    """f becomes the gradient of the energy in a plane: F_a = f_a − (τ / tr U) e_z × fit_a, τ = Σ g_a × f_a."""
+    n = y.shape[1]
+    torque, trace = 0.0, 0.0
+    for j in range(n):
+        torque += g[j] * f[1, j] - g[n + j] * f[0, j]
+        trace += (Q[0, 0] * y[0, j] + Q[1, 0] * y[1, j]) * fit[0, j]
+        trace += (Q[0, 1] * y[0, j] + Q[1, 1] * y[1, j]) * fit[1, j]
+    torque /= trace
+    for j in range(n):
+        f[0, j] += torque * fit[1, j]
+        f[1, j] -= torque * fit[0, j]
+
+
+@compiled
+def balanced_space(fit, y, Q, g, f, U, w):  # type: ignore[no-untyped-def]
+    """f becomes the gradient of the energy: F_a = f_a − (G⁻¹ τ) × fit_a, τ = Σ g_a × f_a."""
+    n = y.shape[1]
+    U[:] = 0.0
+    w[:] = 0.0
+    for j in range(n):
+        gx, gy, gz = g[j], g[n + j], g[2 * n + j]
+        w[0] += gy * f[2, j] - gz * f[1, j]
+        w[1] += gz * f[0, j] - gx * f[2, j]
+        w[2] += gx * f[1, j] - gy * f[0, j]
+        for b in range(3):
+            x = Q[0, b] * y[0, j] + Q[1, b] * y[1, j] + Q[2, b] * y[2, j]
+            for m in range(3):
+                U[b, m] += x * fit[m, j]
+    turn_of(U, w)
+    for j in range(n):
+        f[0, j] -= w[1] * fit[2, j] - w[2] * fit[1, j]
+        f[1, j] -= w[2] * fit[0, j] - w[0] * fit[2, j]
+        f[2, j] -= w[0] * fit[1, j] - w[1] * fit[0, j]
