@@ -113,7 +113,7 @@ def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
 
 @compiled
 def evaluate_all(t, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
-    """The same at successive times: x, v, forces (T, A, 2, 2, 3), values (T, A, 4); before (A,) is moved on to the last."""
+    """The same at T times: x, v, forces (T, A, 2, 2, 3), values (T, A, 4); before (A,) is moved on to the last."""
     for k in range(len(t)):
         evaluate(t[k], x[k], v[k], before, table, forces[k], values[k])
         before[:] = values[k, :, 0]

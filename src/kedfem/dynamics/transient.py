@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acting import first_forces
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
@@ -190,7 +191,10 @@ def first_states(
     moments = instants(model, motion, stresses)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
+        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
+        return [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
     u = quasi_static(model.links, model.joints, moments)
     if following(scene):
         u = far_deflected(model.links, model.joints, moments, u)

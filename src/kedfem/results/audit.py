@@ -89,13 +89,10 @@ class _Sums:
 
 
 class Account:
-    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew.
+    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
 
-    acting : what motors and springs do, `acting.action_flow`
-    """
-
-    def __init__(self, model: Model, acting: Callable[[Block], Flow] | None = None) -> None:
-        self.model, self.acting = model, acting
+    def __init__(self, model: Model) -> None:
+        self.model = model
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
@@ -162,8 +159,6 @@ class Account:
                 taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
         for of, x in zip(self.carried, self.model.carried, strict=True):
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
-        if self.acting is not None:
-            flows.append(self.acting(block))
         return flows, taken
 
     def _watch(
