@@ -232,7 +232,7 @@ def elbow(fidelity: str, load: float, following: bool = True, **analysis: Any) -
         "materials": {"m": ALLOY},
         "links": {"arm": link},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-9}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-4}},
         "loads": {"F": {"kind": "force", "link": "arm", "at": [0.3, 0.2], "vector": [0.6 * load, load],
                         "factor": {"time": [0, 5e-3], "value": [0, 1]}}},
         "analysis": {"end_time": 0.02, "step": 2e-4, "initial": "rest",
