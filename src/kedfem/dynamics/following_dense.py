@@ -125,7 +125,7 @@ class FollowingDense:
         points = points_of(link)
         if points:
             share = np.concatenate([point.share.T for point in points])  # (3E, 3n)
-            seen = strains[:, :, : len(points)].transpose(0, 2, 1).reshape(taken, len(share))
+            seen = strains[:, :, : len(points)].transpose(0, 2, 1).reshape(taken, 3 * len(points))
             g = (seen @ share).reshape(u.shape)
         else:
             g = rows_of(link, part, gs)
