@@ -78,17 +78,12 @@ def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(fidelity: 
         turned = w0 * (t - tau * (1 - np.exp(-t / tau)))
         errors.append(float(np.abs(x["motors/m/angle"] - turned).max()) / turned[-1])
     assert errors[-1] < 1e-3
-    assert order(errors) > 1.2
+    assert order(errors) > 1.5
     assert x["motors/m/speed"][-1] == pytest.approx(w0 * (1 - np.exp(-2)), rel=1e-3)
     assert account.balance.energy < 2e-3
 
 
-SMOOTH = (
-    "the first steps (ρ∞ = 0) lose part of a sudden torque's impulse: 0.7 % of the turn, 0.07 % without them"
-)
-
-
-@pytest.mark.parametrize("fidelity", [pytest.param("rigid", marks=pytest.mark.xfail(reason=SMOOTH)), "beam"])
+@pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_an_arm_on_a_torsion_spring_rings_down(fidelity: str) -> None:
     """J φ'' + c φ' + k (φ − φ0) = 0 from φ = φ' = 0."""
     k, zeta, free = 20.0, 0.1, 0.6
@@ -108,10 +103,9 @@ def test_an_arm_on_a_torsion_spring_rings_down(fidelity: str) -> None:
 def test_an_arm_set_going_coasts(fidelity: str) -> None:
     """No force about the pin: ω stays as at the start, and the kinetic energy with it."""
     t, x, _ = ran(arm(fidelity, 1.0, 0.002, analysis={"initial_speeds": {"A": "60 rpm"}}))
-    # the first steps leave (ω h)² = 1.6e-4 of the speed out: the start lacks the centripetal acceleration
-    np.testing.assert_allclose(x["joints/A/angle"], 2 * np.pi * t, rtol=3e-4)
-    # without the centripetal acceleration, which a start without deflection lacks: (ω h)² = 1.6e-4
-    np.testing.assert_allclose(x["energy/kinetic"], 0.5 * INERTIA * (2 * np.pi) ** 2, rtol=6e-4)
+    # the error of a step: (ω h)²/12 = 1.3e-5, and as much again from the deformation
+    np.testing.assert_allclose(x["joints/A/angle"], 2 * np.pi * t, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(x["energy/kinetic"], 0.5 * INERTIA * (2 * np.pi) ** 2, rtol=2e-4)
 
 
 def test_two_flying_links_on_a_spring_keep_momentum_and_energy() -> None:

@@ -37,14 +37,11 @@ class Bridge:
 
     motion_at : rigid motion at given times
     advance : a solver and its state over the time points of a motion
-    smooth : steps at the start, still to be taken, that leave nothing of vibration that they cannot resolve (ρ∞ = 0): links
-        at once in motion are not yet strained by it, which would ring in rigid ones
     bridged : steps taken in parts so far
     """
 
     h: float
     rho_inf: float
-    smooth: int
     motion_at: Callable[[Float[np.ndarray, " T"]], RigidMotion]
     advance: Advance
     finer: dict[int, Followers] = field(default_factory=dict)
@@ -59,12 +56,7 @@ class Bridge:
             With what was done before.
         """
         done: list[list[LinkHistory]] = []
-        k = min(self.smooth, len(motion.t))
-        if k:
-            self.smooth -= k
-            smoother = self._other(solver, self.h, 0.0)
-            histories, state = self.advance(smoother, state, motion.part(0, k))
-            done.append(histories)
+        k = 0
         while k < len(motion.t):
             try:
                 histories, state = self.advance(solver, state, motion.part(k, len(motion.t)))
@@ -98,13 +90,11 @@ class Bridge:
 
     def _finer(self, solver: Followers, level: int) -> Followers:
         if level not in self.finer:
-            self.finer[level] = self._other(solver, self.h / 2**level, self.rho_inf)
+            scheme = generalised_alpha(self.h / 2**level, self.rho_inf)
+            self.finer[level] = type(solver)(
+                solver.links, solver.joints, scheme, solver.damping, solver.actions, solver.tolerance
+            )
         return self.finer[level]
-
-    def _other(self, solver: Followers, h: float, rho_inf: float) -> Followers:
-        """A solver of the same model with other steps."""
-        scheme = generalised_alpha(h, rho_inf)
-        return type(solver)(solver.links, solver.joints, scheme, solver.damping, solver.actions)
 
 
 def joined(parts: Sequence[list[LinkHistory]]) -> list[LinkHistory]:

@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
-from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
+from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import (
@@ -40,7 +40,8 @@ DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
-CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made; what is left of each step adds up
+CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
+FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +89,12 @@ def held_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPart
     """Dense and exact to rounding where the segment is small, whose stiff hubs lose digits otherwise."""
     if link.unknowns <= SMALL:
         return _small_part(link, joint, c_M, c_K)
-    part = factored(link, joint, c_M, c_K)
-    q = len(joint.keep)
+    return held_substructure(factored(link, joint, c_M, c_K))
+
+
+def held_substructure(part: Substructure) -> HeldPart:
+    """A link condensed onto ports and anchors, seen from its ports."""
+    q = len(part.attachment.keep)
     Y = part.Y @ part.S[:, :q]
 
     def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
@@ -159,9 +164,10 @@ class FollowingSteps:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        actions: Sequence[Action] = (),
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
         self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
@@ -227,7 +233,7 @@ class FollowingSteps:
             self.scale = max(self.scale, sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)))
             if not np.isfinite(sizes).all():
                 break
-            if sum(sizes) <= CONVERGED**2 * self.scale:
+            if sum(sizes) <= self.tolerance**2 * self.scale:
                 now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)

@@ -29,13 +29,14 @@ class FollowingDense:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        actions: Sequence[Action] = (),
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
         self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
-            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, CONVERGED,
+            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, tolerance,
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)

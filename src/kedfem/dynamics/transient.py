@@ -12,13 +12,14 @@ from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
-from kedfem.dynamics.following import FollowingSteps
+from kedfem.dynamics.following import CONVERGED, FREE, FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
@@ -26,6 +27,7 @@ from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, Stiffe
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
@@ -34,7 +36,6 @@ from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
-SMOOTH = 4  # steps that take away what no step resolves, where links start that are rigid or move
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 
@@ -58,7 +59,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
-        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model))
+        tolerance = FREE if scene.driven is None else CONVERGED
+        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model), tolerance)
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -115,11 +117,9 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
 
 
 def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
-    """Smaller steps for where those of the analysis do not settle, and smooth ones where a start jerks."""
-    analysis = scene.analysis
-    jerks = any(link.rigid for link in model.links) or analysis.initial_speeds or analysis.initial_motions
+    """Smaller steps for where those of the analysis do not settle."""
     return Bridge(
-        time_grid(scene).step, analysis.rho_inf, SMOOTH if jerks else 0,
+        time_grid(scene).step, scene.analysis.rho_inf,
         lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
         lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
     )  # fmt: skip
@@ -194,7 +194,13 @@ def first_states(
         forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
         states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
-        return [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
+        states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
+        if not any(link.rigid and link.fit is not None for link in model.links):
+            return states
+        turning = motion.omega[0] + initial_twists(scene, linkage)[1]
+        spin = cross_matrix(turning) @ cross_matrix(turning) - cross_matrix(motion.omega[0]) @ cross_matrix(motion.omega[0])
+        each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
+        return rigid_start(model.links, model.joints, states, each)
     u = quasi_static(model.links, model.joints, moments)
     if following(scene):
         u = far_deflected(model.links, model.joints, moments, u)
