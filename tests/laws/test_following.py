@@ -21,6 +21,7 @@ from kedfem.links.segments import Segments, beam_segments, following, segmented,
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
 from tests.runs import Ran, ran
+from tests.verification.mechanisms import four_bar
 from tests.verification.meshes import mapped_link, mapped_plane
 
 SOFT = Material(density=1000, youngs_modulus=1e9, poisson_ratio=0.3)
@@ -242,3 +243,140 @@ def elbow(fidelity: str, load: float, following: bool = True, **analysis: Any) -
 
 def tip(made: Ran) -> np.ndarray:
     return made.displaced("arm", [0.3, 0.2])
+
+
+@pytest.mark.parametrize("kind", ["planar", "spatial", "plane", "solid"])
+def test_small_loads_leave_the_linear_answer_and_the_difference_grows_with_their_square(kind: str) -> None:
+    changes = {"analysis": {"end_time": 0.012, "step": 4e-4}} if kind == "solid" else {}
+    loads = (0.5, 1, 2) if kind == "spatial" else (1, 2, 4)
+    apart, linear = [], 0.0
+    for load in loads:
+        nominal, free = (tip(ran(merged(elbow(kind, load, follow), changes))) for follow in (False, True))
+        apart.append(np.abs(free - nominal).max())
+        linear = np.abs(nominal).max()
+    assert apart[-1] < 0.03 * linear
+    order = np.diff(np.log2(apart))
+    # beams in space add what their hubs resist to being turned against a segment, of third order
+    assert np.all(order > 1.95)
+    assert np.all(order < (3.1 if kind == "spatial" else 2.05))
+
+
+def merged(raw: dict[str, Any], changes: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    return raw | {key: raw[key] | value for key, value in changes.items()}
+
+
+def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
+    """The source's four-bar at 60 rpm, E and G multiplied, half a turn; settled by its damping."""
+    raw: dict[str, Any] = four_bar(
+        {"turns": 0.5, "steps_per_turn": 720, **({"frames": "following"} if follow else {})},
+        {"mesh": {"elements": 3}},
+        materials={"alloy": {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}},
+        drive={"joint": "A", "motion": {"kind": "ramp", "speed": "60 rpm", "time": 0.3}},
+        damping={"ratio": 0.3, "frequencies": [20, 200]},
+    ).model_dump(mode="json", exclude_unset=True)
+    return raw
+
+
+def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_square_of_their_stiffness() -> None:
+    apart = []
+    for factor in (1, 4, 16):
+        nominal, free = (ran(slow_four_bar(factor, follow)) for follow in (False, True))
+        at = free.ready.scene.joints["C"].at
+        d = free.displaced("rocker", at) - nominal.displaced("rocker", at)
+        apart.append(float(np.sqrt(np.mean(d**2))))
+    order = np.diff(np.log(apart)) / np.log(4)
+    assert np.all(order < -1.9)
+    assert np.all(order > -2.1)
+
+
+@pytest.mark.parametrize("kind", ["planar", "spatial", "plane"])
+def test_the_compiled_loop_is_the_general_path(kind: str) -> None:
+    """Both stop sweeping at 1e-7 of a step's change."""
+    raw = elbow(kind, 16, step=4e-4)
+    raw["damping"] = {"alpha": 5, "beta": 1e-5}
+    if kind == "plane":
+        raw["links"]["arm"]["mesh"] = {"size": 0.02}
+    fast, general = ran(raw), ran(raw, compiled=False)
+    assert type(fast.solver) is not type(general.solver)
+    assert_allclose(tip(fast), tip(general), rtol=0, atol=1e-6 * np.abs(tip(general)).max())
+
+
+@pytest.mark.parametrize("kind", ["spatial", "rigid"])
+def test_the_same_whichever_way_the_whole_scene_is_turned(kind: str) -> None:
+    """A bent arm on a hinge that falls under gravity and a spring: all points and vectors turned at random."""
+    straight = ran(pendulum(kind, np.eye(3)))
+    R = Rotation.from_rotvec([0.9, -0.7, 1.3]).as_matrix()
+    turned = ran(pendulum(kind, R))
+    path = straight.position("arm", [0.3, 0.2, 0.1])
+    assert np.ptp(path, axis=0).min() > 0.05
+    assert_allclose(turned.position("arm", R @ [0.3, 0.2, 0.1]), path @ R.T, rtol=0, atol=1e-6)
+
+
+def pendulum(kind: str, R: np.ndarray) -> dict[str, Any]:
+    points = [R @ x for x in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.1])]
+    arm = {"material": "m", "fidelity": "beam", "beam": "spatial", "mesh": {"elements": 2},
+           "shape": {"kind": "polyline", "points": [list(x) for x in points], "width": 0.01, "thickness": 0.01}}  # fmt: skip
+    if kind == "rigid":
+        arm["fidelity"] = "rigid"
+    return {
+        "gravity": list(R @ [2.0, -9.0, 3.0]),
+        "materials": {"m": ALLOY},
+        "links": {"arm": arm},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": list(points[0]), "axis": list(R @ [0.3, 0.4, 1.0])}},
+        "springs": {"s": {"kind": "torsion", "joint": "A", "stiffness": 0.05, "damping": 0.002}},
+        "analysis": {"end_time": 0.2, "step": 2e-3},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["planar", "spatial", "plane", "solid", "rigid"])
+def test_free_flight_keeps_momentum_and_the_integrators_order_of_spin_and_energy(kind: str) -> None:
+    """Linear momentum to rounding; angular momentum and energy to second order of the step, from both sides."""
+    lost = []
+    for h in (4e-4, 2e-4):
+        made = ran(flight(kind, h))
+        p, energy = made.momentum, made.kinetic_energy + made.strain_energy
+        assert_allclose(p[:, :3], p[[0]][:, :3].repeat(len(p), 0), rtol=0, atol=1e-11 * np.abs(p[0, :3]).max())
+        spin = np.linalg.norm(p[-1, 3:] - p[0, 3:]) / np.linalg.norm(p[0, 3:])
+        lost.append((spin, abs(energy[-1] / energy[0] - 1)))
+    assert max(lost[0]) < 1e-3
+    order = np.log2(np.array(lost[0]) / lost[1])
+    assert np.all(order > 1.8)
+    assert np.all(order < 2.3)
+
+
+def flight(kind: str, h: float) -> dict[str, Any]:
+    """A bar thrown spinning, in space if it can."""
+    flat = kind in {"planar", "plane"}
+    link = {"material": "m", "fidelity": "beam" if kind in {"planar", "spatial"} else kind,
+            "shape": {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.01, "thickness": 0.01}}  # fmt: skip
+    if link["fidelity"] == "beam":
+        link |= {"beam": kind, "mesh": {"elements": 3}}
+    elif kind != "rigid":
+        link |= {"mesh": {"elements": [4, 1] if flat else [4, 1, 1]}, "segments": 2}
+    start = {"at": [0.25, 0], "velocity": [1, 2, 0 if flat else 0.5], "spin": [0, 0, 30] if flat else [5, 10, 30]}
+    return {
+        "materials": {"m": ALLOY},
+        "links": {"arm": link},
+        "analysis": {"end_time": 0.04, "step": h, "rho_inf": 0.9, "initial_motions": {"arm": start}},
+    }
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_joints_stay_closed_and_work_is_as_counted(compiled: bool) -> None:
+    """One factorisation per segment, at most four sweeps a step, in the source's four-bar at 600 rpm."""
+    raw = four_bar(
+        {"turns": 0.1 if not compiled else 1, "steps_per_turn": 1000, "frames": "following", "initial": "rest"},
+        {"mesh": {"elements": 4}},
+        damping={"ratio": 0.02, "frequencies": [20, 200]},
+    ).model_dump(mode="json", exclude_unset=True)  # fmt: skip
+    made = ran(raw, compiled)
+    assert made.solver.factorisations == len(made.ready.model.links) == 12
+    assert 1 < made.sweeps <= 4
+    for at, (one, other) in {"B": ("crank", "coupler"), "C": ("coupler", "rocker")}.items():
+        point = made.ready.scene.joints[at].at
+        gap = made.position(one, point) - made.position(other, point)
+        assert np.abs(gap).max() < 1e-12
+    for (one, other) in pairwise(range(4)):
+        ends = made.state(one, "u")[:, -1], made.state(other, "u")[:, 0]
+        nominal = np.abs(ends[0] - ends[1]).max()
+        assert nominal < 1e-12
