@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import numpy as np
 from numba import njit
 
 from kedfem.dynamics.actions_kernel import evaluate

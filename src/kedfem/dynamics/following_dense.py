@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from kedfem.dynamics.acting import Acting, nominal_ends, weights
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
 from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme

@@ -3,14 +3,22 @@
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.links.beam import beam_link, line_axes
 from kedfem.errors import MeshError
+from kedfem.links.beam import beam_link, line_axes
 from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.section import scene_section
 from kedfem.links.seats import joint_seat
-from kedfem.links.segments import Interval, Segments, along, beam_segments, following, segmented, space_segments
+from kedfem.links.section import scene_section
+from kedfem.links.segments import (
+    Interval,
+    Segments,
+    along,
+    beam_segments,
+    following,
+    segmented,
+    space_segments,
+)
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.mesh import link_mesh, plane_mesh
