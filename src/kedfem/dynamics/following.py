@@ -17,16 +17,23 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import Acting, Ends, nominal_ends, weights
 from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
-from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.frames import Followed, deformation, followed, frame_force, frames_of, rotation, stress_deformation
+from kedfem.dynamics.dense import SMALL, dense_part
+from kedfem.dynamics.frames import (
+    Followed,
+    deformation,
+    followed,
+    frame_force,
+    frames_of,
+    rotation,
+    stress_deformation,
+)
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
-DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 SWEEPS = 15  # in a step, of which it takes 2 to 4
 NominalEnds = tuple[float, Ends, Ends]
@@ -102,7 +109,7 @@ def _small_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPa
     return HeldPart(held, Y, part.S)
 
 
-class NotConverged(Exception):
+class NotConverged(Exception):  # noqa: N818 - not a fault yet: such a step is taken in parts
     """A step whose sweeps do not settle.
 
     taken : time points of the block before it
@@ -151,7 +158,13 @@ class FollowingSteps:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
         acting: Acting,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
+        self.links, self.joints, self.scheme, self.damping, self.acting = (
+            links,
+            joints,
+            scheme,
+            damping,
+            acting,
+        )
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps, self.scale = len(self.parts), 0, 0.0
@@ -209,18 +222,25 @@ class FollowingSteps:
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = self._solved(rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
-            sizes = [float(np.vdot(x, mass_times(link.mass, x))) for link, x in zip(self.links, change, strict=True)]
+            sizes = [
+                float(np.vdot(x, mass_times(link.mass, x)))
+                for link, x in zip(self.links, change, strict=True)
+            ]
             self.sweeps += 1
-            taken = self.mixing.step(np.concatenate([x.ravel() for x in change]))
-            ends = np.cumsum([x.size for x in change])[:-1]
+            settled = sum(sizes) <= CONVERGED**2 * self.scale
+            asked = np.concatenate([x.ravel() for x in change])
+            taken = asked if settled else self.mixing.step(asked)
+            borders = np.cumsum([x.size for x in change])[:-1]
             now = [
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
-                for k, (s, n, x, nominal) in enumerate(zip(states, now, np.split(taken, ends), at, strict=True))
+                for k, (s, n, x, nominal) in enumerate(
+                    zip(states, now, np.split(taken, borders), at, strict=True)
+                )
             ]
             self.scale = max(self.scale, sum(float(np.vdot(n.u, n.Mu)) for n in now))
             if not np.isfinite(sizes).all():
                 break
-            if sum(sizes) <= CONVERGED**2 * self.scale:
+            if settled:
                 now = self._acted(now, at, ends)
                 self._turned = self._scratch[3][:, 0].copy()
                 return [
@@ -243,7 +263,16 @@ class FollowingSteps:
             for each, x in zip(padded, rows, strict=True):
                 each[: x.shape[1], : len(x)] = x.T
         external(
-            t, self.acting.segment, self._weights, self.acting.table, (x0, v0), (u, v), self._turned, F, out, self._scratch
+            t,
+            self.acting.segment,
+            self._weights,
+            self.acting.table,
+            (x0, v0),
+            (u, v),
+            self._turned,
+            F,
+            out,
+            self._scratch,
         )
         return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, out, strict=True)]
 
@@ -260,8 +289,9 @@ class FollowingSteps:
         if link.fit is None:
             return at.R
         if not link.frames:
-            return at.R @ now.frames[0].Q
-        return at.R @ rotation(link, link.fit, position(link, now.u @ at.R), np.eye(link.d), now.frames[0].angle)[0]
+            return np.asarray(at.R @ now.frames[0].Q)
+        y = position(link, now.u @ at.R)
+        return np.asarray(at.R @ rotation(link, link.fit, y, np.eye(link.d), now.frames[0].angle)[0])
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -271,7 +301,8 @@ class FollowingSteps:
         Mv, Ma = accelerated(scheme, Mu, s.Mu, s.Mv, s.Ma)
         y = position(link, u @ at.R)
         frames = tuple(
-            followed(link, frame, y, before, scheme) for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
+            followed(link, frame, y, before, scheme)
+            for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
         )
         damped = s.damped
         if self.damping.alpha:
@@ -299,7 +330,9 @@ class FollowingSteps:
             z = scipy.linalg.cho_solve(factor, f, check_finite=False)
         w = [b @ z for b in RB]
         forces = [part.S @ x - y for part, x, y in zip(self.parts, w, reactions, strict=True)]
-        return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(self.parts, held, w, strict=True)], forces
+        return [
+            x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(self.parts, held, w, strict=True)
+        ], forces
 
     def _ended(
         self, k: int, s: SegmentState, now: SegmentState, at: Nominal, force: Float[np.ndarray, " q"]
@@ -311,7 +344,11 @@ class FollowingSteps:
         return replace(now, port_forces=world, R=self._mean(k, now, at))
 
     def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))] if taken else []
+        return (
+            [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
+            if taken
+            else []
+        )
 
     def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
         link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
@@ -319,7 +356,10 @@ class FollowingSteps:
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
         stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
         return LinkHistory(
-            **stacked, g=np.stack(g), port_forces=np.stack(forces), strain=np.array([s.strain for s in states])
+            **stacked,  # type: ignore[arg-type]
+            g=np.stack(g),
+            port_forces=np.stack(forces),
+            strain=np.array([s.strain for s in states]),
         )
 
 
@@ -347,7 +387,12 @@ def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) 
 
 
 def internal_force(
-    link: Link, y: Nodal, R: Float[np.ndarray, "d d"], frames: Sequence[Followed], damped: np.ndarray, beta: float
+    link: Link,
+    y: Nodal,
+    R: Float[np.ndarray, "d d"],
+    frames: Sequence[Followed],
+    damped: np.ndarray,
+    beta: float,
 ) -> tuple[Nodal, float]:
     """Internal force of a segment with damping, world components, and its strain energy.
 

@@ -29,7 +29,13 @@ class FollowingDense:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
         acting: Acting,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = links, joints, scheme, damping, acting
+        self.links, self.joints, self.scheme, self.damping, self.acting = (
+            links,
+            joints,
+            scheme,
+            damping,
+            acting,
+        )
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
@@ -45,9 +51,11 @@ class FollowingDense:
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
         self._beams = self._points()
-        self._acting = acting.segment, weights(
-            acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2]
-        ), acting.table
+        self._acting = (
+            acting.segment,
+            weights(acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2]),
+            acting.table,
+        )
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
     @property
@@ -61,10 +69,20 @@ class FollowingDense:
         L, (b, _, E) = len(self.links), self._beams[3].shape
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
         C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, 3, 3)), np.zeros(L)
-        g, strain, direction, turn = np.zeros((3, L, D * n)), np.zeros((3, b, 3, E)), np.zeros((b, 2, E)), np.zeros((b, E))
+        g, strain, direction, turn = (
+            np.zeros((3, L, D * n)),
+            np.zeros((3, b, 3, E)),
+            np.zeros((b, 2, E)),
+            np.zeros((b, E)),
+        )
         Q[:], direction[:, 0] = np.eye(3), 1.0
-        general = [first_state(*each, s) for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)]
-        for i, (link, joint, part, s) in enumerate(zip(self.links, self.joints, self.parts, general, strict=True)):
+        general = [
+            first_state(link, joint, self.damping, s)
+            for link, joint, s in zip(self.links, self.joints, states, strict=True)
+        ]
+        for i, (link, joint, part, s) in enumerate(
+            zip(self.links, self.joints, self.parts, general, strict=True)
+        ):
             for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
                 out[i, : link.d, : link.n] = coordinates(link, part, rows)
             for out, rows in ((F, s.F), (f, s.f)):
@@ -110,7 +128,8 @@ class FollowingDense:
         history = (u, v, a, g, strains, np.zeros((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
             self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._beams, self._kinds,
-            (R, F), (*self._acting, motion.t, *nominal_ends(self.acting, motion)), state, history, self._memory, self._counts,
+            (R, F), (*self._acting, motion.t, *nominal_ends(self.acting, motion)), state, history, self._memory,
+            self._counts,
         )  # fmt: skip
         histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
         if taken < T:
@@ -175,12 +194,19 @@ class FollowingDense:
         which = np.array([i for i, link in enumerate(self.links) if points_of(link)], int)
         every = [points_of(self.links[i]) for i in which]
         b, E = len(which), max([1, *(len(points) for points in every)])
-        rows, tangent, rigidity = np.zeros((b, 3, E, self._sizes[1])), np.zeros((b, 2, E)), np.zeros((b, 3, E))
+        rows, tangent, rigidity = (
+            np.zeros((b, 3, E, self._sizes[1])),
+            np.zeros((b, 2, E)),
+            np.zeros((b, 3, E)),
+        )
         tangent[:, 0] = 1.0
         for k, (i, points) in enumerate(zip(which, every, strict=True)):
             n, T = self.links[i].n, self.parts[i].T
             for e, point in enumerate(points):
-                of_u, of_psi = point.strains.reshape(3, -1, 3)[:, :, :2], point.strains.reshape(3, -1, 3)[:, :, 2]
+                of_u, of_psi = (
+                    point.strains.reshape(3, -1, 3)[:, :, :2],
+                    point.strains.reshape(3, -1, 3)[:, :, 2],
+                )
                 rows[k, 0, e, :n] = T[0].T @ of_u[0] @ point.tangent
                 rows[k, 1, e, :n] = T[2].T @ -of_psi[1]
                 rows[k, 2, e, :n] = T[2].T @ of_psi[2]

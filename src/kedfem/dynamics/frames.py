@@ -90,9 +90,7 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
     return np.asarray(g)
 
 
-def followed(
-    link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme
-) -> Followed:
+def followed(link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme) -> Followed:
     """A frame at the end of a step, rates of g by the scheme's own formulas.
 
     Parameters

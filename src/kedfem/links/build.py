@@ -101,16 +101,23 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case _:
             joints = [joint for joint in scene.joints.values() if name in joint.links]
             ends = np.array([joint.at for joint in joints])
-            return segmented(link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends)))
+            return segmented(
+                link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends))
+            )
 
 
 def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:
     """What of a link the elements around its joints and bodies take up along a direction."""
     out = []
-    places = [(joint.at, joint.axis if joint.kind != "prismatic" else None) for joint in scene.joints.values() if name in joint.links]
+    places = [
+        (joint.at, joint.axis if joint.kind != "prismatic" else None)
+        for joint in scene.joints.values()
+        if name in joint.links
+    ]
     for at, axis in places:
+        about = None if axis is None else np.asarray(axis) / np.linalg.norm(axis)
         try:
-            seat = joint_seat(link, f"links.{name}", np.asarray(at), None if axis is None else np.asarray(axis) / np.linalg.norm(axis))
+            seat = joint_seat(link, f"links.{name}", np.asarray(at), about)
         except MeshError:
             continue  # is said where the joint is made
         if seat.facets is not None:
