@@ -1,6 +1,6 @@
 """Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: strains, and the force they make.
 
-At a point, with x' the derivative of the position by arc length as drawn, |x'| = 1 there, and θ the angle that it has turned,
+At a point, with x' the derivative of the position by arc length as drawn, where |x'| = 1, and θ the angle it has turned,
 
     ε = |x'| − 1,   γ = θ − ψ,   κ = ψ'
 

@@ -36,7 +36,6 @@ from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, 
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
-DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
@@ -117,7 +116,7 @@ def _small_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPa
     return HeldPart(held, Y, part.S)
 
 
-class NotConverged(Exception):
+class NotConverged(Exception):  # noqa: N818 - not a fault yet: such a step is taken in parts
     """A step whose sweeps do not settle.
 
     taken : time points of the block before it
@@ -166,7 +165,13 @@ class FollowingSteps:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
         actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
+            links,
+            joints,
+            scheme,
+            damping,
+            actions,
+        )
         self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
@@ -222,18 +227,28 @@ class FollowingSteps:
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = solved(self.parts, rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
-            sizes = [float(np.vdot(x, mass_times(link.mass, x))) for link, x in zip(self.links, change, strict=True)]
+            sizes = [
+                float(np.vdot(x, mass_times(link.mass, x)))
+                for link, x in zip(self.links, change, strict=True)
+            ]
             self.sweeps += 1
-            taken = self.mixing.step(np.concatenate([x.ravel() for x in change]))
+            settled = sum(sizes) <= self.tolerance**2 * self.scale
+            asked = np.concatenate([x.ravel() for x in change])
+            taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
             now = [
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
-                for k, (s, n, x, nominal) in enumerate(zip(states, now, np.split(taken, ends), at, strict=True))
+                for k, (s, n, x, nominal) in enumerate(
+                    zip(states, now, np.split(taken, ends), at, strict=True)
+                )
             ]
-            self.scale = max(self.scale, sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)))
+            self.scale = max(
+                self.scale,
+                sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)),
+            )
             if not np.isfinite(sizes).all():
                 break
-            if sum(sizes) <= self.tolerance**2 * self.scale:
+            if settled:
                 now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)
@@ -278,7 +293,8 @@ class FollowingSteps:
         Mv, Ma = accelerated(scheme, Mu, s.Mu, s.Mv, s.Ma)
         y = position(link, u @ at.R)
         frames = tuple(
-            followed(link, frame, y, before, scheme) for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
+            followed(link, frame, y, before, scheme)
+            for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
         )
         damped = s.damped
         if self.damping.alpha:
@@ -305,7 +321,11 @@ class FollowingSteps:
         return replace(now, port_forces=world, R=self._mean(k, now, at))
 
     def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))] if taken else []
+        return (
+            [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
+            if taken
+            else []
+        )
 
     def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
         link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
@@ -313,7 +333,10 @@ class FollowingSteps:
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
         stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
         return LinkHistory(
-            **stacked, g=np.stack(g), port_forces=np.stack(forces), strain=np.array([s.strain for s in states])
+            **stacked,
+            g=np.stack(g),
+            port_forces=np.stack(forces),
+            strain=np.array([s.strain for s in states]),
         )
 
 
@@ -325,7 +348,10 @@ def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float
 
 
 def solved(
-    parts: Sequence[HeldPart], rhs: Sequence[NodalOf], RB: Sequence[NodalOf], factor: tuple[np.ndarray, bool] | None
+    parts: Sequence[HeldPart],
+    rhs: Sequence[NodalOf],
+    RB: Sequence[NodalOf],
+    factor: tuple[np.ndarray, bool] | None,
 ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
     """Changes of all segments in their frames, and port forces: A Δ = r + Wᵀ λ, Σ Bᵀ R λ = 0, R W Δ = B z.
 
@@ -371,7 +397,12 @@ def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) 
 
 
 def internal_force(
-    link: Link, y: Nodal, R: Float[np.ndarray, "d d"], frames: Sequence[Followed], damped: np.ndarray, beta: float
+    link: Link,
+    y: Nodal,
+    R: Float[np.ndarray, "d d"],
+    frames: Sequence[Followed],
+    damped: np.ndarray,
+    beta: float,
 ) -> tuple[Nodal, float]:
     """Internal force of a segment with damping, world components, and its strain energy.
 

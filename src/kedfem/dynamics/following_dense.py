@@ -12,7 +12,7 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
 from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
@@ -31,7 +31,13 @@ class FollowingDense:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
         actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
+            links,
+            joints,
+            scheme,
+            damping,
+            actions,
+        )
         self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
@@ -62,10 +68,20 @@ class FollowingDense:
         L, (b, _, E) = len(self.links), self._beams[3].shape
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
         C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, 3, 3)), np.zeros(L)
-        g, strain, direction, turn = np.zeros((3, L, D * n)), np.zeros((3, b, 3, E)), np.zeros((b, 2, E)), np.zeros((b, E))
+        g, strain, direction, turn = (
+            np.zeros((3, L, D * n)),
+            np.zeros((3, b, 3, E)),
+            np.zeros((b, 2, E)),
+            np.zeros((b, E)),
+        )
         Q[:], direction[:, 0] = np.eye(3), 1.0
-        general = [first_state(*each, s) for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)]
-        for i, (link, joint, part, s) in enumerate(zip(self.links, self.joints, self.parts, general, strict=True)):
+        general = [
+            first_state(*each, s)
+            for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)
+        ]
+        for i, (link, joint, part, s) in enumerate(
+            zip(self.links, self.joints, self.parts, general, strict=True)
+        ):
             for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
                 out[i, : link.d, : link.n] = coordinates(link, part, rows)
             for out, rows in ((F, s.F), (f, s.f)):
@@ -184,12 +200,19 @@ class FollowingDense:
         which = np.array([i for i, link in enumerate(self.links) if points_of(link)], int)
         every = [points_of(self.links[i]) for i in which]
         b, E = len(which), max([1, *(len(points) for points in every)])
-        rows, tangent, rigidity = np.zeros((b, 3, E, self._sizes[1])), np.zeros((b, 2, E)), np.zeros((b, 3, E))
+        rows, tangent, rigidity = (
+            np.zeros((b, 3, E, self._sizes[1])),
+            np.zeros((b, 2, E)),
+            np.zeros((b, 3, E)),
+        )
         tangent[:, 0] = 1.0
         for k, (i, points) in enumerate(zip(which, every, strict=True)):
             n, T = self.links[i].n, self.parts[i].T
             for e, point in enumerate(points):
-                of_u, of_psi = point.strains.reshape(3, -1, 3)[:, :, :2], point.strains.reshape(3, -1, 3)[:, :, 2]
+                of_u, of_psi = (
+                    point.strains.reshape(3, -1, 3)[:, :, :2],
+                    point.strains.reshape(3, -1, 3)[:, :, 2],
+                )
                 rows[k, 0, e, :n] = T[0].T @ of_u[0] @ point.tangent
                 rows[k, 1, e, :n] = T[2].T @ -of_psi[1]
                 rows[k, 2, e, :n] = T[2].T @ of_psi[2]

@@ -41,26 +41,51 @@ SWEEPS = 15
 
 @compiled
 def follow_block(  # type: ignore[no-untyped-def]
-    coefficients, matrices, unknowns, shapes, frames, beams, kinds, forcing, acting, state, history, memory, counts
+    coefficients,
+    matrices,
+    unknowns,
+    shapes,
+    frames,
+    beams,
+    kinds,
+    forcing,
+    acting,
+    state,
+    history,
+    memory,
+    counts,
 ):
     """Take up to T steps in place, [KED, eq. (20)]; the number that settled, and the segment that did not or -1."""
     G, Yt, S, B = matrices
     columns, count, first = unknowns
     Rs, Fs = forcing
-    u, v, a, F0, f0, C, force0, Q0, angle0, g0, strain0, direction, turn0, turned = state
+    u, v, a, _, _, _, _, Q0, angle0, g0, strain0, direction, turn0, turned = state
     bends, follows, fit, K = frames
     T, L, D, n = Fs.shape
     Qn, c, k, E = B.shape[1], B.shape[2], len(first), direction.shape[2]
-    n0, n1, n2, _, h1, h0, alpha, beta, tolerance = coefficients[4:]
+    n0, n1, n2, _, h1, h0, _, beta, tolerance = coefficients[4:]
     rates = (n0, n1, n2, h1, h0, beta)
-    u1, v1, f1, F, change = np.zeros_like(u), np.zeros_like(u), np.zeros_like(u), np.zeros_like(u), np.zeros_like(u)
+    u1, v1, f1, F, change = (
+        np.zeros_like(u),
+        np.zeros_like(u),
+        np.zeros_like(u),
+        np.zeros_like(u),
+        np.zeros_like(u),
+    )
     lasting, resisted = np.zeros_like(u), np.zeros_like(u)
     Q1, angle1, g1 = Q0.copy(), angle0.copy(), np.zeros_like(g0)
     base, damped = np.zeros((len(turn0), 4, E)), np.zeros((len(turn0), 3, E))
     seen, points = np.zeros((len(turn0), 6, E)), np.zeros((5, E))
     Rp, RB, SRB = np.zeros((L, D, D)), np.zeros((L, Qn, c)), np.zeros((L, Qn, c))
     force, H = np.zeros((L, Qn)), np.zeros((k, k))
-    work = (np.zeros((D, n)), np.zeros((D, n)), np.zeros(D * n), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    work = (
+        np.zeros((D, n)),
+        np.zeros((D, n)),
+        np.zeros(D * n),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros(3),
+    )
     swept_work = (np.zeros(k), np.zeros((L, Qn)), np.zeros((D, n)), np.zeros((L, D * n)), np.zeros(D * n))
     parts = (G, Yt, RB, SRB, columns, count)
     others = not bends.all()
@@ -76,7 +101,21 @@ def follow_block(  # type: ignore[no-untyped-def]
                 for i in range(L):
                     if not bends[i]:
                         held_together(
-                            rates, i, kinds[i], follows[i], shapes, fit, K, R, u1, g0, g1, Q1, angle1, f1, work
+                            rates,
+                            i,
+                            kinds[i],
+                            follows[i],
+                            shapes,
+                            fit,
+                            K,
+                            R,
+                            u1,
+                            g0,
+                            g1,
+                            Q1,
+                            angle1,
+                            f1,
+                            work,
                         )
             if sweep == 0 or settled:
                 mean_rotation(bends, fit, shapes[0], R, u1, Q1)
@@ -94,7 +133,9 @@ def follow_block(  # type: ignore[no-untyped-def]
             if settled or sweep == SWEEPS:
                 break
             counts[0] += 1
-            moved, worst = swept(coefficients, parts, Rp, F, f1, u1, lasting, H, first, force, change, swept_work)
+            moved, worst = swept(
+                coefficients, parts, Rp, F, f1, u1, lasting, H, first, force, change, swept_work
+            )
             if not np.isfinite(moved):
                 break
             settled = moved <= tolerance * tolerance * counts[1]
@@ -117,7 +158,7 @@ def follow_block(  # type: ignore[no-untyped-def]
 
 @compiled
 def begin_step(coefficients, R, state, u1, lasting, resisted):  # type: ignore[no-untyped-def]
-    """What a step begins with: the displacement were the acceleration to stay, and what of the balance it does not change.
+    """What a step begins with: the displacement if the acceleration stayed, and what of the balance it does not change.
 
     Parameters
     ----------

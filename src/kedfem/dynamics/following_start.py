@@ -7,7 +7,15 @@ import scipy.linalg
 
 from kedfem.dynamics.condensed import port_rotation
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.following import HeldPart, Mixing, held_part, internal_force, mean_orientation, position, solved
+from kedfem.dynamics.following import (
+    HeldPart,
+    Mixing,
+    held_part,
+    internal_force,
+    mean_orientation,
+    position,
+    solved,
+)
 from kedfem.dynamics.frames import frames_of, seen_from
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import Nodal, NodalOf
@@ -19,7 +27,10 @@ SETTLED = 1e-10  # change of a sweep, of the deflection
 
 
 def far_deflected(
-    links: Sequence[Link], joints: Sequence[Attachment], instants: Sequence[Instant], start: Sequence[Sequence[NodalOf]]
+    links: Sequence[Link],
+    joints: Sequence[Attachment],
+    instants: Sequence[Instant],
+    start: Sequence[Sequence[NodalOf]],
 ) -> list[list[NodalOf]]:
     """Deflections of any size that turn with their links without vibrating: f(δ) = P − M R0'' − M ([α]× + [ω]×²) δ.
 
@@ -48,7 +59,11 @@ def static_excess(link: Link, u: Nodal, R: NodalOf) -> Nodal:
 
 
 def _balanced(
-    links: Sequence[Link], joints: Sequence[Attachment], parts: Sequence[HeldPart], instant: Instant, u: list[NodalOf]
+    links: Sequence[Link],
+    joints: Sequence[Attachment],
+    parts: Sequence[HeldPart],
+    instant: Instant,
+    u: list[NodalOf],
 ) -> list[NodalOf]:
     mixing = Mixing()
     ends = np.cumsum([x.size for x in u])[:-1]

@@ -102,9 +102,7 @@ def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
     return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
 
 
-def followed(
-    link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme
-) -> Followed:
+def followed(link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme) -> Followed:
     """A frame at the end of a step, rates of g by the scheme's own formulas.
 
     Parameters

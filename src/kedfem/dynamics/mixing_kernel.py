@@ -1,8 +1,8 @@
 """Anderson's mixing of sweeps and the small dense solves of a step, compiled by numba.
 
-    pairs (2, m, N) : where steps taken led, and how the change asked for changed in them
-    products (m, m) : of the latter with each other
-    last (2, N) : step taken and change asked for, of the sweep before
+pairs (2, m, N) : where steps taken led, and how the change asked for changed in them
+products (m, m) : of the latter with each other
+last (2, N) : step taken and change asked for, of the sweep before
 """
 
 from typing import Any

@@ -42,19 +42,25 @@ def rigid_start(
     """
     scale = [_stiffness(link) for link in links]
     centripetal = [
-        _place(link, s) @ W.T if link.rigid else np.zeros_like(s.u) for link, s, W in zip(links, states, spin, strict=True)
+        _place(link, s) @ W.T if link.rigid else np.zeros_like(s.u)
+        for link, s, W in zip(links, states, spin, strict=True)
     ]
     parts = [
-        held_part(link, joint, 1.0, STIFFER / k) if link.rigid else held_substructure(mass_substructure(link, joint))
+        held_part(link, joint, 1.0, STIFFER / k)
+        if link.rigid
+        else held_substructure(mass_substructure(link, joint))
         for link, joint, k in zip(links, joints, scale, strict=True)
     ]
-    load = [s.F - s.f @ s.R.T - mass_times(link.mass, c) for link, s, c in zip(links, states, centripetal, strict=True)]
+    load = [
+        s.F - s.f @ s.R.T - mass_times(link.mass, c)
+        for link, s, c in zip(links, states, centripetal, strict=True)
+    ]
     b, forces = _coupled(parts, joints, states, load, centripetal)
     a = [x + c for x, c in zip(b, centripetal, strict=True)]
     highest = max(k for link, k in zip(links, scale, strict=True) if link.rigid)
     parts = [
         held_part(link, joint, REST * k, 1.0) if link.rigid
-        else held_substructure(mass_substructure(replace(link, mass=tuple(STILL * highest * m for m in link.mass)), joint))
+        else held_substructure(mass_substructure(_heavier(link, STILL * highest), joint))
         for link, joint, k in zip(links, joints, scale, strict=True)
     ]  # fmt: skip
     left = [
@@ -64,7 +70,13 @@ def rigid_start(
     u, _ = _coupled(parts, joints, states, left, [np.zeros_like(x) for x in left])
     return [
         replace(
-            s, u=x, a=y, Mu=mass_times(link.mass, x), Ma=mass_times(link.mass, y), g=x @ s.R, port_forces=force
+            s,
+            u=x,
+            a=y,
+            Mu=mass_times(link.mass, x),
+            Ma=mass_times(link.mass, y),
+            g=x @ s.R,
+            port_forces=force,
         )
         for link, s, x, y, force in zip(links, states, u, a, forces, strict=True)
     ]
@@ -73,6 +85,10 @@ def rigid_start(
 def _stiffness(link: Link) -> float:
     """Square of the frequency that a rigid link's stiffness gives its mass [1/s²]."""
     return float(np.linalg.eigvalsh(np.asarray(link.K0))[-1]) if link.rigid else 0.0
+
+
+def _heavier(link: Link, factor: float) -> Link:
+    return replace(link, mass=tuple(factor * m for m in link.mass))
 
 
 def _place(link: Link, s: LinkState) -> Nodal:
@@ -91,7 +107,9 @@ def _coupled(
     held, reactions = zip(*(part.held(x @ r) for part, x, r in zip(parts, rhs, R, strict=True)), strict=True)
     offset = [port_values(joint, x @ r) for joint, x, r in zip(joints, moved, R, strict=True)]
     H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
-    f = np.sum([b.T @ (y + part.S @ o) for part, b, y, o in zip(parts, RB, reactions, offset, strict=True)], axis=0)
+    f = np.sum(
+        [b.T @ (y + part.S @ o) for part, b, y, o in zip(parts, RB, reactions, offset, strict=True)], axis=0
+    )
     z = scipy.linalg.solve(H, f, assume_a="pos") if len(H) else f
     w = [b @ z - o for b, o in zip(RB, offset, strict=True)]
     forces = [part.S @ x - y for part, x, y in zip(parts, w, reactions, strict=True)]

@@ -129,9 +129,9 @@ def _stuck(step: int, part: RigidMotion, stuck: Stuck) -> str:
     """What to do about a step that does not settle."""
     k = stuck.taken
     return (
-        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive angle "
-        f"{np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from sweep to "
-        "sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
+        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
+        f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from "
+        "sweep to sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
     )
 
 
@@ -198,7 +198,9 @@ def first_states(
         if not any(link.rigid and link.fit is not None for link in model.links):
             return states
         turning = motion.omega[0] + initial_twists(scene, linkage)[1]
-        spin = cross_matrix(turning) @ cross_matrix(turning) - cross_matrix(motion.omega[0]) @ cross_matrix(motion.omega[0])
+        spin = cross_matrix(turning) @ cross_matrix(turning) - cross_matrix(motion.omega[0]) @ cross_matrix(
+            motion.omega[0]
+        )
         each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
         return rigid_start(model.links, model.joints, states, each)
     u = quasi_static(model.links, model.joints, moments)
