@@ -26,7 +26,6 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
-from kedfem.results.acting import action_flow
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
@@ -89,7 +88,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
-    account = Account(ready.model, action_flow(scene, ready.model))
+    account = Account(ready.model)
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
@@ -104,7 +103,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
-        *balance_warning(account.balance),
+        *balance_warning(account.balance, scene.analysis.stiffening),
         *warnings,
     )
     return Run(
@@ -178,7 +177,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
-    geometric, errors = GeometricError(model), step_error(ready)
+    geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     with ResultsWriter(

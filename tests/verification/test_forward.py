@@ -8,7 +8,6 @@ from scipy.special import ellipk
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.transient import steps_of, transient
-from kedfem.results.acting import action_flow
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
@@ -37,7 +36,7 @@ def ran(raw: dict[str, Any]) -> Run:
     """Times, channels of one column, and the account."""
     scene = scene_from(raw)
     ready = meshed(scene)
-    account = Account(ready.model, action_flow(scene, ready.model))
+    account = Account(ready.model)
     recorded = recording(scene, ready.model, account)
     blocks = list(transient(scene, ready.linkage, ready.path, ready.model, steps_of(scene, ready.model)))
     found = [rows(recorded, block) for block in blocks]
@@ -73,15 +72,15 @@ def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(fidelity: 
     T0, w0 = 5.0, 40.0
     tau = INERTIA * w0 / T0
     errors = []
-    for steps in (200, 400):
+    for steps in (500, 1000):
         motor = {"joint": "A", "torque": {"over": "speed", "at": [0, w0], "value": [T0, 0]}}
         t, x, account = ran(arm(fidelity, 2 * tau, tau / steps, motors={"m": motor}))
-        expected = w0 * (1 - np.exp(-t / tau))
-        errors.append(float(np.abs(x["motors/m/speed"] - expected).max()) / w0)
         turned = w0 * (t - tau * (1 - np.exp(-t / tau)))
-        np.testing.assert_allclose(x["motors/m/angle"], turned, atol=3e-3 * turned[-1])
-        assert account.balance.energy < 2e-3
-    assert errors[-1] < 2e-3
+        errors.append(float(np.abs(x["motors/m/angle"] - turned).max()) / turned[-1])
+    assert errors[-1] < 1e-3
+    assert order(errors) > 1.5
+    assert x["motors/m/speed"][-1] == pytest.approx(w0 * (1 - np.exp(-2)), rel=1e-3)
+    assert account.balance.energy < 2e-3
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
@@ -92,20 +91,21 @@ def test_an_arm_on_a_torsion_spring_rings_down(fidelity: str) -> None:
     c = 2 * zeta * np.sqrt(k * INERTIA)
     spring = {"kind": "torsion", "joint": "A", "stiffness": k, "damping": c, "free_angle": free}
     errors = []
-    for steps in (100, 200):
+    for steps in (200, 400):
         t, x, _ = ran(arm(fidelity, 3 * 2 * np.pi / w, 2 * np.pi / w / steps, springs={"s": spring}))
         wd = w * np.sqrt(1 - zeta**2)
         expected = free * (1 - np.exp(-zeta * w * t) * (np.cos(wd * t) + zeta * w / wd * np.sin(wd * t)))
         errors.append(float(np.abs(x["joints/A/angle"] - expected).max()) / free)
-    assert errors[-1] < 2e-3
+    assert errors[-1] < 1e-3
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_an_arm_set_going_coasts(fidelity: str) -> None:
     """No force about the pin: ω stays as at the start, and the kinetic energy with it."""
     t, x, _ = ran(arm(fidelity, 1.0, 0.002, analysis={"initial_speeds": {"A": "60 rpm"}}))
-    np.testing.assert_allclose(x["joints/A/angle"], 2 * np.pi * t, atol=1e-4)
-    np.testing.assert_allclose(x["energy/kinetic"], 0.5 * INERTIA * (2 * np.pi) ** 2, rtol=1e-4)
+    # the error of a step: (ω h)²/12 = 1.3e-5, and as much again from the deformation
+    np.testing.assert_allclose(x["joints/A/angle"], 2 * np.pi * t, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(x["energy/kinetic"], 0.5 * INERTIA * (2 * np.pi) ** 2, rtol=2e-4)
 
 
 def test_two_flying_links_on_a_spring_keep_momentum_and_energy() -> None:
@@ -121,7 +121,7 @@ def test_two_flying_links_on_a_spring_keep_momentum_and_energy() -> None:
         "analysis": {"end_time": 1.0, "step": 0.001, "rho_inf": 1.0,
                      "initial_motions": {"one": {"at": [0, 0], "velocity": [0.3, 0.2], "spin": [0, 0, 5]}}},
     }  # fmt: skip
-    t, x, account = ran(raw)
+    _, x, account = ran(raw)
     stored = 0.5 * 10 * (x["springs/t/angle"] - 0.5) ** 2 + 0.5 * 300 * (x["springs/l/length"] - 0.5) ** 2
     total = x["energy/kinetic"] + x["energy/strain"] + stored
     assert np.ptp(x["springs/t/angle"]) > 0.5  # they swing

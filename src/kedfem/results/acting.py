@@ -1,81 +1,44 @@
 """Channels of motors and springs, and of how far hinges have turned."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.action import ANGLE, DISTANCE, POINT, TURN, Action, Table, kernel_table, vectors
+from kedfem.dynamics.action import DISTANCE, TURN, Action, Table, kernel_table, vectors
 from kedfem.dynamics.actions import actions, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
-from kedfem.results.balance import Flow
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Scene
 
 POSITION, SPEED, EFFORT = 0, 1, 2
-Ends = Float[np.ndarray, "T A 2 2 3"]
 
 
 @dataclass
 class Measured:
-    """Actions over successive blocks, turns counted on from block to block; worked out once for each block.
-
-    x, v, forces : (T, A, 2, 2, 3) vectors of all ends, their rates, and the forces on them
-    values : (T, A, 4) coordinate, rate, force and stored energy
-    """
+    """Values of actions over successive blocks, turns counted on from block to block; worked out once for each block."""
 
     every: Sequence[Action]
     table: Table
     turned: Float[np.ndarray, " A"] = field(default_factory=lambda: np.zeros(0))
     block: Block | None = None
-    x: Ends = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
-    v: Ends = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
-    forces: Ends = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
     values: Float[np.ndarray, "T A 4"] = field(default_factory=lambda: np.zeros((0, 0, 4)))
 
-    def of(self, block: Block) -> "Measured":
-        """Itself, with what belongs to a block; blocks in the order of time."""
+    def of(self, block: Block) -> Float[np.ndarray, "T A 4"]:
+        """Coordinate, rate, force and stored energy of all actions; blocks in the order of time."""
         if block is not self.block:
             from kedfem.dynamics.actions_kernel import evaluate_all
 
             before = np.zeros(len(self.every)) if block.step == 0 else self.turned
             self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
-            self.x, self.v = vectors(self.every, block)
-            self.forces = np.zeros_like(self.x)
-            evaluate_all(block.motion.t, self.x, self.v, self.turned, self.table, self.forces, self.values)
+            x, v = vectors(self.every, block)
+            evaluate_all(block.motion.t, x, v, self.turned, self.table, np.zeros_like(x), self.values)
             self.block = block
-        return self
-
-
-def action_flow(scene: Scene, model: Model) -> Callable[[Block], Flow] | None:
-    """What motors and springs do on links that have unknowns, for the account of energy and momentum; None without any.
-
-    Power, resultant and moment about the world's origin, as loads. A force f on a direction e has the moment e × f.
-    """
-    every = actions(scene, model)
-    if not every:
-        return None
-    measured = Measured(every, kernel_table(every))
-    on_links = np.array([[end.k >= 0 for end in action.ends] for action in every])
-    points = np.array([[end.form == POINT for end in action.ends] for action in every])[..., None, None]
-    angles = np.array([[end.form == ANGLE for end in action.ends] for action in every])[..., None, None]
-
-    def flow(block: Block) -> Flow:
-        now = measured.of(block)
-        f = now.forces * on_links[..., None, None]
-        moments = np.where(angles, f, np.cross(now.x, f))
-        over = (1, 2, 3)
-        none, nothing = np.zeros((len(block), 3)), np.zeros(len(block))
-        return Flow(
-            nothing, none, none, (f * now.v).sum(axis=(*over, 4)), nothing,
-            np.where(points, f, 0.0).sum(axis=over), moments.sum(axis=over), none, nothing,
-        )  # fmt: skip
-
-    return flow
+        return self.values
 
 
 def acting(scene: Scene, model: Model) -> list[Recorded]:
@@ -99,7 +62,7 @@ def acting(scene: Scene, model: Model) -> list[Recorded]:
 
 
 def _column(measured: Measured, i: int, which: int, sign: float, block: Block) -> Rows:
-    return np.asarray(sign * measured.of(block).values[:, i, which, None])
+    return np.asarray(sign * measured.of(block)[:, i, which, None])
 
 
 def _channels(scene: Scene, action: Action) -> list[tuple[Channel, int, float]]:

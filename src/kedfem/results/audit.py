@@ -89,13 +89,10 @@ class _Sums:
 
 
 class Account:
-    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew.
+    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
 
-    acting : what motors and springs do, `acting.action_flow`
-    """
-
-    def __init__(self, model: Model, acting: Callable[[Block], Flow] | None = None) -> None:
-        self.model, self.acting = model, acting
+    def __init__(self, model: Model) -> None:
+        self.model = model
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
@@ -162,8 +159,6 @@ class Account:
                 taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
         for of, x in zip(self.carried, self.model.carried, strict=True):
             flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
-        if self.acting is not None:
-            flows.append(self.acting(block))
         return flows, taken
 
     def _watch(
@@ -195,9 +190,15 @@ def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], R
     ]
 
 
-def balance_warning(found: Balance) -> tuple[str, ...]:
-    """A warning where the integration loses or makes energy or momentum."""
-    left = {"energy": found.energy, "momentum": found.linear, "angular momentum": found.angular}
+def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
+    """A warning where the integration loses or makes energy or momentum.
+
+    Parameters
+    ----------
+    stiffened : the run has geometric stiffening, whose work is in the residual too: energy is not judged
+    """
+    energy = {} if stiffened else {"energy": found.energy}
+    left = energy | {"momentum": found.linear, "angular momentum": found.angular}
     said = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
     if not said:
         return ()

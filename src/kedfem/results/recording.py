@@ -17,7 +17,7 @@ from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import cross
-from kedfem.results.acting import acting, action_flow
+from kedfem.results.acting import acting
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
@@ -44,9 +44,7 @@ def recording(scene: Scene, model: Model, account: Account | None = None) -> lis
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
     drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
-    energies = [
-        Recorded(*each) for each in energy_channels(account or Account(model, action_flow(scene, model)))
-    ]
+    energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
     return [*probes, *joints, *drive, *acting(scene, model), *energies]
 
 
