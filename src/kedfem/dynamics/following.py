@@ -37,6 +37,7 @@ from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
+PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
@@ -222,7 +223,7 @@ class FollowingSteps:
         H = np.sum([b.T @ part.S @ b for part, b in zip(self.parts, RB, strict=True)], axis=0)
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
-        for _ in range(SWEEPS):
+        for sweep in range(SWEEPS):
             now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = solved(self.parts, rhs, RB, factor)
@@ -232,7 +233,8 @@ class FollowingSteps:
                 for link, x in zip(self.links, change, strict=True)
             ]
             self.sweeps += 1
-            settled = sum(sizes) <= self.tolerance**2 * self.scale
+            tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
+            settled = sum(sizes) <= tolerance**2 * self.scale
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
