@@ -285,7 +285,7 @@ class FollowingSteps:
         link = self.links[k]
         if link.frames or link.fit is None:
             return mean_orientation(link, now.u, at.R)
-        return at.R @ now.frames[0].Q
+        return np.asarray(at.R @ now.frames[0].Q)
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -323,30 +323,24 @@ class FollowingSteps:
         return replace(now, port_forces=world, R=self._mean(k, now, at))
 
     def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        return (
-            [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
-            if taken
-            else []
-        )
+        if not taken:
+            return []
+        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
 
     def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
         link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
         g = [stress_deformation(link, frames, s.frames) if frames else s.u @ s.R for s in states]
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
-        stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
-        return LinkHistory(
-            **stacked,
-            g=np.stack(g),
-            port_forces=np.stack(forces),
-            strain=np.array([s.strain for s in states]),
-        )
+        u, v, a, R, F = (np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F"))
+        strain = np.array([s.strain for s in states])
+        return LinkHistory(u, v, a, np.stack(g), R, F, np.stack(forces), strain)
 
 
 def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
     """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
     if link.fit is None:
         return R
-    return R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0]
+    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0])
 
 
 def solved(
