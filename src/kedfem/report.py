@@ -10,6 +10,7 @@ from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.study import Measured, Study
 from kedfem.analysis import Run, frame_steps
+from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
@@ -17,7 +18,7 @@ from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.path import Path
 from kedfem.results.audit import Balance
-from kedfem.scene import LinkScene, Scene, time_grid
+from kedfem.scene import LineSpring, LinkScene, Motor, Scene, Spring, time_grid
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
 ELEMENTS = {
@@ -80,12 +81,12 @@ def balance_table(found: Balance, geometric: float) -> Table:
     """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
     table = Table(title="Balance and geometric error", show_header=False)
     for what, share in (
-        ("energy left over by the steps", found.energy),
+        ("energy, left over by the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
-        table.add_row(what, f"{_percent(share)} of the largest exchanged")
-    table.add_row("work that nominal frames neglect", f"{_percent(found.neglected)} of it")
+        table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
+    table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
     table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 
@@ -102,7 +103,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
     cost = _cost(ready, estimated_cost(ready.scene, ready.model))
     found = resolution(ready)
     third = [] if found is None else [resolution_table(found)]
-    return [*first, _links(ready.model), *second, _motion(ready), *third, cost]
+    return [*first, _links(ready.model), *second, _motion(ready), *_actions(ready), *third, cost]
 
 
 def plan_tables(plan: Plan) -> list[Table]:
@@ -229,19 +230,42 @@ def _motion(ready: Prepared) -> Table:
     return table
 
 
+def _actions(ready: Prepared) -> list[Table]:
+    """Motors and springs: where they act and by which law."""
+    actions(ready.scene, ready.model)  # refused where they do not fit
+    table = Table(title="Motors and springs", show_header=False)
+    for name, motor in ready.scene.motors.items():
+        table.add_row(name, f"motor on joint {motor.joint}", _motor_law(motor))
+    for name, spring in ready.scene.springs.items():
+        table.add_row(name, *_spring_law(spring))
+    return [table] if table.row_count else []
+
+
+def _motor_law(motor: Motor) -> str:
+    """A motor's curve in words."""
+    unit, value = "N m" if motor.torque else "N", motor.curve.value
+    low, high = (with_prefix(x, unit) for x in (min(value), max(value)))
+    return low if len(value) == 1 else f"{low} to {high} over {motor.curve.over}"
+
+
+def _spring_law(spring: Spring) -> tuple[str, str]:
+    """Where a spring is, and its constants."""
+    if isinstance(spring, LineSpring):
+        on, units = f"spring between {' and '.join(end.link for end in spring.between)}", ("N/m", "N s/m")
+    else:
+        on, units = f"spring about joint {spring.joint}", ("N m/rad", "N m s/rad")
+    constants = zip((spring.stiffness, spring.damping), units, strict=True)
+    return on, ", ".join(with_prefix(value, unit) for value, unit in constants if value)
+
+
 def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
     """How fast each link starts, in words, where the scene asks for speeds."""
     analysis = ready.scene.analysis
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []
-    v, omega = initial_twists(ready.scene, ready.linkage)
-    moved = ready.linkage.centre if ready.scene.joints else np.zeros(3)
-    out = []
-    for k, name in enumerate(ready.linkage.bodies[1:], start=1):
-        middle = v[k] + np.cross(omega[k], moved)
-        speeds = f"{np.linalg.norm(omega[k]):.4g} rad/s, {np.linalg.norm(middle):.4g} m/s amid the joints"
-        out.append((f"link {name} starts with", speeds))
-    return out
+    v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
+    speeds = [f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s" for s, w in zip(v, omega, strict=True)]
+    return [(f"link {x} starts with", y) for x, y in zip(ready.linkage.bodies[1:], speeds[1:], strict=True)]
 
 
 def _cost(ready: Prepared, cost: Cost) -> Table:

@@ -254,11 +254,11 @@ def _four_bar(rpm: float, ratio: float, end: float, h: float, elements: int = 8)
 TIP = ("x [m]", "y [m]")
 CASES: dict[str, Case] = {
     "four_bar_600_damped": _four_bar(600, 0.02, 0.3, 1.25e-5),
-    "four_bar_600_undamped": _four_bar(600, 0.0, 0.3, 3.125e-6, 16),
+    "four_bar_600_undamped": _four_bar(600, 0.0, 0.3, 1.5625e-6, 16),
     "four_bar_400_damped": _four_bar(400, 0.02, 0.45, 2.5e-5),
     "four_bar_300_damped": _four_bar(300, 0.02, 0.6, 2.5e-5),
-    "four_bar_150_damped": _four_bar(150, 0.02, 1.2, 5e-5),
-    "four_bar_60_damped": _four_bar(60, 0.02, 1.0, 5e-5),
+    "four_bar_150_damped": _four_bar(150, 0.02, 1.2, 2.5e-5),
+    "four_bar_60_damped": _four_bar(60, 0.02, 1.0, 2.5e-5),
     "spin_up": Case(spin_up, ("u1 [m]", "u2 [m]", "rotation [rad]"), 20.0, 0.05, 1.25e-3, 8),
     "flying_rod": Case(
         flying_rod, ("x0 [m]", "y0 [m]", "x1 [m]", "y1 [m]", "energy [J]", "spin [N m s]"), 0.5, 1e-3, 2.5e-5

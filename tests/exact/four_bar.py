@@ -56,7 +56,9 @@ def rayleigh(ratio: float, low: float = 20.0, high: float = 200.0) -> tuple[floa
     return 2 * ratio * a * b / (a + b), 2 * ratio / (a + b)
 
 
-def four_bar(rpm: float, ratio: float, elements: int, nodes: int = 3) -> tuple[Problem, State]:
+def four_bar(
+    rpm: float, ratio: float, elements: int, nodes: int = 3, slender: float = 1.0
+) -> tuple[Problem, State]:
     """The problem and its state at t = 0: undeformed, with the rates of the rigid linkage.
 
     Parameters
@@ -64,12 +66,14 @@ def four_bar(rpm: float, ratio: float, elements: int, nodes: int = 3) -> tuple[P
     rpm : speed of the crank
     ratio : damping ratio at 20 and 200 Hz
     elements, nodes : per link, per element
+    slender : shear stiffness multiplied and rotary inertia divided by it
     """
     speed = rpm * 2 * np.pi / 60
     first = pose(0.0, speed)
     A, I = SIDE**2, SIDE**4 / 12  # noqa: E741
+    shear, rotary = 5 / 6 * G * A * slender, RHO * I / slender
     rods = [
-        Rod(tuple(a), tuple(b), E * A, 5 / 6 * G * A, E * I, RHO * A, RHO * I, elements, nodes)
+        Rod(tuple(a), tuple(b), E * A, shear, E * I, RHO * A, rotary, elements, nodes)
         for a, b in zip(first.points[:-1], first.points[1:], strict=True)
     ]
     beams = joined(rods, pins=[[(0, 1), (1, 0)], [(1, 1), (2, 0)]], lumps=[Lump((2, 1), inertia=FLYWHEEL)])

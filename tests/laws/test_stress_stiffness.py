@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import expm
 
-from kedfem.links.beam import beam_link
+from kedfem.links.beam import beam_link, shape_functions
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid, rigid_functions
 from kedfem.links.section import rectangle
+from kedfem.links.spatial_beam import space_strains
+from kedfem.links.spatial_stress import metric
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.motion.newton import cross_matrix
 from kedfem.scene import Material
 from tests.verification.meshes import mapped_link, mapped_plane
 from tests.verification.spatial_beams import FLAT, straight
@@ -109,3 +113,23 @@ def test_a_tie_pulls_back_across_its_axis_with_its_force_over_its_length(made: s
     k = stress_stiffness(link)(g)
     P = turned_directions(link)
     assert_allclose(np.vdot(across, k @ across @ P), N * 1.0, rtol=1e-6)  # N L θ², L = θ = 1
+
+
+def test_strains_of_a_beam_in_space_are_changes_of_scalar_products() -> None:
+    """Σ c_αβ e_α · δe_β is the linear strain, on an element that is curved and twisted."""
+    rng = np.random.default_rng(3)
+    s = np.array([0.0, 1.0, 0.5])
+    n1, n2 = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+    x = np.zeros((3, 3, 3))
+    for node, at in enumerate(s):
+        turn = expm(cross_matrix(np.array([0.4 * at, 0.3 * at, -0.5 * at])))
+        x[node] = [[at, 0.2 * at**2, -0.1 * at**2], turn @ n1, turn @ n2]
+    r, u = 0.3, rng.standard_normal((3, 3, 3))
+    rows, det_J = space_strains(x, r)
+    N, dN = shape_functions(r, 3)
+    weights = np.zeros((5, 3, 3))
+    weights[0, :, 0] = weights[3, :, 1] = weights[4, :, 2] = dN / det_J
+    weights[1, :, 1] = weights[2, :, 2] = N
+    e, change = (np.einsum("amf,mfc->ac", weights, y) for y in (x, u))
+    wanted = np.einsum("imfc,mfc->i", rows, u)
+    assert_allclose(np.einsum("iab,ac,bc->i", metric(e), e, change), wanted, rtol=1e-12)

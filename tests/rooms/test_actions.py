@@ -1,7 +1,6 @@
 """Motors, springs and dampers: forces that do the work of their coordinate, whatever moves, and balance by themselves."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,10 +21,11 @@ from kedfem.dynamics.action import (
     TURN,
     Action,
     End,
+    end_weights,
     kernel_table,
 )
 from kedfem.dynamics.actions import actions, hinges
-from kedfem.dynamics.actions_kernel import evaluate, evaluate_all
+from kedfem.dynamics.actions_kernel import borne, evaluate, evaluate_all, seen
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import MeshError, SceneError
@@ -228,13 +228,14 @@ def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
     x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
                   for s in t])  # fmt: skip
     values, before = np.zeros((9, 3, 4)), np.zeros(3)
-    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), values)
+    forces = np.zeros_like(x)
+    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), forces, values)
     q = np.zeros(3)
     for k in range(9):
         for i, action in enumerate(every):
-            np.testing.assert_allclose(
-                values[k, i], found(action, x[k, i], t=t[k], before=q[i])[1], atol=1e-12
-            )
+            alone = found(action, x[k, i], t=t[k], before=q[i])
+            np.testing.assert_allclose(forces[k, i], alone[0], atol=1e-12)
+            np.testing.assert_allclose(values[k, i], alone[1], atol=1e-12)
         q = values[k, :, 0]
     np.testing.assert_allclose(values[:, 0, 0], 3 * t, atol=1e-12)
     np.testing.assert_array_equal(before, values[-1, :, 0])
@@ -331,6 +332,16 @@ def spring(link: str, at: list[float], to: list[float], **more: Any) -> dict[str
     }
 
 
+def test_a_joint_that_names_the_ground_first_turns_its_link_all_the_same() -> None:
+    raw = arm("beam")
+    raw["joints"]["A"]["links"] = ["ground", "arm"]
+    scene, model = built(raw)
+    (action,) = actions(scene, model)
+    f, values = found(action, state_of(action, model, turning(model, 0.5 * Z)))
+    assert values[0] == pytest.approx(-0.5)
+    np.testing.assert_allclose(f[0, 0], [0, 0, -2.5], atol=1e-12)  # about the axis, −z
+
+
 def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     springs = {
         "tip": spring("arm", [1, 0], [1, 2]),
@@ -359,13 +370,18 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     np.testing.assert_allclose(shoe.ends[0].X + shoe.ends[0].offset, [[1.5, 0.1, 0]])
 
 
-def test_the_nearest_of_several_segments_bears_an_end() -> None:
-    """Segments are links of one name."""
-    scene, model = built(arm("beam", springs={"tip": spring("arm", [1, 0], [1, 2])}))
-    far = replace(model.links[0], X=model.links[0].X + np.array([5.0, 0.0, 0.0]))
-    several = replace(model, links=(far, model.links[0]), bodies=(1, 1))
-    assert [x.ends[0].k for x in actions(scene, several)] == [1, 1]
-    assert [x.ends[0].k for x in actions(scene, several, lambda name, point: 1)] == [1, 1]
+@pytest.mark.parametrize("kind", ["beam", "spatial", "solid", "plane"])
+def test_ends_are_on_the_segments_that_hold_them(kind: str) -> None:
+    """A link in segments, each a link of its name: forces are on them where they touch joint or point."""
+    raw = arm(kind, springs={"tip": spring("arm", [0.98, 0], [1, 2])})
+    if kind in {"solid", "plane"}:
+        raw["links"]["arm"]["segments"] = 3
+    scene, model = built(raw)
+    assert [link.name for link in model.links] == ["arm"] * 3
+    motor, tip = actions(scene, model)
+    assert [motor.ends[0].k, tip.ends[0].k] == [0, 2]
+    x = state_of(tip, model, turning(model, 0.3 * Z))
+    np.testing.assert_allclose(x[0, 0], 0.98 * np.array([np.cos(0.3), np.sin(0.3), 0]), atol=1e-9)
 
 
 def test_ends_must_be_on_their_links() -> None:
@@ -379,24 +395,48 @@ def test_ends_must_be_on_their_links() -> None:
         actions(scene, model)
 
 
+@pytest.mark.parametrize("kind", ["beam", "plane", "solid"])
+def test_padded_states_are_seen_and_bear_forces_as_rows_do(kind: str) -> None:
+    """In other coordinates, too: u = T x, component by component; forces there are Tᵀ f."""
+    scene, model = built(
+        arm(kind, springs={"tip": spring("arm", [0.98 if kind != "beam" else 1, 0], [1, 2])})
+    )
+    every, rng = actions(scene, model), np.random.default_rng(0)
+    n, d = max(link.n for link in model.links), max(link.d for link in model.links)
+    T = [[rng.normal(size=(link.n, link.n)) for _ in range(link.d)] for link in model.links]
+    x = [rng.normal(size=(link.d, link.n)) for link in model.links]
+    u = [np.stack([T[k][c] @ x[k][c] for c in range(link.d)], axis=1) for k, link in enumerate(model.links)]
+    padded = np.zeros((len(model.links), d, n))
+    for k, link in enumerate(model.links):
+        padded[k, : link.d, : link.n] = x[k]
+    owners, weights = end_weights(every, (d, n), T)
+    out, drawn_now = np.zeros((len(every), 2, 2, 3)), drawn(every)
+    seen(owners, weights, drawn_now, padded, out)
+    expected = [state_of(action, model, lambda k, X: u[k]) for action in every]
+    np.testing.assert_allclose(out, expected, atol=1e-9)
+    forces, change = rng.normal(size=out.shape), np.zeros_like(padded)
+    borne(owners, weights, forces, change)
+    np.testing.assert_allclose(np.vdot(change, padded), np.vdot(forces, out - drawn_now))  # the same work
+
+
 # -- recorded -----------------------------------------------------------------------------------------------
 
 
 def blocks(model: Model, t: np.ndarray, angle: np.ndarray, length: int) -> list[Block]:
     """An arm that turns about the origin by an angle over time, nominally at rest, block by block."""
-    link, out = model.links[0], []
-    rate = np.gradient(angle, t)
-    for k in range(0, len(t), length):
-        here = range(k, min(k + length, len(t)))
-        u = np.array([turning(model, angle[i] * Z)(0, link.X) for i in here])
-        x = u + link.X[:, : link.d] if link.kind != "beam" else u + link.X * [1.0, 1.0, 0.0]
-        v = np.zeros_like(u)
-        v[..., 0], v[..., 1] = -rate[here, None] * x[..., 1], rate[here, None] * x[..., 0]
-        if link.kind == "beam":
-            v[..., 2] = rate[here, None] * link.one
-        none, R = np.zeros((len(u), 0)), np.tile(np.eye(link.d), (len(u), 1, 1))
-        history = LinkHistory(u, v, 0 * u, 0 * u, R, 0 * u, none, np.zeros(len(u)))
-        out.append(Block(k, resting(2, t[here]), [history]))
+    out, rate = [], np.gradient(angle, t)
+    for first in range(0, len(t), length):
+        here, histories = range(first, min(first + length, len(t))), []
+        for k, link in enumerate(model.links):
+            u = np.array([turning(model, angle[i] * Z)(k, link.X) for i in here])
+            x = u + link.X[:, : link.d] if link.kind != "beam" else u + link.X * [1.0, 1.0, 0.0]
+            v = np.zeros_like(u)
+            v[..., 0], v[..., 1] = -rate[here, None] * x[..., 1], rate[here, None] * x[..., 0]
+            if link.kind == "beam":
+                v[..., 2] = rate[here, None] * link.one
+            none, R = np.zeros((len(u), 0)), np.tile(np.eye(link.d), (len(u), 1, 1))
+            histories.append(LinkHistory(u, v, 0 * u, 0 * u, R, 0 * u, none, np.zeros(len(u))))
+        out.append(Block(first, resting(2, t[here]), histories))
     return out
 
 
@@ -413,8 +453,9 @@ def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> N
     angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
     recorded = recording(scene, model)
     assert not any(each.channel.name.startswith("drive") for each in recorded)
-    parts = [rows([x for x in recorded if x.channel.name.split("/")[0] in ("motors", "springs") or "angle" in x.channel.name], b)
-             for b in blocks(model, t, angle, length)]  # fmt: skip
+    sections = ("motors", "springs")
+    wanted = [x for x in recorded if x.channel.name.split("/")[0] in sections or "angle" in x.channel.name]
+    parts = [rows(wanted, block) for block in blocks(model, t, angle, length)]
     got = {name: np.concatenate([part[name][:, 0] for part in parts]) for name in parts[0]}
     rate = np.gradient(angle, t)
     place = np.linalg.norm(tip) * np.array([np.cos(angle), np.sin(angle)])
@@ -429,10 +470,5 @@ def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> N
     assert list(got) == list(expected)
     for name, values in expected.items():
         np.testing.assert_allclose(got[name], values, atol=1e-8, err_msg=name)
-    again = rows(
-        recorded[:0] + [x for x in recorded if x.channel.name == "joints/A/angle"],
-        blocks(model, t, angle, 5)[0],
-    )
-    np.testing.assert_allclose(
-        again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9
-    )  # a new run counts from zero
+    again = rows(wanted, blocks(model, t, angle, 5)[0])  # a new run counts from zero
+    np.testing.assert_allclose(again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9)

@@ -54,7 +54,7 @@ def channels(raw: dict[str, Any], model: Model, snapshot: Snapshot) -> dict[str,
 
 def as_block(snapshot: Snapshot) -> Block:
     """A block of one time point."""
-    names = [field.name for field in fields(LinkHistory)]
+    names = [field.name for field in fields(LinkHistory) if field.name != "products"]
     links = [LinkHistory(*(np.asarray(getattr(s, x))[None] for x in names)) for s in snapshot.states]
     return Block(snapshot.step, snapshot.motion.part(snapshot.k, snapshot.k + 1), links)
 

@@ -22,6 +22,7 @@ from kedfem.links.recovery import point_rows
 from kedfem.links.reduced import rigid_modes
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import drive_angle, scene_from, time_grid
+from tests.verification.stiffening import turning_scene
 
 from .test_dynamics import four_bar, slider_crank
 from .test_steps import displacements, mixed
@@ -259,3 +260,15 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
     for c in {0, component}:
         assert np.abs(g[0, c]) > 0
         assert_allclose(g[:, c], g[0, c], rtol=2e-4)  # the start's rate is of second order in the step
+
+
+@pytest.mark.parametrize("beam", ["planar", "spatial"])
+def test_an_arm_that_turns_faster_than_it_vibrates_stands_by_its_tension(beam: str) -> None:
+    """μ = 6, above 3.516: without stiffening a small force across it makes it run away."""
+    size = {}
+    for stiffening_ in (False, True):
+        scene = turning_scene(6.0, beam, [0, 1e-3, 0], stiffening_)
+        y = tip(meshed(scene))
+        size[stiffening_] = np.abs(y).max()
+    assert size[True] < 0.1
+    assert size[False] > 1e3

@@ -23,6 +23,7 @@ MODULES = (
     "stiffening",
     "kinematics",
     "mechanisms",
+    "nominal_frames",
 )
 
 

@@ -12,9 +12,11 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.links.beam import beam_link
 from kedfem.links.beam_axis import straight_axis
+from kedfem.links.bodies import flywheel_tensor, with_body
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.section import Section, rectangle
+from kedfem.links.seats import joint_seat
+from kedfem.links.section import Section, rectangle, tube
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
 from kedfem.scene import Material, Scene, scene_from, time_grid
@@ -107,7 +109,7 @@ def pressed(link: Link) -> np.ndarray:
 
 @case("Euler's column", "P = π² EI/(4 L²) of a cantilever, with shear P/(1 + P/κGA) (Engesser)")
 def columns() -> list[Row]:
-    """K + P k is singular; L √(A/I) = 70. Of a column k holds all there is: no mass, no motion."""
+    """K + P k is singular; L √(A/I) = 70."""
     E, A = RUBBER.youngs_modulus, HEIGHT**2
     euler = np.pi**2 * E * HEIGHT**4 / 12 / (4 * LENGTH**2)
     exact = euler / (1 + euler / (5 / 6 * RUBBER.shear_modulus * A))
@@ -266,3 +268,66 @@ def turning_by_steps() -> list[Row]:
         Row(name, wanted, vibration(turning_scene(6.0, beam, force), c) / unit, 5e-3, "6 beam3")
         for name, (wanted, beam, force, c) in found.items()
     ]
+
+
+# -- rotors -------------------------------------------------------------------------------------------------
+
+SHAFT = tube(0.02, 0.0, 1e3)  # without shear, as the reference
+SPIN = np.diag([0.0, -1.0, -1.0])  # [e]×² about x
+CROSS = np.array([[0.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # [e]×
+
+
+def whirl(omega: float, mass: float, polar: float) -> np.ndarray:
+    """Whirl of a thin disc on the tip of a massless shaft that spins [rad/s], backward ones negative (Stodola, Green).
+
+    (K − w² diag(m, I_d) + w ω diag(0, I_p)) (y, θ) = 0 with y + iz, θ_z − iθ_y ~ exp(iwt), I_d = I_p/2.
+    """
+    K = (
+        RUBBER.youngs_modulus
+        * SHAFT.second_moment
+        / LENGTH**3
+        * np.array([[12, -6 * LENGTH], [-6 * LENGTH, 4 * LENGTH**2]])
+    )
+    M, G = np.diag([mass, polar / 2]), np.diag([0, polar])
+    zero, one = np.zeros((2, 2)), np.eye(2)
+    right = scipy.linalg.block_diag(one, M)
+    return np.sort(scipy.linalg.eigvals(np.block([[zero, one], [K, omega * G]]), right).real)
+
+
+def whirl_of_link(omega: float, mass: float, polar: float, stiffened: bool = True) -> np.ndarray:
+    """The same of a beam in space of hardly any mass, from its own equation in the link frame, seen from the world."""
+    light = Material(density=1e-3, youngs_modulus=RUBBER.youngs_modulus, poisson_ratio=0.0)
+    bare = spatial_beam_link("shaft", straight_axis(line(), 4, 3, None), SHAFT, light)
+    tip, axis = np.array([LENGTH, 0, 0]), np.array([1.0, 0, 0])
+    seat = joint_seat(bare, "disc", tip, axis)
+    link = with_body(bare, seat, mass, tip, flywheel_tensor(seat, axis, polar))
+    T, M = free_map(link, ROOT), vector_mass(link)
+    k = stressed(link, deflection(link, T, -(omega**2) * link.mX @ SPIN.T)) * float(stiffened)
+    each = sp.eye_array(link.n)
+    K = (T.T @ (link.K0 + k + omega**2 * M @ sp.kron(each, SPIN)) @ T).toarray()
+    C = (T.T @ (2 * omega * M @ sp.kron(each, CROSS)) @ T).toarray()
+    m = (T.T @ M @ T).toarray()
+    zero, one = np.zeros_like(K), np.eye(len(K))
+    values, vectors = scipy.linalg.eig(np.block([[zero, one], [-K, -C]]), scipy.linalg.block_diag(one, m))
+    tips = (T @ vectors[: len(K)]).reshape(link.n, 3, -1)
+    turning = np.einsum("n,ncv->cv", seat.fit[0], tips)
+    # y + iz ~ exp(iwt): z = −i y; in the link frame the frequency is lower by ω
+    forward = np.abs(turning[2] + 1j * turning[1]) < 1e-3 * np.abs(turning[1])
+    w = values.imag[forward] + omega
+    return w[np.argsort(np.abs(w))][:4]
+
+
+@case(
+    "Whirl of a disc on an overhung shaft",
+    "Stodola; Green: gyroscopic effect of a thin disc on a massless shaft",
+)
+def overhung_disc() -> list[Row]:
+    """0.5 kg, I_p = 0.05 kg m² on 1 m; without stress stiffness the disc's moment of momentum is lost as it tilts."""
+    out = []
+    for omega in (50.0, 200.0, 500.0):
+        wanted, got = whirl(omega, 0.5, 0.05), np.sort(whirl_of_link(omega, 0.5, 0.05))
+        out += [
+            Row(f"spin {omega:g} rad/s, whirl {i + 1} [rad/s]", float(w), float(g), 1e-5, "4 beam3, a disc")
+            for i, (w, g) in enumerate(zip(wanted, got, strict=True))
+        ]
+    return out

@@ -19,7 +19,8 @@ from tests.exact.beams import (
     weight,
 )
 from tests.exact.cases import CASES, at_rest, flying_rod
-from tests.exact.four_bar import four_bar, pose
+from tests.exact.chain import chain_history
+from tests.exact.four_bar import four_bar, outer_stress, pose
 from tests.exact.solve import Problem, State, Stepping, equilibrium, forces, motion, spinning_frequencies
 
 from .large_deflection import (
@@ -106,6 +107,21 @@ def test_the_rigid_four_bar_is_closed() -> None:
         assert_allclose(at.omega, slope, rtol=1e-8, atol=1e-8)  # central differences
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("rpm", [300, 600])
+def test_the_four_bar_moves_as_a_chain_of_masses_and_springs(rpm: float) -> None:
+    """Another discretisation, with another time integration, tends to the same curve with the second power."""
+    end, spacing, slender = 0.03, 5e-4, 1000.0
+    problem, first = four_bar(rpm, 0.0, 16, slender=slender)
+    _, exact, _ = motion(problem, first, Stepping(2.5e-5, 1200, 20), outer_stress(problem))
+    errors = []
+    for k, h in ((1, 1e-5), (2, 5e-6), (4, 2.5e-6)):
+        _, found = chain_history(rpm, (4 * k, 12 * k, 10 * k), h, round(end / h))
+        errors.append(np.abs(found[:: round(spacing / h)] - exact).max() / np.abs(exact).max())
+    assert errors[2] < 0.03
+    assert errors[0] / errors[2] > 8
+
+
 def test_a_rigid_motion_does_not_strain() -> None:
     beams = joined([DRAWN])
     c, s = np.cos(2.5), np.sin(2.5)
@@ -188,7 +204,7 @@ def test_a_stiff_double_pendulum_moves_as_two_rigid_rods() -> None:
 def test_a_free_rod_keeps_momentum_and_energy() -> None:
     """Linear momentum to rounding; spin and energy to the order of the scheme."""
     found = []
-    for steps in (400, 800):
+    for steps in (200, 400):
         this = flying_rod(4, 5)
         beams = this.problem.beams
         _, _, thrown = motion(this.problem, this.first, Stepping(0.1 / steps, steps), this.observed)
@@ -198,9 +214,9 @@ def test_a_free_rod_keeps_momentum_and_energy() -> None:
             return np.array([energy, *momenta(beams, state.q, state.v)])
 
         _, values, _ = motion(this.problem, thrown, Stepping(0.1 / steps, 2 * steps, rho_inf=1.0), kept)
-        assert_allclose(values[:, 1:3], np.broadcast_to([0.1, 0.2], (len(values), 2)), rtol=1e-6)  # ∫F dt
+        assert_allclose(values[:, 1:3], np.broadcast_to([0.1, 0.2], (len(values), 2)), rtol=1e-5)  # ∫F dt
         found.append(np.ptp(values[:, [0, 3]], axis=0) / np.abs(values[0, [0, 3]]))
-    assert np.all(found[1] < 1e-4)
+    assert np.all(found[1] < 5e-4)
     assert np.all(found[1] < 0.3 * found[0])
 
 
@@ -229,7 +245,7 @@ def test_kept_histories_are_what_the_oracle_finds(name: str) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_kept_histories_are_converged(name: str) -> None:
     kept = history(name)
-    cap = 2e-3 if "undamped" in name else 1e-4
+    cap = 3e-3 if "undamped" in name else 5e-4
     assert max(kept.step_error.max(), kept.mesh_error.max()) < cap
 
 

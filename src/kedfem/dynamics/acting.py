@@ -1,63 +1,71 @@
-"""Actions on the steppers' own states: forces of motors and springs on the rows of all segments."""
+"""Actions as the steppers take them: over a block of time points, on padded states of all links."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from kedfem.dynamics.action import Action, Table, kernel_table, nominal_vectors
+from kedfem.dynamics.action import Action, Table, end_weights, kernel_table, nominal_vectors
+from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
-
-Ends = Float[np.ndarray, "A 2 2 3"]
-Rows = Float[np.ndarray, "n d"]
 
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """What the time integration needs of actions.
+    """Actions on the states of a solver.
 
     every, table : the actions, and as the kernel takes them
-    segment : (A, 2) number of each end's segment, −1 where nothing but the nominal motion moves it
+    owners, weights : of `action.end_weights`
     """
 
     every: tuple[Action, ...]
     table: Table
-    segment: np.ndarray
+    owners: Int[np.ndarray, "A 2"]
+    weights: Float[np.ndarray, "A 2 2 D S"]
 
 
-def acting_on(every: Sequence[Action]) -> Acting:
-    """Actions made ready."""
-    segment = np.array([[end.k for end in action.ends] for action in every], int).reshape(-1, 2)
-    return Acting(tuple(every), kernel_table(every), segment)
+def acting_on(
+    every: Sequence[Action], links: Sequence[Link], bases: Sequence[Sequence[np.ndarray]] | None = None
+) -> Acting:
+    """Actions on links whose states are padded to the largest, in coordinates of `bases` if given."""
+    shape = max(link.d for link in links), max(link.n for link in links)
+    return Acting(tuple(every), kernel_table(every), *end_weights(every, shape, bases))
 
 
-def nominal_ends(acting: Acting, motion: RigidMotion) -> tuple[Float[np.ndarray, "T A 2 2 3"], ...]:
-    """Positions and velocities of all ends, were nothing but the nominal motion."""
-    x, v = np.zeros((2, len(motion.t), len(acting.every), 2, 2, 3))
+def over_block(acting: Acting, motion: RigidMotion) -> tuple[Any, ...] | None:
+    """What `actions_kernel.external` takes over a block of time points; None without actions."""
+    A = len(acting.every)
+    if not A:
+        return None
+    x, v = np.zeros((2, len(motion.t), A, 2, 2, 3))
     for i, action in enumerate(acting.every):
         for e, end in enumerate(action.ends):
             x[:, i, e], v[:, i, e] = nominal_vectors(end, motion)
-    return x, v
+    scratch = (*np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))
+    return acting.owners, acting.weights, acting.table, motion.t, x, v, *scratch
 
 
-def weights(
-    acting: Acting, links: Sequence[Link], on: Callable[[int, Rows], Rows], shape: tuple[int, int]
-) -> Float[np.ndarray, "A 2 2 D n"]:
-    """Weights of all ends' vectors on a solver's own coordinates, component first and padded.
+def first_forces(
+    every: Sequence[Action], links: Sequence[Link], motion: RigidMotion, rows: Sequence[tuple[Nodal, Nodal]]
+) -> list[Nodal]:
+    """Forces of actions on the rows (n, d) of all links at the start, where nothing has turned yet.
 
     Parameters
     ----------
-    on : number of a segment and nodal weights (n, d) → weights on its coordinates (d, n)
-    shape : (D, n) padded
+    motion : at that time only
+    rows : δ and δ' of all links
     """
-    out = np.zeros((len(acting.every), 2, 2, *shape))
-    for i, action in enumerate(acting.every):
-        for e, end in enumerate(action.ends):
-            if end.k >= 0:
-                d = links[end.k].d
-                for m, row in enumerate(end.weights):
-                    own = on(end.k, np.outer(row, end.mask[:d]))
-                    out[i, e, m, : own.shape[0], : own.shape[1]] = own
-    return out
+    if not every:
+        return [np.zeros_like(u) for u, _ in rows]
+    from kedfem.dynamics.actions_kernel import external
+
+    acting = acting_on(every, links)
+    u, v, F = np.zeros((3, len(links), *acting.weights.shape[-2:]))
+    for k, (link, each) in enumerate(zip(links, rows, strict=True)):
+        for padded, own in zip((u, v), each, strict=True):
+            padded[k, : link.d, : link.n] = own.T
+    external(over_block(acting, motion), 0, u, v, np.zeros(len(every)), F)
+    return [F[k, : link.d, : link.n].T for k, link in enumerate(links)]

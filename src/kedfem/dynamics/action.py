@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block
 from kedfem.motion.rigid import RigidMotion
@@ -135,6 +135,33 @@ def vectors(every: Sequence[Action], block: Block) -> tuple[Float[np.ndarray, "T
                 x[:, i, e] += elastic_vectors(end, history.u)
                 v[:, i, e] += elastic_vectors(end, history.v)
     return x, v
+
+
+def end_weights(
+    every: Sequence[Action],
+    shape: tuple[int, int],
+    bases: Sequence[Sequence[Float[np.ndarray, "n s"]]] | None = None,
+) -> tuple[Int[np.ndarray, "A 2"], Float[np.ndarray, "A 2 2 D S"]]:
+    """Owners and padded weights of all ends, for the kernel's `seen` and `borne`.
+
+    Parameters
+    ----------
+    shape : components D and functions S that states are padded to
+    bases : per link and component, its rows from other coordinates: u[:, c] = basis[c] @ x[c]; none: rows as they are
+
+    Returns
+    -------
+    Number of the link of each end or -1; what component c of each of its two vectors has of each coordinate.
+    """
+    owners = np.array([[end.k for end in action.ends] for action in every], int).reshape(-1, 2)
+    weights = np.zeros((len(every), 2, 2, *shape))
+    for row, action in zip(weights, every, strict=True):
+        for out, end in zip(row, action.ends, strict=True):
+            for c in range(shape[0] if end.k >= 0 else 0):
+                if end.mask[c] and (bases is None or c < len(bases[end.k])):
+                    w = end.weights if bases is None else end.weights @ bases[end.k][c]
+                    out[: len(w), c, : w.shape[1]] = w
+    return owners, weights
 
 
 def elastic_vectors(end: End, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T 2 3"]:

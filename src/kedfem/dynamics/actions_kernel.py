@@ -63,11 +63,59 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
 
 
 @compiled
-def evaluate_all(t, x, v, before, table, values):  # type: ignore[no-untyped-def]
-    """Values (T, A, 4) at successive times; x, v (T, A, 2, 2, 3); before (A,) is moved on to the last."""
-    forces = np.zeros(x.shape[1:])
+def seen(owners, weights, nominal, u, out):  # type: ignore[no-untyped-def]
+    """Vectors of all ends, nominal + Σ w u, from padded states u (L, D, n); see `action.end_weights`."""
+    A, _, M, D, n = weights.shape
+    out[:] = nominal
+    for i in range(A):
+        for e in range(2):
+            k = owners[i, e]
+            if k >= 0:
+                for m in range(M):
+                    for c in range(D):
+                        for j in range(n):
+                            out[i, e, m, c] += weights[i, e, m, c, j] * u[k, c, j]
+
+
+@compiled
+def borne(owners, weights, forces, out):  # type: ignore[no-untyped-def]
+    """Add to padded forces (L, D, n) on the links what forces on the ends are on their states: Σ w f."""
+    A, _, M, D, n = weights.shape
+    for i in range(A):
+        for e in range(2):
+            k = owners[i, e]
+            if k >= 0:
+                for m in range(M):
+                    for c in range(D):
+                        f = forces[i, e, m, c]
+                        if f != 0.0:
+                            for j in range(n):
+                                out[k, c, j] += weights[i, e, m, c, j] * f
+
+
+@compiled
+def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
+    """Add the forces of all actions to F (L, D, n), u and v being the states and their rates; coordinates (A,).
+
+    Parameters
+    ----------
+    acting : of `dynamics.acting.over_block`
+    t : number of the time point in the block
+    turned : (A,) coordinates at the time point before
+    """
+    owners, weights, table, times, x0, v0, x, x1, forces, values = acting
+    seen(owners, weights, x0[t], u, x)
+    seen(owners, weights, v0[t], v, x1)
+    evaluate(times[t], x, x1, turned, table, forces, values)
+    borne(owners, weights, forces, F)
+    return values[:, 0]
+
+
+@compiled
+def evaluate_all(t, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
+    """The same at T times: x, v, forces (T, A, 2, 2, 3), values (T, A, 4); before (A,) is moved on to the last."""
     for k in range(len(t)):
-        evaluate(t[k], x[k], v[k], before, table, forces, values[k])
+        evaluate(t[k], x[k], v[k], before, table, forces[k], values[k])
         before[:] = values[k, :, 0]
 
 

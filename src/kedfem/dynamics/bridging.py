@@ -19,7 +19,7 @@ Followers = FollowingSteps | FollowingDense
 Advance = Callable[[Followers, Any, RigidMotion], tuple[list[LinkHistory], Any]]
 
 
-class Stuck(Exception):
+class Stuck(Exception):  # noqa: N818 - the driver of the steps says it as an error
     """A step that does not settle in any parts.
 
     taken, histories : time points of the block before it
@@ -72,7 +72,13 @@ class Bridge:
         return joined(done), state
 
     def _in_parts(
-        self, solver: Followers, state: Any, end: RigidMotion, k: int, done: list[list[LinkHistory]], link: str
+        self,
+        solver: Followers,
+        state: Any,
+        end: RigidMotion,
+        k: int,
+        done: list[list[LinkHistory]],
+        link: str,
     ) -> tuple[list[LinkHistory], Any]:
         """The step to one time point in 2, 4, 8, … parts."""
         self.bridged += 1
@@ -92,7 +98,7 @@ class Bridge:
         if level not in self.finer:
             scheme = generalised_alpha(self.h / 2**level, self.rho_inf)
             self.finer[level] = type(solver)(
-                solver.links, solver.joints, scheme, solver.damping, solver.acting
+                solver.links, solver.joints, scheme, solver.damping, solver.actions, solver.tolerance
             )
         return self.finer[level]
 

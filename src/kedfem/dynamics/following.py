@@ -10,22 +10,24 @@ constant and factored once, in the segment's frame as predicted: [KED, eqs. (12)
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.acting import Acting, Ends, nominal_ends, weights
-from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
+from kedfem.dynamics.acting import acting_on, over_block
+from kedfem.dynamics.action import Action
+from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import (
     Followed,
-    deformation,
     followed,
     frame_force,
     frames_of,
     rotation,
+    seen_from,
     stress_deformation,
 )
 from kedfem.dynamics.history import Forcing, LinkHistory
@@ -35,9 +37,10 @@ from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
+LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
-NominalEnds = tuple[float, Ends, Ends]
-CONVERGED = 1e-8  # change of a sweep, of the largest displacement
+CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
+FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +88,12 @@ def held_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPart
     """Dense and exact to rounding where the segment is small, whose stiff hubs lose digits otherwise."""
     if link.unknowns <= SMALL:
         return _small_part(link, joint, c_M, c_K)
-    part = factored(link, joint, c_M, c_K)
-    q = len(joint.keep)
+    return held_substructure(factored(link, joint, c_M, c_K))
+
+
+def held_substructure(part: Substructure) -> HeldPart:
+    """A link condensed onto ports and anchors, seen from its ports."""
+    q = len(part.attachment.keep)
     Y = part.Y @ part.S[:, :q]
 
     def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
@@ -156,24 +163,23 @@ class FollowingSteps:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        acting: Acting,
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = (
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
             links,
             joints,
             scheme,
             damping,
-            acting,
+            actions,
         )
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
-        self.factorisations, self.sweeps, self.scale = len(self.parts), 0, 0.0
+        self.factorisations, self.sweeps = len(self.parts), 0
+        self.scale = rounding(links)
         self.mixing = Mixing()
-        self._shape = max(link.d for link in links), max(link.n for link in links)
-        self._weights = weights(acting, links, lambda k, rows: rows.T, self._shape)
-        self._turned = np.zeros(len(acting.every))
-        A = len(acting.every)
-        self._scratch = (*np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))
+        self._acting = acting_on(actions, links)
+        self._turned = np.zeros(len(actions))
 
     def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
         """The state of the first time point."""
@@ -197,10 +203,9 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[list[SegmentState]] = []
-        nominal = nominal_ends(self.acting, motion)
+        acting = over_block(self._acting, motion)
         for t in range(len(forcing[0].R)):
-            ends = motion.t[t], nominal[0][t], nominal[1][t]
-            now = self.step(state, [each.at(t) for each in forcing], ends)
+            now = self.step(state, [each.at(t) for each in forcing], acting, t)
             if isinstance(now, str):
                 raise NotConverged(t, self._histories(taken), state, now)
             state = now
@@ -208,7 +213,7 @@ class FollowingSteps:
         return self._histories(taken), state
 
     def step(
-        self, states: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
+        self, states: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
     ) -> list[SegmentState] | str:
         """States of all segments one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle."""
         now = [self._predicted(k, s, nominal) for k, (s, nominal) in enumerate(zip(states, at, strict=True))]
@@ -218,31 +223,33 @@ class FollowingSteps:
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
         for _ in range(SWEEPS):
-            now = self._acted(now, at, ends)
+            now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
-            frame_change, forces = self._solved(rhs, RB, factor)
+            frame_change, forces = solved(self.parts, rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
             sizes = [
                 float(np.vdot(x, mass_times(link.mass, x)))
                 for link, x in zip(self.links, change, strict=True)
             ]
             self.sweeps += 1
-            settled = sum(sizes) <= CONVERGED**2 * self.scale
+            settled = sum(sizes) <= self.tolerance**2 * self.scale
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
-            borders = np.cumsum([x.size for x in change])[:-1]
+            ends = np.cumsum([x.size for x in change])[:-1]
             now = [
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
                 for k, (s, n, x, nominal) in enumerate(
-                    zip(states, now, np.split(taken, borders), at, strict=True)
+                    zip(states, now, np.split(taken, ends), at, strict=True)
                 )
             ]
-            self.scale = max(self.scale, sum(float(np.vdot(n.u, n.Mu)) for n in now))
+            self.scale = max(
+                self.scale,
+                sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)),
+            )
             if not np.isfinite(sizes).all():
                 break
             if settled:
-                now = self._acted(now, at, ends)
-                self._turned = self._scratch[3][:, 0].copy()
+                now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)
                     for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
@@ -250,31 +257,19 @@ class FollowingSteps:
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
 
     def _acted(
-        self, now: Sequence[SegmentState], at: Sequence[Nominal], ends: NominalEnds
-    ) -> list[SegmentState]:
-        """States with the forces of motors and springs where they are now."""
-        if not self.acting.every:
-            return list(now)
-        from kedfem.dynamics.acting_kernel import external
+        self, now: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
+    ) -> tuple[list[SegmentState], Float[np.ndarray, " A"]]:
+        """States with the forces of motors and springs where they are now, and the coordinates of these."""
+        if acting is None:
+            return list(now), self._turned
+        from kedfem.dynamics.actions_kernel import external
 
-        t, x0, v0 = ends
-        u, v, F, out = np.zeros((4, len(self.links), *self._shape))
+        u, v, F = np.zeros((3, len(self.links), *self._acting.weights.shape[3:]))
         for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
             for each, x in zip(padded, rows, strict=True):
                 each[: x.shape[1], : len(x)] = x.T
-        external(
-            t,
-            self.acting.segment,
-            self._weights,
-            self.acting.table,
-            (x0, v0),
-            (u, v),
-            self._turned,
-            F,
-            out,
-            self._scratch,
-        )
-        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, out, strict=True)]
+        turned = external(acting, t, u, v, self._turned, F).copy()
+        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, F, strict=True)], turned
 
     def _predicted(self, k: int, s: SegmentState, at: Nominal) -> SegmentState:
         """The end of the step with an acceleration that stays, seen from frames there."""
@@ -286,12 +281,9 @@ class FollowingSteps:
     def _mean(self, k: int, now: SegmentState, at: Nominal) -> Float[np.ndarray, "d d"]:
         """Mean orientation of a segment, link to world."""
         link = self.links[k]
-        if link.fit is None:
-            return at.R
-        if not link.frames:
-            return np.asarray(at.R @ now.frames[0].Q)
-        y = position(link, now.u @ at.R)
-        return np.asarray(at.R @ rotation(link, link.fit, y, np.eye(link.d), now.frames[0].angle)[0])
+        if link.frames or link.fit is None:
+            return mean_orientation(link, now.u, at.R)
+        return at.R @ now.frames[0].Q
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -319,21 +311,6 @@ class FollowingSteps:
             r += self.scheme.alpha_f * (s.F - s.f)
         return np.asarray(r - self.scheme.alpha_m * s.Ma)
 
-    def _solved(
-        self, rhs: Sequence[NodalOf], RB: Sequence[NodalOf], factor: tuple[np.ndarray, bool] | None
-    ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """Changes in the predicted frames, and port forces: Σ Bᵀ R λ = 0, R W Δ = B z."""
-        held, reactions = zip(*(part.held(r) for part, r in zip(self.parts, rhs, strict=True)), strict=True)
-        z = np.zeros(RB[0].shape[1])
-        if factor is not None:
-            f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
-            z = scipy.linalg.cho_solve(factor, f, check_finite=False)
-        w = [b @ z for b in RB]
-        forces = [part.S @ x - y for part, x, y in zip(self.parts, w, reactions, strict=True)]
-        return [
-            x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(self.parts, held, w, strict=True)
-        ], forces
-
     def _ended(
         self, k: int, s: SegmentState, now: SegmentState, at: Nominal, force: Float[np.ndarray, " q"]
     ) -> SegmentState:
@@ -356,11 +333,42 @@ class FollowingSteps:
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
         stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
         return LinkHistory(
-            **stacked,  # type: ignore[arg-type]
+            **stacked,
             g=np.stack(g),
             port_forces=np.stack(forces),
             strain=np.array([s.strain for s in states]),
         )
+
+
+def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
+    """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
+    if link.fit is None:
+        return R
+    return R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0]
+
+
+def solved(
+    parts: Sequence[HeldPart],
+    rhs: Sequence[NodalOf],
+    RB: Sequence[NodalOf],
+    factor: tuple[np.ndarray, bool] | None,
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
+    """Changes of all segments in their frames, and port forces: A Δ = r + Wᵀ λ, Σ Bᵀ R λ = 0, R W Δ = B z.
+
+    Parameters
+    ----------
+    rhs : r per segment (n, d)
+    RB : Rᵀ B
+    factor : of H = Σ Bᵀ R S Rᵀ B, None without interface unknowns
+    """
+    held, reactions = zip(*(part.held(r) for part, r in zip(parts, rhs, strict=True)), strict=True)
+    z = np.zeros(RB[0].shape[1])
+    if factor is not None:
+        f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
+        z = scipy.linalg.cho_solve(factor, f, check_finite=False)
+    w = [b @ z for b in RB]
+    forces = [part.S @ x - y for part, x, y in zip(parts, w, reactions, strict=True)]
+    return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(parts, held, w, strict=True)], forces
 
 
 def position(link: Link, u: Nodal) -> Nodal:
@@ -369,14 +377,16 @@ def position(link: Link, u: Nodal) -> Nodal:
     return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
 
 
+def rounding(links: Sequence[Link]) -> float:
+    """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
+    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    return float(LEAST**2 * sum(sizes))
+
+
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:
     """A segment's state at the first time point."""
     y = position(link, s.u @ s.R)
-    start = Followed(np.eye(link.d), 0.0, *(np.zeros_like(y) for _ in range(3)))
-    frames = []
-    for frame in frames_of(link):
-        Q, angle = rotation(link, frame.fit, y, start.Q, start.angle)
-        frames.append(replace(start, Q=Q, angle=angle, g=deformation(link, y, Q, angle)))
+    frames = [seen_from(link, frame, y) for frame in frames_of(link)]
     damped = np.zeros((3, *y.shape))
     damped[0] = damping.alpha * (s.Mu @ s.R)
     f, strain = internal_force(link, y, s.R, frames, damped, damping.beta)

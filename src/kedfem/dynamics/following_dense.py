@@ -1,17 +1,19 @@
 """Steps of small segments whose frames follow them: dense constant matrices and one compiled loop. Needs numba."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from kedfem.dynamics.acting import Acting, nominal_ends, weights
+from kedfem.dynamics.acting import acting_on, over_block
+from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
-from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state
+from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
@@ -27,23 +29,24 @@ class FollowingDense:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        acting: Acting,
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.acting = (
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
             links,
             joints,
             scheme,
             damping,
-            acting,
+            actions,
         )
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
-            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, CONVERGED,
+            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, tolerance,
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
-        self._counts = np.zeros(4)
+        self._counts = np.array([0.0, rounding(links), 0.0, 0.0])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]
@@ -51,11 +54,7 @@ class FollowingDense:
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
         self._beams = self._points()
-        self._acting = (
-            acting.segment,
-            weights(acting, links, lambda k, rows: work_on(self.parts[k], rows), self._sizes[:2]),
-            acting.table,
-        )
+        self._acting = acting_on(actions, links, [part.T for part in self.parts])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
     @property
@@ -77,8 +76,8 @@ class FollowingDense:
         )
         Q[:], direction[:, 0] = np.eye(3), 1.0
         general = [
-            first_state(link, joint, self.damping, s)
-            for link, joint, s in zip(self.links, self.joints, states, strict=True)
+            first_state(*each, s)
+            for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)
         ]
         for i, (link, joint, part, s) in enumerate(
             zip(self.links, self.joints, self.parts, general, strict=True)
@@ -98,7 +97,7 @@ class FollowingDense:
             for seen in s.frames if not points else ():
                 Q[i, : link.d, : link.d], angle[i] = seen.Q, seen.angle
                 g[0, i].reshape(D, n)[: link.d, : link.n] = coordinates(link, part, seen.g)
-        return u, v, a, F, f, C, force, Q, angle, g, strain, direction, turn, np.zeros(len(self.acting.every))
+        return u, v, a, F, f, C, force, Q, angle, g, strain, direction, turn, np.zeros(len(self.actions))
 
     def copied(self, state: State) -> State:
         """A state that a solver may use up."""
@@ -128,9 +127,10 @@ class FollowingDense:
         history = (u, v, a, g, strains, np.zeros((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
             self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._beams, self._kinds,
-            (R, F), (*self._acting, motion.t, *nominal_ends(self.acting, motion)), state, history, self._memory,
-            self._counts,
+            (R, F), over_block(self._acting, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
+        if self.actions:
+            forcing = [self._acted(i, each, F[:, i]) for i, each in enumerate(forcing)]
         histories = [self._history(i, each, history, taken) for i, each in enumerate(forcing)]
         if taken < T:
             raise NotConverged(taken, histories, state, self.links[worst].name)
@@ -143,12 +143,18 @@ class FollowingDense:
         u, v, a = (rows_of(link, part, x) for x in (us, vs, as_))
         if points:
             share = np.concatenate([point.share.T for point in points])  # (3E, 3n)
-            seen = strains[:, 0, :, : len(points)].transpose(0, 2, 1).reshape(taken, -1)
+            seen = strains[:, 0, :, : len(points)].transpose(0, 2, 1).reshape(taken, 3 * len(points))
             g = (seen @ share).reshape(u.shape)
         else:
             g = rows_of(link, part, gs)
         R = Rs[:, : link.d, : link.d].copy()
         return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces[:, held], energies.copy())
+
+    def _acted(self, i: int, forcing: Forcing, F: Float[np.ndarray, "T D n"]) -> Forcing:
+        """The loads of a segment with the forces of motors and springs on it."""
+        link, part = self.links[i], self.parts[i]
+        rows = [F[:, c, : link.n] @ (part.T[c].T @ link.mass[c]) for c in range(link.d)]  # T⁻¹ = Tᵀ m
+        return replace(forcing, F=np.stack(rows, axis=2))
 
     def _coupled(self) -> tuple[State, State]:
         D, n, P = self._sizes

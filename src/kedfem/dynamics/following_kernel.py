@@ -13,12 +13,12 @@ near the diagonal: from column `first` of each row on.
     kinds : (L,) 0: rows (u, v, w), 1: (u, v), 2: (u, v, ψ)
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components; Q (L, 3, 3), angle (L,) of the
         frame; g (3, L, N) seen from it, and rates; strain, direction, turn of `beams`; turned (A,) coordinates of actions
-    acting : segment (A, 2), weight (A, 2, 2, D, S), table, times (T,), nominal x and v (T, A, 2, 2, 3) of
-        `dynamics.acting_kernel`
+    acting : of `dynamics.acting.over_block`, whose forces are added to F; None without motors and springs, whose code is
+        then not compiled
     history : u, v, a, g (T, L, D, S), strain (T, b, 3, E), R (T, L, D, D), port forces (T, L, Q) in that frame, strain
         energy (T, L)
     memory : of `dynamics.mixing_kernel`
-    counts : sweeps, scale², pairs that are known, the next pair to be forgotten
+    counts : sweeps, square of what counts as a step, pairs that are known, the next pair to be forgotten
 
 Imported when it is first needed. Plain loops, so that nothing is allocated in a step; few calls, and what a step does not
 change is found once in it.
@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from kedfem.dynamics.acting_kernel import external
+from kedfem.dynamics.actions_kernel import external
 from kedfem.dynamics.beams_kernel import begun, bent, ended
 from kedfem.dynamics.frames_kernel import elastic_energy, held_together, mean_rotation, oriented
 from kedfem.dynamics.mixing_kernel import factored, mixed, solved
@@ -59,13 +59,6 @@ def follow_block(  # type: ignore[no-untyped-def]
     G, Yt, S, B = matrices
     columns, count, first = unknowns
     Rs, Fs = forcing
-    segment, weight, table, times, x0, v0 = acting
-    scratch = (
-        np.zeros(x0.shape[1:]),
-        np.zeros(x0.shape[1:]),
-        np.zeros(x0.shape[1:]),
-        np.zeros((len(segment), 4)),
-    )
     u, v, a, _, _, _, _, Q0, angle0, g0, strain0, direction, turn0, turned = state
     bends, follows, fit, K = frames
     T, L, D, n = Fs.shape
@@ -129,12 +122,14 @@ def follow_block(  # type: ignore[no-untyped-def]
             if sweep == 0:
                 oriented(kinds, R, Q1, Rp)
                 coupled(S, B, Rp, columns, count, first, RB, SRB, H)
-            if sweep == 0 or len(segment):
-                if len(segment):
-                    velocity(rates, u1, u, v, a, v1)
-                external(
-                    times[t], segment, weight, table, (x0[t], v0[t]), (u1, v1), turned, Fs[t], F, scratch
-                )
+            if sweep == 0 or acting is not None:
+                F[:] = Fs[t]
+            if acting is not None:
+                velocity(rates, u1, u, v, a, v1)
+                where = external(acting, t, u1, v1, turned, F)
+                if settled:
+                    turned[:] = where
+                    Fs[t] = F
             if settled or sweep == SWEEPS:
                 break
             counts[0] += 1
@@ -146,10 +141,9 @@ def follow_block(  # type: ignore[no-untyped-def]
             settled = moved <= tolerance * tolerance * counts[1]
             if not settled:
                 mixed(memory, counts, sweep, change.ravel())
-            counts[1] = max(counts[1], advanced(change, u1))
+            counts[1] = max(counts[1], advanced(change, u1, u))
         if not settled:
             return t, worst
-        turned[:] = scratch[3][:, 0]
         ended(t, rates, beams, R, seen, strain0, direction, turn0, history[4], history[7])
         if others:
             for i in range(L):
@@ -164,7 +158,7 @@ def follow_block(  # type: ignore[no-untyped-def]
 
 @compiled
 def begin_step(coefficients, R, state, u1, lasting, resisted):  # type: ignore[no-untyped-def]
-    """What a step begins with: the displacement were the acceleration to stay, and what of the balance stays in it.
+    """What a step begins with: the displacement if the acceleration stayed, and what of the balance it does not change.
 
     Parameters
     ----------
@@ -306,15 +300,15 @@ def swept(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advanced(change, u):  # type: ignore[no-untyped-def]
-    """u moves by the change; the sum of its squares then."""
+def advanced(change, u, before):  # type: ignore[no-untyped-def]
+    """u moves by the change; the sum of squares of what it has moved by since `before`."""
     total = 0.0
     L, D, n = u.shape
     for i in range(L):
         for b in range(D):
             for j in range(n):
                 u[i, b, j] += change[i, b, j]
-                total += u[i, b, j] * u[i, b, j]
+                total += (u[i, b, j] - before[i, b, j]) ** 2
     return total
 
 

@@ -1,4 +1,4 @@
-"""Initial states that satisfy the equation: at rest, or quasi-static."""
+"""Initial states that satisfy the equation: at rest, or quasi-static; rates where links start to move by themselves."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,9 +16,14 @@ from kedfem.dynamics.condensed import (
     substructure,
 )
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
+from kedfem.motion.initial import initial_twists
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rows import cross
+from kedfem.scene import Scene
 
 TURNING_SWEEPS = 20
 KRYLOV = 50  # vectors
@@ -36,6 +41,26 @@ class Deflected:
     v: Nodal
     g_rate: Nodal
     stressed: Nodal | float = 0.0
+
+
+def initial_rates(scene: Scene, linkage: Linkage, model: Model) -> list[Nodal]:
+    """δ' (n, d) of all links at the start, from the speeds that the scene asks for: rigid motions that the joints allow.
+
+    Raises
+    ------
+    MotionError
+        If the joints do not allow these speeds together.
+    """
+    v, omega = initial_twists(scene, linkage)
+    return [rigid_rates(link, v[k], omega[k]) for link, k in zip(model.links, model.bodies, strict=True)]
+
+
+def rigid_rates(link: Link, v: Float[np.ndarray, "3"], omega: Float[np.ndarray, "3"]) -> Nodal:
+    """The rate of a link's state where it moves as drawn: v at the origin [m/s], turning by ω [rad/s]."""
+    rates = np.outer(link.one, v) + cross(omega[None], link.X)
+    if link.kind == "beam":
+        rates[:, 2] = omega[2] * link.one
+    return np.asarray(rates[:, : link.d])
 
 
 def initial_states(

@@ -20,6 +20,8 @@ from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal
 from kedfem.dynamics.stiffening import SETTLED, SWEEPS, Stiffening, StressModes, swept
 
+ROUNDING = 1e-15  # of the largest eigenvalue
+
 
 class StiffenedCondensed(CondensedSteps):
     """Condensed steps; each sweep is one more pair of triangular solves per link."""
@@ -78,12 +80,13 @@ class StiffenedDense(DenseSteps):
     def __init__(self, model: Model, scheme: Scheme, stiffening: Stiffening) -> None:
         super().__init__(model.links, model.joints, scheme, model.damping)
         self.stiffening = stiffening
-        D, n, _ = self._sizes
-        most = max(len(modes.states) for modes in stiffening.modes)
-        self._k, self._P = np.zeros((len(self.links), most, n, n)), np.zeros((len(self.links), D, D))
+        T = [part.T[0] for part in self.parts]
+        dense = [t.T @ _dense(modes) @ t for t, modes in zip(T, stiffening.modes, strict=True)]
+        # k_i = Σ_j r_ji q_j, q_j orthonormal as vectors of entries
+        self._qr = [np.linalg.qr(k.reshape(len(k), -1).T) for k in dense]
+        D, L = self._sizes[0], len(self.links)
+        self._P = np.zeros((L, D, D))
         for i, (link, modes) in enumerate(zip(self.links, stiffening.modes, strict=True)):
-            T = self.parts[i].T[0]
-            self._k[i, : len(modes.states), : link.n, : link.n] = T.T @ _dense(modes) @ T
             self._P[i, : link.d, : link.d] = modes.P
 
     def _loop(
@@ -95,15 +98,35 @@ class StiffenedDense(DenseSteps):
     ) -> None:
         from kedfem.dynamics.stiffened_kernel import advance_stiffened
 
-        s = np.zeros((len(padded[0]), *self._k.shape[:2]))
-        for i, each in enumerate(self.stiffening.stressed(forcing)):
-            if each.stress is not None:
-                s[:, i, : each.stress.shape[1]] = each.stress
+        s, k = self._terms(forcing)
         limits = (self.scheme.h, SETTLED, SWEEPS)
-        stressed = (s, self._k, self._P)
+        stressed = (s, k, self._P)
         advance_stiffened(
             self.coefficients, limits, self._matrices, *self._unknowns, padded, stressed, state, history
         )
+
+    def _terms(self, forcing: Sequence[Forcing]) -> tuple[np.ndarray, np.ndarray]:
+        """Factors (T, L, m) and matrices (L, m, S, S) of k over a block, as few as it takes."""
+        few = [
+            fewer_terms(each.stress @ r.T)
+            for each, (_, r) in zip(self.stiffening.stressed(forcing), self._qr, strict=True)
+            if each.stress is not None
+        ]
+        n, L, most = self._sizes[1], len(self.links), max(s.shape[1] for s, _ in few)
+        s, k = np.zeros((len(few[0][0]), L, most)), np.zeros((L, most, n, n))
+        for i, (link, (factors, V), (q, _)) in enumerate(zip(self.links, few, self._qr, strict=True)):
+            s[:, i, : factors.shape[1]] = factors
+            k[i, : factors.shape[1], : link.n, : link.n] = (q @ V).T.reshape(-1, link.n, link.n)
+        return s, k
+
+
+def fewer_terms(
+    a: Float[np.ndarray, "T m"],
+) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "m r"]]:
+    """Factors s and V with a = s Vᵀ, but for rounding of aᵀ a: what a few turns of a linkage need is little."""
+    values, vectors = np.linalg.eigh(a.T @ a)
+    V = vectors[:, values > ROUNDING * values[-1]]
+    return a @ V, V
 
 
 def predicted(s: LinkState, h: float) -> Nodal:

@@ -100,7 +100,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
             return space_segments(link, _axis(given), material)
         case _:
             joints = [joint for joint in scene.joints.values() if name in joint.links]
-            ends = np.array([joint.at for joint in joints])
+            ends = np.array([joint.at for joint in joints]).reshape(-1, 3)
             return segmented(
                 link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends))
             )

@@ -12,7 +12,8 @@ import skfem
 from jaxtyping import Float, Int
 
 from kedfem.errors import SceneError
-from kedfem.links.beam import line_pairs, parent_nodes, shape_functions, strain_rows
+from kedfem.links.beam import line_pairs, shape_functions
+from kedfem.links.beam_recovery import beam_fibre, fibre_row, nearest_on_beam
 from kedfem.links.record import Link
 from kedfem.links.spatial_recovery import (
     beam_strains,
@@ -40,13 +41,20 @@ class PointRows:
     X: Float[np.ndarray, "3"]
 
 
-def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+def point_rows(
+    link: Link,
+    where: str,
+    point: Float[np.ndarray, "3"],
+    kinks: Float[np.ndarray, "_ 3"] | None = None,
+) -> PointRows:
     """The rows of a probe; its displacement is d = N g and f = N δ with the same N, [KED, eqs. (4b)(6)].
 
     Parameters
     ----------
     where : how messages name the point, e.g. ``output.probes.tip.at``
     point : reference position [m]
+    kinks : of planar beams, where joints, bodies and forces sit: stress is interpolated over the elements between
+        them [m]; within one element if not given
 
     Raises
     ------
@@ -54,13 +62,13 @@ def point_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRo
         If the point is not in the link.
     """
     if link.full is not None and link.Q is not None:
-        at = point_rows(link.full, where, point)
+        at = point_rows(link.full, where, point, kinks)
         return PointRows(at.value @ link.Q, _on_functions(at.stress, link.Q, link.d), at.X)
     match link.kind:
         case "spatial_beam":
             return _section_rows(link, where, point)
         case "beam":
-            return _beam_rows(link, where, point)
+            return _beam_rows(link, where, point, kinks)
         case _:
             return _solid_rows(link, where, point)
 
@@ -148,7 +156,7 @@ def stress_recovery(link: Link) -> StressRecovery:
         values, stresses, cells = drawn(link)
         return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
-    fibres = (_beam_fibre(link, half), _beam_fibre(link, -half))
+    fibres = (beam_fibre(link, half), beam_fibre(link, -half))
     if link.cells.shape[1] <= 3:
         return StressRecovery(link, fibres, link.cells, link.cell_type)
     return StressRecovery(link, fibres, line_pairs(link.cells), "line")
@@ -264,20 +272,17 @@ def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, " d"])
     return local
 
 
-def _beam_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
+def _beam_rows(
+    link: Link, where: str, point: Float[np.ndarray, "3"], kinks: Float[np.ndarray, "_ 3"] | None
+) -> PointRows:
     if link.section is None:
         raise SceneError(f"{where}: link '{link.name}' has no section")
-    half = link.section.height / 2
-    found = []
-    for e, cell in enumerate(link.cells):
-        r, offset, gap = _beam_coordinates(link.X[cell][:, :2], point[:2])
-        found.append((float(np.hypot(gap, max(0.0, abs(offset) - half))), abs(offset), e, r, offset))
-    beyond, _, e, r, offset = min(found)
+    beyond, e, r, offset = nearest_on_beam(link, point)
     if beyond > POINT_TOLERANCE * np.ptp(link.X, axis=0).max():
         raise SceneError(_outside(link, where, point, beyond))
     value = np.zeros(link.n)
     value[link.cells[e]] = shape_functions(r, link.cells.shape[1])[0]
-    row = _fibre_row(link, e, r, offset)
+    row = fibre_row(link, e, r, offset, kinks)
     stress = sp.csr_array(sp.vstack([row[None, :], np.zeros((5, 3 * link.n))]))
     return PointRows(value, stress, value @ link.X)
 
@@ -290,45 +295,6 @@ def _section_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Poin
     stress = np.zeros((6, 3 * link.n))
     stress[[0, 3, 5]] = section_stress(link, beam_strains(link, e, r), y, z)
     return PointRows(value, sp.csr_array(stress), value @ link.X)
-
-
-def _beam_coordinates(
-    x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]
-) -> tuple[float, float, float]:
-    """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
-    r = 0.0
-    for _ in range(20):
-        N, dN = shape_functions(r, len(x))
-        tangent = dN @ x
-        r = float(np.clip(r + tangent @ (point - N @ x) / (tangent @ tangent), -1, 1))
-    N, dN = shape_functions(r, len(x))
-    t = dN @ x / np.linalg.norm(dN @ x)
-    d = point - N @ x
-    return r, float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
-
-
-def _fibre_row(link: Link, element: int, r: float, offset: float) -> Float[np.ndarray, " k"]:
-    """σ_xx = E (ε − offset κ) of a fibre, from the strains at the reduced Gauss points extended to r."""
-    cell = link.cells[element]
-    gauss = np.polynomial.legendre.leggauss(len(cell) - 1)[0]
-    weights = [np.prod([(r - q) / (p - q) for q in gauss if q != p]) for p in gauss]
-    rows = sum(w * strain_rows(link.X[cell][:, :2], float(p))[0] for w, p in zip(weights, gauss, strict=True))
-    out = np.zeros(3 * link.n)
-    out[(3 * cell[:, None] + np.arange(3)).ravel()] = link.E * (
-        np.asarray(rows)[0] - offset * np.asarray(rows)[2]
-    )
-    return out
-
-
-def _beam_fibre(link: Link, offset: float) -> sp.csr_array:
-    """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
-    nodes = link.cells.shape[1]
-    total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
-    for e, cell in enumerate(link.cells):
-        for a, r in zip(cell, parent_nodes(nodes), strict=True):
-            total[a] += _fibre_row(link, e, r, offset)
-            count[a] += 1
-    return sp.csr_array(total / count[:, None])
 
 
 def _outside(link: Link, where: str, point: Float[np.ndarray, "3"], gap: float) -> str:

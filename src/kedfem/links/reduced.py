@@ -110,14 +110,18 @@ def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
     return np.concatenate([link.one[:, None], X @ axes[sizes > STRAIGHT * sizes[0]].T], axis=1)
 
 
-def rigid(link: Link) -> Link:
+def rigid(link: Link, highest: float = np.inf) -> Link:
     """The changed copy of a link that only moves rigidly: {1, x, y, z} made stiff.
 
     Its own vibrations are put RIGID times above an axial wave's passing frequency √(E/ρ)/L.
+
+    Parameters
+    ----------
+    highest : what they are put at, at most [rad/s]: in frames that follow the rounding of positions is stretched by K0
     """
     made = reduced(link, rigid_functions(link))
     density = float(link.m1[:, 0].sum() / link.volume.sum())
-    stiffness = (RIGID**2 * link.E / density) / link.size**2
+    stiffness = min((RIGID**2 * link.E / density) / link.size**2, highest**2)
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)

@@ -21,7 +21,7 @@ from kedfem.results.acting import acting
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
-from kedfem.scene import Probe, Scene
+from kedfem.scene import ForceLoad, Probe, Scene
 
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
@@ -55,7 +55,8 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
 
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
     where, drawn = f"output.probes.{name}.at", np.asarray(probe.at)
-    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn))
+    kinks = _kinks(scene, probe.link)
+    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
     link = model.links[k]
     key = f"probes/{name}/{probe.quantity}"
     place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
@@ -89,6 +90,14 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
 
     description = f"elastic {probe.quantity} {place}"
     return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
+
+
+def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
+    """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
+    joints = [joint.at for joint in scene.joints.values() if link in joint.links]
+    bodies = [body.at for body in scene.bodies.values() if body.link == link]
+    forces = [load.at for load in scene.loads.values() if isinstance(load, ForceLoad) and load.link == link]
+    return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
 
 
 def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
@@ -309,7 +318,9 @@ def _rigid_torque(model: Model) -> Recorded:
 
 def _holder(model: Model, name: str, joint: str) -> int:
     """The link of a name, or its segment, that a joint holds."""
-    return next(k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints)
+    return next(
+        k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints
+    )
 
 
 def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:

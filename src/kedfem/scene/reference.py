@@ -56,6 +56,10 @@ as *where: what was wanted, what was got*.
   scene are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams. Else they
   are beams in space; `beam = "planar"` or `"spatial"` settles it. Beams, plane links and solids go together: a hinge
   joins any two, a weld a beam in space and a solid.
+* **Without a drive** the mechanism moves by itself: under `motors`, `springs`, gravity and other loads, from
+  `analysis.initial_speeds`. All frames follow the links then, `analysis.end_time` and `step` are required, and links need
+  not be held by joints. Torques, angles and speeds of a joint are those of its first link that is not the ground against
+  the other, positive about its axis.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 

@@ -1,0 +1,133 @@
+"""Stress of a planar beam from the strains at its reduced Gauss points, which are the most accurate there.
+
+A probe takes the cubic through the nearest four of them: its error falls with the third power of the elements' length,
+at nodes and in the middle between them with the fourth, where the moment is smooth along a straight run of elements, as
+with loads spread along it. Joints, bodies and forces at a point (kinks) end a run.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.links.beam import parent_nodes, shape_functions, strain_rows
+from kedfem.links.record import Link
+
+THROUGH = 4  # Gauss points of a probe
+STRAIGHT = 1e-9  # sine of the angle between elements of a run
+ON_AXIS = 1e-6  # how near to a node or to the axis counts as on it, of an element's length
+Points = Float[np.ndarray, "_ 3"]
+
+
+def nearest_on_beam(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, int, float, float]:
+    """How far a point is outside a beam, and the element, parent coordinate and offset to the left of the axis there.
+
+    At a node between two elements the first of them is taken.
+    """
+    half = link.section.height / 2 if link.section else 0.0
+    found = []
+    for e, cell in enumerate(link.cells):
+        r, offset, gap = beam_coordinates(link.X[cell][:, :2], point[:2])
+        found.append((float(np.hypot(gap, max(0.0, abs(offset) - half))), abs(offset), e, r, offset))
+    beyond, _, e, r, offset = min(found)
+    return beyond, e, r, offset
+
+
+def beam_coordinates(
+    x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]
+) -> tuple[float, float, float]:
+    """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
+    r = 0.0
+    for _ in range(20):
+        N, dN = shape_functions(r, len(x))
+        tangent = dN @ x
+        r = float(np.clip(r + tangent @ (point - N @ x) / (tangent @ tangent), -1, 1))
+    N, dN = shape_functions(r, len(x))
+    t = dN @ x / np.linalg.norm(dN @ x)
+    d = point - N @ x
+    return r, float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
+
+
+def fibre_row(
+    link: Link, element: int, r: float, offset: float, kinks: Points | None = None
+) -> Float[np.ndarray, " k"]:
+    """σ_xx = E (ε − offset κ) of a fibre (3n,): the strains at the nearest four Gauss points, interpolated to r.
+
+    Parameters
+    ----------
+    element, r : where; the run of elements is the one that the element is in
+    offset : to the left of the axis [m]
+    kinks : places of joints, bodies and forces [m]; the element's own Gauss points alone if not given
+    """
+    run = np.array([element]) if kinks is None else straight_run(link, element, kinks)
+    start, along = link.X[link.cells[element][0], :2], _side(link, element)
+    length = np.linalg.norm(along)
+    points = [(int(e), float(q)) for e in run for q in _gauss(link)]
+    s = np.array([(_on_axis(link, e, q) - start) @ along for e, q in points]) / length
+    at = float((_on_axis(link, element, r) - start) @ along / length)
+    nearest = np.sort(np.argsort(np.abs(s - at), kind="stable")[:THROUGH])
+    weights = [np.prod([(at - s[k]) / (s[j] - s[k]) for k in nearest if k != j]) for j in nearest]
+    out = np.zeros((link.n, 3))
+    for j, w in zip(nearest, weights, strict=True):
+        e, q = points[j]
+        rows = strain_rows(link.X[link.cells[e]][:, :2], q)[0]
+        out[link.cells[e]] += w * link.E * (rows[0] - offset * rows[2]).reshape(-1, 3)
+    return out.ravel()
+
+
+def straight_run(link: Link, element: int, kinks: Points) -> Int[np.ndarray, " e"]:
+    """The elements on one line with an element and no kink between, in order along the axis."""
+    within = [_between_ends(link, e, kinks) for e in range(len(link.cells))]
+    run = [element]
+    for step in (-1, 1):
+        e = element
+        while 0 <= e + step < len(link.cells) and not within[e] and not within[e + step]:
+            if _bent(link, min(e, e + step), kinks):
+                break
+            e += step
+            run.append(e)
+    return np.array(sorted(run))
+
+
+def beam_fibre(link: Link, offset: float) -> sp.csr_array:
+    """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
+    nodes = link.cells.shape[1]
+    total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
+    for e, cell in enumerate(link.cells):
+        for a, r in zip(cell, parent_nodes(nodes), strict=True):
+            total[a] += fibre_row(link, e, r, offset)
+            count[a] += 1
+    return sp.csr_array(total / count[:, None])
+
+
+def _gauss(link: Link) -> Float[np.ndarray, " q"]:
+    return np.polynomial.legendre.leggauss(link.cells.shape[1] - 1)[0]
+
+
+def _side(link: Link, element: int) -> Float[np.ndarray, "2"]:
+    first, last = link.cells[element][:2]
+    return np.asarray(link.X[last, :2] - link.X[first, :2])
+
+
+def _on_axis(link: Link, element: int, r: float) -> Float[np.ndarray, "2"]:
+    cell = link.cells[element]
+    return np.asarray(shape_functions(r, len(cell))[0] @ link.X[cell, :2])
+
+
+def _bent(link: Link, element: int, kinks: Points) -> bool:
+    """Whether the axis turns, ends or has a kink at the node between an element and the next."""
+    if link.cells[element][1] != link.cells[element + 1][0]:
+        return True
+    a, b = _side(link, element), _side(link, element + 1)
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    node = link.X[link.cells[element][1], :2]
+    near = np.linalg.norm(kinks[:, :2] - node, axis=1) <= ON_AXIS * np.linalg.norm(a)
+    return bool(near.any() or abs(a[0] * b[1] - a[1] * b[0]) > STRAIGHT * size or a @ b < 0)
+
+
+def _between_ends(link: Link, element: int, kinks: Points) -> bool:
+    """Whether there is a kink on an element, not at its ends."""
+    along, start = _side(link, element), link.X[link.cells[element][0], :2]
+    length = float(np.linalg.norm(along))
+    d = (kinks[:, :2] - start) / length
+    s, beside = d @ along / length, (d[:, 1] * along[0] - d[:, 0] * along[1]) / length
+    return bool(np.any((np.abs(beside) <= ON_AXIS) & (s > ON_AXIS) & (s < 1 - ON_AXIS)))

@@ -1,0 +1,179 @@
+"""The linear equation's own geometric error, estimated from its deflections, against what is known of it."""
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.geometric import GeometricError, axial_forces, geometric_warning, slices, slopes
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.scene import scene_from
+
+FOUR_BAR = Path(__file__).parents[2] / "examples" / "four_bar_beams" / "scene.toml"
+L, SIDE, E, RHO = 1.0, 0.01, 2.1e11, 7850.0  # an arm [m] of steel
+EI, EA = E * SIDE**4 / 12, E * SIDE**2
+LINE = RHO * SIDE**2  # kg/m
+BEAM = {"fidelity": "beam", "mesh": {"elements": 12}}
+
+
+def blocks(ready: Prepared) -> list[Block]:
+    solver = steps_of(ready.scene, ready.model)
+    return list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver))
+
+
+def estimated(raw: dict[str, Any]) -> GeometricError:
+    ready, _ = prepared(scene_from(raw))
+    found = GeometricError(ready.model)
+    for block in blocks(ready):
+        found.add(block)
+    return found
+
+
+def four_bar(rpm: float, elements: int = 4, **link: Any) -> dict[str, Any]:
+    """Three turns of the source's example from rest."""
+    raw = tomllib.loads(FOUR_BAR.read_text())
+    raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
+    raw["analysis"] = {"turns": 3, "steps_per_turn": 360 if rpm >= 300 else 720, "initial": "rest"}
+    for x in raw["links"].values():
+        x.update({"mesh": {"elements": elements}, **link})
+    return raw
+
+
+def arm(speed: float = 1e-4, link: dict[str, Any] = BEAM, **loads: Any) -> dict[str, Any]:
+    """A bar on a drive, quasi-static."""
+    shape = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": SIDE, "thickness": SIDE}
+    return {
+        "materials": {"steel": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.0}},
+        "links": {"arm": {"material": "steel", "shape": shape, **link}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
+        "loads": loads,
+        "analysis": {"end_time": 1e-3, "step": 5e-4, "initial": "quasi-static"},
+    }
+
+
+def tip(*force: float) -> dict[str, Any]:
+    return {"kind": "force", "link": "arm", "at": [L, 0], "vector": [*force], "frame": "link"}
+
+
+@pytest.mark.parametrize(
+    ("rpm", "true"), [(60, 0.002), (150, 0.014), (300, 0.065), (400, 0.12), (600, 0.27)]
+)  # against a converged geometrically exact solution, docs/theory.md
+def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_does(
+    rpm: float, true: float
+) -> None:
+    found = estimated(four_bar(rpm))
+    assert_allclose(found.estimate, true, rtol=0.15, atol=1e-3)  # it falls between the instants looked at
+    warning = geometric_warning(found)
+    assert bool(warning) == (true > 0.02)
+    if warning:
+        assert "following" in warning[0]
+        assert ("stiffening" in warning[0]) == (true < 0.15)
+
+
+def test_reduced_links_are_judged_as_full_ones() -> None:
+    full, reduced = (estimated(four_bar(400, 8, reduced=x)) for x in (False, True))
+    assert_allclose(reduced.axial / reduced.strain, full.axial / full.strain, rtol=0.05)
+    assert_allclose(reduced.turn, full.turn, rtol=0.02)
+
+
+def test_a_load_across_a_cantilever_is_judged_as_the_elastica_does() -> None:
+    """P L²/EI = 1: w/L = 0.301721, linear 1/3 (Bisshopp and Drucker 1945)."""
+    found = estimated(arm(P=tip(0, -EI / L**2)))
+    assert found.axial < 1e-3 * found.strain  # no force along the arm
+    assert_allclose(found.turn, 0.5, rtol=0.03)  # P L²/2EI at the tip, less in the last slice
+    assert_allclose(found.estimate, 1 / 3 / 0.301721 - 1, rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        BEAM,
+        {**BEAM, "beam": "spatial"},
+        {"fidelity": "plane", "mesh": {"elements": [16, 1]}},
+        {"mesh": {"elements": [16, 1, 1]}},
+        {"mesh": {"elements": [16, 1, 1]}, "reduced": True, "functions": 16},
+    ],
+    ids=["beam", "spatial", "plane", "solid", "reduced"],
+)
+@pytest.mark.parametrize("N", [-0.2, 0.2])
+def test_a_beam_column_is_judged_by_the_axial_force_in_its_own_shape(link: dict[str, Any], N: float) -> None:
+    """Force Q across and N along the tip: N ∫ w'² / ∫ EI w''² = 0.4 N L²/EI of the cubic w of Q."""
+    found = estimated(arm(link=link, P=tip(N * EI / L**2, -1e-3 * EI / L**2)))
+    bending = found.strain - (N * EI / L**2) ** 2 * L / EA / 2
+    assert_allclose(found.axial / (2 * bending), 0.4 * abs(N), rtol=0.1)  # eight slices
+
+
+def test_a_beam_column_is_judged_on_the_safe_side_by_a_factor_of_two() -> None:
+    """Timoshenko's beam-column: N compresses, the moment at the root is Q L tan(k L)/(k L), (k L)² = N L²/EI."""
+    N = 0.2
+    found = estimated(arm(P=tip(-N * EI / L**2, -0.05 * EI / L**2)))
+    true = 1 - np.sqrt(N) / np.tan(np.sqrt(N))
+    assert true < found.estimate < 2.5 * true
+
+
+def rayleigh_ritz(speed: float) -> tuple[float, float]:
+    """w'' at the root of a turning arm under an even load, EI = L = 1, linear and with its centrifugal force.
+
+    EI w'''' − (N w')' − ρA Ω² w = 1 with N = ½ ρA Ω² (L² − x²), w = Σ c_k x^(k+2); speed: ρA Ω².
+    """
+    x, weight = np.polynomial.legendre.leggauss(40)
+    x, weight = (x + 1) / 2, weight / 2
+    k = np.arange(2, 10)
+    w, w1, w2 = x[:, None] ** k, k * x[:, None] ** (k - 1), k * (k - 1) * x[:, None] ** (k - 2)
+    linear = (w2.T * weight) @ w2 - speed * (w.T * weight) @ w
+    stiff = (w1.T * (weight * speed * (1 - x**2) / 2)) @ w1
+    q = w.T @ weight
+    return 2 * np.linalg.solve(linear, q)[0], 2 * np.linalg.solve(linear + stiff, q)[0]
+
+
+def test_a_rotating_arm_is_judged_on_the_safe_side_by_a_factor_of_two_and_a_half() -> None:
+    """An even load turns with an arm that turns at a third of its first frequency."""
+    speed = 3.516 / 3 * np.sqrt(EI / LINE) / L**2
+    linear, true = rayleigh_ritz((3.516 / 3) ** 2)
+    q = 0.05 * EI / L**3 / SIDE**2  # N/m³, so that bending stores far more than the centrifugal stretch
+    raw = arm(speed, q={"kind": "body", "link": "arm", "vector": [0, q, 0], "frame": "link"})
+    found = estimated(raw)
+    assert linear / true - 1 < found.estimate < 2.5 * (linear / true - 1)
+
+
+def test_axial_force_and_slope_are_those_of_a_turning_arm() -> None:
+    """N = ½ ρA Ω² (L² − x²) at every cut; no slope without a load across."""
+    speed = 20.0
+    for link in (BEAM, {"mesh": {"elements": [16, 1, 1]}}):
+        ready = meshed(scene_from(arm(speed, link=link)))
+        model, block = ready.model, blocks(ready)[-1]
+        of = slices(model.links[0], model.joints[0])
+        cuts = (of.means @ model.links[0].X[:, 0] + np.roll(of.means @ model.links[0].X[:, 0], -1))[:-1] / 2
+        N = axial_forces(model.links[0], model.joints[0], of, block.links[0], block.motion, model.bodies[0])
+        # slices hold whole nodes: the mass between two nodes belongs to either
+        assert_allclose(N[-1], LINE * speed**2 * (L**2 - cuts**2) / 2, atol=0.04 * N.max())
+        psi = slopes(model.links[0], of, block.links[0], block.motion.R[:, model.bodies[0]])
+        assert np.abs(psi).max() < 1e-6
+
+
+def test_frames_that_follow_have_no_such_error() -> None:
+    ready = meshed(scene_from(arm(P=tip(0, -EI / L**2))))
+    found = GeometricError(ready.model)
+    for block in blocks(ready):
+        turned = replace(block.links[0], R=block.links[0].R + 1e-9)
+        found.add(replace(block, links=[turned]))
+    assert found.estimate == 0.0
+    assert geometric_warning(found) == ()
+
+
+def test_what_stiffening_leaves_is_said_without_advising_it_again() -> None:
+    ready = meshed(scene_from(four_bar(300)))
+    plain, stiffened = GeometricError(ready.model), GeometricError(ready.model, stiffened=True)
+    for block in blocks(ready):
+        plain.add(block)
+        stiffened.add(block)
+    assert_allclose(stiffened.estimate, 0.4 * plain.estimate)  # measured: 0.25 to 0.4 is left
+    assert "stiffening" not in geometric_warning(stiffened)[0]
