@@ -76,8 +76,8 @@ class FollowingDense:
         )
         Q[:], direction[:, 0] = np.eye(3), 1.0
         general = [
-            first_state(*each, s)
-            for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)
+            first_state(link, joint, self.damping, s)
+            for link, joint, s in zip(self.links, self.joints, states, strict=True)
         ]
         for i, (link, joint, part, s) in enumerate(
             zip(self.links, self.joints, self.parts, general, strict=True)
