@@ -39,7 +39,7 @@ from kedfem.motion.rigid import RigidMotion
 DEBUG=0
 DEPTH = 4  # sweeps that are remembered
 LEAST = 1e-6  # of the links' sizes
-SWEEPS = 15  # in a step, of which it takes 2 to 4
+SWEEPS = 40  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made; what is left of each step adds up
 
 

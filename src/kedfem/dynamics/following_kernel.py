@@ -36,7 +36,7 @@ from kedfem.dynamics.frames_kernel import SPACE, elastic_energy, held_together, 
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
-SWEEPS = 15
+SWEEPS = 40
 RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 
