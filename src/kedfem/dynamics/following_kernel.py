@@ -20,7 +20,8 @@ near the diagonal: from column `first` of each row on. E points of a planar beam
         energy (T, L)
     memory : pairs (2, m, L·D·S) of steps taken and of how the change asked for changed, products (m, m) of the latter;
         last step and change (2, L·D·S)
-    counts : sweeps, square of what counts as a step, pairs that are known, the next pair to be forgotten
+    counts : sweeps, square of what counts as a step, pairs that are known, the next pair to be forgotten, square of a
+        step that is too far
 
 Imported when it is first needed. Plain loops, so that nothing is allocated in a step.
 """
@@ -78,7 +79,7 @@ def follow_block(  # type: ignore[no-untyped-def]
         turned_ports(Rp, B, count, RB)
         gathered(S, RB, columns, count, SRB, H)
         factored(H, first)
-        settled, worst = False, -1
+        settled, worst, reached = False, -1, 0.0
         for sweep in range(SWEEPS):
             counts[0] += 1
             F[:] = Fs[t]
@@ -87,7 +88,7 @@ def follow_block(  # type: ignore[no-untyped-def]
             residuals(coefficients, kinds, F, Rp, state, end, rhs)
             worst = swept(parts, kinds, Rp, rhs, H, first, z, reaction, force, change)
             moved = squares(change)
-            settled = moved <= tolerance * tolerance * counts[1]
+            settled = moved <= tolerance * tolerance * max(counts[1], reached)
             if not settled:
                 mixed(memory, counts, sweep, change.ravel())
             for i in range(L):
@@ -95,11 +96,13 @@ def follow_block(  # type: ignore[no-untyped-def]
                     for j in range(n):
                         u1[i, b, j] += change[i, b, j]
             end_of_step(coefficients, shapes, frames, beams, kinds, Rs[t], base, state, end, work, points)
-            if settled or not np.isfinite(moved):
+            reached = difference(u1, u)
+            if settled or not reached <= counts[4]:
                 break
-            counts[1] = max(counts[1], difference(u1, u))
         if not settled:
+            counts[2] = counts[3] = 0.0
             return t, worst
+        counts[1] = max(counts[1], reached)
         mean_frames(shapes, frames, Rs[t], u1, Q1)
         F[:] = Fs[t]
         if acting is not None:
