@@ -17,7 +17,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -29,7 +29,7 @@ from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
-from kedfem.scene import Scene, following, time_grid, turn_steps
+from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
@@ -99,7 +99,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
         *stability_warning(scene),
-        *(() if following(scene) else geometric_warning(geometric)),
+        *geometric_warning(geometric),
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
@@ -180,6 +180,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     geometric, errors = GeometricError(model), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    notes |= {f"segments of {name}": len(parts) for name, parts in segments(model).items() if parts[0].fit is not None}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:

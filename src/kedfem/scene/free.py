@@ -34,6 +34,8 @@ def frame_faults(parts: Parts) -> Iterator[str]:
         yield parts.analysis.fault("frames", "must be 'following' in a scene without a drive, got 'nominal'")
     if parts.analysis.word("solver") == "literal" and any_following(parts):
         yield parts.analysis.fault("solver", "must be 'condensed' for frames that follow, got 'literal'")
+    if parts.analysis.raw.get("stiffening") is True and any_following(parts):
+        yield parts.analysis.fault("stiffening", "must be left out for frames that follow, which need none, got true")
     for link in parts.links.values():
         if fidelity(link) == "rigid" and not link.has("shape"):
             for key in ("frames", "segments"):
@@ -201,6 +203,10 @@ def undriven_faults(parts: Parts) -> Iterator[str]:
         yield analysis.fault("step", "is required in a scene without a drive [s], got nothing")
     if analysis.word("initial") == "quasi-static":
         yield analysis.fault("initial", "must be 'rest' in a scene without a drive, got 'quasi-static'")
+    drawn = parts.animation.record
+    if drawn is not None and drawn.exaggeration != 1.0:
+        message = "must be 1 in a scene without a drive, which has no motion that it deviates from"
+        yield parts.animation.fault("exaggeration", f"{message}, got {drawn.exaggeration:g}")
     if analysis.has("accuracy"):
         wanted = "must be left out in a scene without a drive (trial runs need one)"
         yield analysis.fault("accuracy", f"{wanted}, got {shown(analysis.raw['accuracy'])}")

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from kedfem.scene.analysis import Analysis, Probe
+from kedfem.scene.analysis import Analysis, Animation, Probe
 from kedfem.scene.drives import Drive
 from kedfem.scene.faults import line
 from kedfem.scene.links import Joint, LinkScene
@@ -29,6 +29,7 @@ TYPES: dict[str, Any] = {
     "probes": Probe,
     "drive": Drive,
     "analysis": Analysis,
+    "animation": Animation,
 }
 
 
@@ -95,6 +96,7 @@ class Parts:
     probes: dict[str, Entry]
     drive: Entry
     analysis: Entry
+    animation: Entry
     gravity: tuple[float, ...]
     materials: list[str]
     folder: Path
@@ -115,9 +117,9 @@ def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
     }
 
 
-def single(section: str, raw: Any) -> Entry:
+def single(section: str, raw: Any, *above: str) -> Entry:
     """A section that is one table."""
-    return Entry((section,), raw if isinstance(raw, Mapping) else {}, good(section, raw))
+    return Entry((*above, section), raw if isinstance(raw, Mapping) else {}, good(section, raw))
 
 
 def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path) -> Parts:
@@ -134,6 +136,7 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
         analysis=single("analysis", raw.get("analysis")),
+        animation=single("animation", output.get("animation") if isinstance(output, Mapping) else None, "output"),
         gravity=gravity,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
         folder=folder,
