@@ -103,7 +103,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
-        *balance_warning(account.balance),
+        *balance_warning(account.balance, scene.analysis.stiffening),
         *warnings,
     )
     return Run(
@@ -177,7 +177,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
-    geometric, errors = GeometricError(model), step_error(ready)
+    geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     notes |= {f"segments of {name}": len(parts) for name, parts in segments(model).items() if parts[0].fit is not None}

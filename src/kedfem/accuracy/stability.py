@@ -1,10 +1,10 @@
-"""Steps that damped links need as they turn, so that vibration which no step resolves dies away."""
+"""Steps that links need as they turn, damped or in frames that follow, so that vibration which no step resolves dies."""
 
 import math
 
 import numpy as np
 
-from kedfem.scene import Scene, drive_angle, rayleigh, time_grid
+from kedfem.scene import Scene, drive_angle, following, rayleigh, time_grid
 
 MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration neither grows nor dies (measured)
 
@@ -12,7 +12,7 @@ MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration
 def fewest_steps(scene: Scene) -> float:
     """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
     rho_inf = scene.analysis.rho_inf
-    if rayleigh(scene.damping)[1] == 0.0:
+    if rayleigh(scene.damping)[1] == 0.0 and not following(scene):
         return 0.0
     if rho_inf == 1.0:
         return math.inf
@@ -27,7 +27,8 @@ def stability_warning(scene: Scene) -> tuple[str, ...]:
     fewest, steps = fewest_steps(scene), time_grid(scene).steps
     if steps >= fewest:
         return ()
-    what = "with damping in proportion to the stiffness vibration that the step cannot resolve grows in links that turn"
+    cause = "frames that follow" if following(scene) else "damping in proportion to the stiffness"
+    what = f"with {cause} vibration that the step cannot resolve grows in links that turn"
     if fewest == math.inf:
         return (f"analysis.rho_inf = 1: {what}; take 0.95",)
     return (

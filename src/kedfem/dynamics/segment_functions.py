@@ -73,7 +73,7 @@ def segment_basis(
 def _relative(link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
     """A deflection without the segment's mean rigid motion."""
     M = np.stack([mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in modes.T], axis=1)
-    return g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape)
+    return np.asarray(g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape))
 
 
 def _answers(

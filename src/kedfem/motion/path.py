@@ -177,7 +177,8 @@ class _Stand:
 
 def _next(here: _Stand, step: float) -> _Stand:
     """The next grid point, the step halved until Newton converges fast and the orientation stays."""
-    while abs(step) >= SMALLEST_STEP:
+    least = min(SMALLEST_STEP, abs(step))
+    while abs(step) >= least:
         phi = here.phi + step
         step, guess, link = step / 2, here.predicted(step), here.link
         once, _ = closed(link, guess, np.array([phi]), sweeps=1)

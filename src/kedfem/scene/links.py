@@ -15,6 +15,7 @@ from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
+Element = Literal["hex27", "hex20", "hex8", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
 Count = Annotated[StrictInt, Field(ge=1)]
 
 
@@ -61,8 +62,9 @@ class LinkScene(Record):
     """mass of a rigid slider (a rigid link without a shape)"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
-    element: Literal["hex27", "hex20", "hex8", "quad9", "beam2", "beam3", "beam4", "beam5", "beam7", "beam9"] | None = None
-    """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2, 4, 5, 7, 9: nodes per element) for a beam"""
+    element: Element | None = None
+    """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2, 4, 5, 7, 9: nodes per element) for a
+    beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of the elements of a solid or plane link"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None

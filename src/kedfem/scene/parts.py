@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from kedfem.scene.analysis import Analysis, Animation, Probe
+from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive
 from kedfem.scene.faults import line
 from kedfem.scene.links import Joint, LinkScene
@@ -28,6 +29,7 @@ TYPES: dict[str, Any] = {
     "springs": Spring,
     "probes": Probe,
     "drive": Drive,
+    "damping": Damping,
     "analysis": Analysis,
     "animation": Animation,
 }
@@ -95,6 +97,7 @@ class Parts:
     springs: dict[str, Entry]
     probes: dict[str, Entry]
     drive: Entry
+    damping: Entry
     analysis: Entry
     animation: Entry
     gravity: tuple[float, ...]
@@ -135,6 +138,7 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         springs=entries("springs", raw.get("springs")),
         probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
+        damping=single("damping", raw.get("damping")),
         analysis=single("analysis", raw.get("analysis")),
         animation=single("animation", output.get("animation") if isinstance(output, Mapping) else None, "output"),
         gravity=gravity,
