@@ -17,7 +17,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -180,6 +180,7 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    notes |= {f"segments of {name}": len(parts) for name, parts in segments(model).items() if parts[0].fit is not None}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:

@@ -375,7 +375,7 @@ def position(link: Link, u: Nodal) -> Nodal:
 
 def rounding(links: Sequence[Link]) -> float:
     """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
-    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    sizes = [float(link.one @ link.m1[:, 0]) * link.size**2 for link in links]
     return float(LEAST**2 * sum(sizes))
 
 

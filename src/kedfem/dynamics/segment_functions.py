@@ -81,7 +81,7 @@ def _relative(
 ) -> Float[np.ndarray, "n d"]:
     """A deflection without the segment's mean rigid motion."""
     M = np.stack([mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in modes.T], axis=1)
-    return g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape)
+    return np.asarray(g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape))
 
 
 def _answers(
