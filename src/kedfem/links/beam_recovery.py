@@ -1,8 +1,9 @@
 """Stress of a planar beam from the strains at its reduced Gauss points, which are the most accurate there.
 
-A probe takes the cubic through the nearest four of them, or as many as an element of more nodes has: its error falls with the third power of the elements' length,
+A probe takes the cubic through the nearest four of them: its error falls with the third power of the elements' length,
 at nodes and in the middle between them with the fourth, where the moment is smooth along a straight run of elements, as
-with loads spread along it. Joints, bodies and forces at a point (kinks) end a run.
+with loads spread along it. Joints, bodies and forces at a point (kinks) end a run. Elements of more than five nodes have
+more such points each: then it takes as many.
 """
 
 import numpy as np
