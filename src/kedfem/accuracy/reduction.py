@@ -4,9 +4,12 @@ The estimate: the residual of the reduced run in the full equation, at some mome
 the full linkage; these are added to the functions, and the run is repeated. What changes, times a factor found on full
 runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
 tolerance, the richer functions are kept and the same is done again.
+
+Of links with frames that follow each segment is reduced, with functions that nominal frames give; the runs that estimate
+the error have frames that follow. Of the residual in their frames only what moments do in turning these is left out.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,9 +22,11 @@ from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
-from kedfem.dynamics.reduction import bases, enriched, static_parts
+from kedfem.dynamics.bases import bases
+from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -36,6 +41,7 @@ ADDED = 8  # functions that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
 FIRST = 0.1  # of the tolerance: what the first functions leave out of the training deflections' energy norm
+SEGMENT = 1.0  # the same of segments, whose functions are sorted by what they are needed for
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
 
@@ -105,11 +111,14 @@ def reduced(
     """
     stage("functions")
     parts = static_parts(full.model)
-    needed = [link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL]
+    needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
+    needed &= reducible(full.model)
+    if not needed:
+        return Reduction(full, {}, tolerance)
     found = bases(full.model, instants(full.model, _training(full)), parts, needed)
     given = counts or {}
     Q: Functions = [
-        None if basis is None else basis.first(given.get(link.name, basis.count(FIRST * tolerance)))
+        None if basis is None else basis.first(given.get(link.name, _count(link, basis, tolerance)))
         for link, basis in zip(full.model.links, found, strict=True)
     ]
     stage("error of the reduction")
@@ -118,25 +127,38 @@ def reduced(
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
 
 
+def reducible(model: Model) -> set[str]:
+    """Names of the links that can be reduced: not beams with frames that follow, which are elements of few functions."""
+    return {link.name for link in model.links if link.fit is None or link.meshed}
+
+
+def _count(link: Link, basis: Basis, tolerance: float) -> int:
+    """How many functions serve a tolerance to begin with."""
+    return basis.count((FIRST if link.fit is None else SEGMENT) * tolerance)
+
+
 def first_reduced(
-    full: Prepared, tolerance: float, known: Mapping[str, Float[np.ndarray, "_ _"]] | None = None
+    full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
     """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
 
     Parameters
     ----------
-    known : functions of links that need not be found any more
+    known : functions of links that need not be found any more, link by link
     """
     links = full.model.links
     if all(link.unknowns <= SMALL and link.full is None for link in links):
         return full
-    given = [None if known is None else known.get(link.name) for link in links]
-    model = reduced_model(full.model, given)
-    left = [link.name for link in model.links if link.unknowns > MINUTE and link.full is None]
+    model = full.model if known is None else reduced_model(full.model, known)
+    left = {link.name for link in model.links if link.unknowns > MINUTE and link.full is None}
+    left &= reducible(model)
     if not left:
         return replace(full, model=model)
     found = bases(model, instants(model, _training(full)), static_parts(model), only=left)
-    Q = [None if basis is None else basis.first(basis.count(FIRST * tolerance)) for basis in found]
+    Q = [
+        None if basis is None else basis.first(_count(link, basis, tolerance))
+        for link, basis in zip(model.links, found, strict=True)
+    ]
     return replace(full, model=reduced_model(model, Q))
 
 

@@ -37,6 +37,7 @@ from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
+PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST = 1e-6  # of the links' sizes
 SWEEPS = 15  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
@@ -222,7 +223,7 @@ class FollowingSteps:
         H = np.sum([b.T @ part.S @ b for part, b in zip(self.parts, RB, strict=True)], axis=0)
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
-        for _ in range(SWEEPS):
+        for sweep in range(SWEEPS):
             now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
             frame_change, forces = solved(self.parts, rhs, RB, factor)
@@ -232,7 +233,8 @@ class FollowingSteps:
                 for link, x in zip(self.links, change, strict=True)
             ]
             self.sweeps += 1
-            settled = sum(sizes) <= self.tolerance**2 * self.scale
+            tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
+            settled = sum(sizes) <= tolerance**2 * self.scale
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
@@ -283,7 +285,7 @@ class FollowingSteps:
         link = self.links[k]
         if link.frames or link.fit is None:
             return mean_orientation(link, now.u, at.R)
-        return at.R @ now.frames[0].Q
+        return np.asarray(at.R @ now.frames[0].Q)
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -321,30 +323,24 @@ class FollowingSteps:
         return replace(now, port_forces=world, R=self._mean(k, now, at))
 
     def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        return (
-            [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
-            if taken
-            else []
-        )
+        if not taken:
+            return []
+        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
 
     def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
         link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
         g = [stress_deformation(link, frames, s.frames) if frames else s.u @ s.R for s in states]
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
-        stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
-        return LinkHistory(
-            **stacked,
-            g=np.stack(g),
-            port_forces=np.stack(forces),
-            strain=np.array([s.strain for s in states]),
-        )
+        u, v, a, R, F = (np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F"))
+        strain = np.array([s.strain for s in states])
+        return LinkHistory(u, v, a, np.stack(g), R, F, np.stack(forces), strain)
 
 
 def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
     """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
     if link.fit is None:
         return R
-    return R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0]
+    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0])
 
 
 def solved(

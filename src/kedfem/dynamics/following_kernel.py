@@ -36,7 +36,7 @@ from kedfem.dynamics.mixing_kernel import factored, mixed, solved
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
-SWEEPS = 15
+SWEEPS, PATIENCE, EASIER = 15, 6, 100.0  # as in `dynamics.following`
 
 
 @compiled
@@ -138,7 +138,8 @@ def follow_block(  # type: ignore[no-untyped-def]
             )
             if not np.isfinite(moved):
                 break
-            settled = moved <= tolerance * tolerance * counts[1]
+            allowed = tolerance if sweep < PATIENCE else EASIER * tolerance
+            settled = moved <= allowed * allowed * counts[1]
             if not settled:
                 mixed(memory, counts, sweep, change.ravel())
             counts[1] = max(counts[1], advanced(change, u1, u))

@@ -218,4 +218,6 @@ def drag_faults(parts: Parts) -> Iterator[str]:
     if alpha:
         key = "ratio" if damping.has("ratio") else "alpha"
         wanted = f"must be given as beta alone in a scene without a drive, such as beta = {beta:.3g} [s]"
-        yield damping.fault(key, f"{wanted}: alpha resists the motion as a whole, got alpha = {alpha:.3g} 1/s")
+        yield damping.fault(
+            key, f"{wanted}: alpha resists the motion as a whole, got alpha = {alpha:.3g} 1/s"
+        )
