@@ -169,7 +169,9 @@ def _links(model: Model) -> Table:
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for name, parts in segments(model).items():
-        elements, unknowns = (str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts]))
+        elements, unknowns = (
+            str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
+        )
         table.add_row(name, _kind(parts), elements, unknowns, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")

@@ -37,7 +37,7 @@ from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
-PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
+PATIENCE, EASIER = 12, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST, FAR = 1e-6, 100.0  # of the links' sizes
 SWEEPS = 40  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
@@ -340,7 +340,7 @@ def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float
     """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
     if link.fit is None:
         return R
-    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0])
+    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), 0.0)[0])
 
 
 def solved(
