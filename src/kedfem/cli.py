@@ -151,7 +151,7 @@ def bench(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="One of: accuracy, elements, growth, plane, reduction, solvers, start, steps, suite.",
+            help="One of: accuracy, beams, elements, following, growth, plane, reduction, solvers, start, steps, suite.",
         ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),

@@ -147,22 +147,32 @@ class Beam:
 
 @st.composite
 def beams(draw: st.DrawFn) -> Beam:
-    """One to three straight segments, 2- or 3-node elements."""
+    """One to three straight segments, elements of 2 to 5 nodes."""
     random = np.random.default_rng(draw(seeds))
     steps = random.uniform(0.3, 1.0, (draw(st.integers(1, 3)), 1)) * np.array([[1.0, 0.0, 0.0]])
     steps[:, 1] = random.uniform(-0.5, 0.5, len(steps))
     points = np.concatenate([random.uniform(-1, 1, (1, 3)), steps]).cumsum(axis=0)
     section = rectangle(*random.uniform(0.01, 0.1, 2).tolist())
-    return Beam(points, section, draw(st.integers(1, 2)), draw(st.sampled_from([2, 3])))
+    return Beam(points, section, draw(st.integers(1, 2)), draw(st.sampled_from([2, 3, 5])))
+
+
+# Lobatto's points in closed form, ends first: Abramowitz and Stegun, table 25.6
+LOBATTO = {
+    2: [-1.0, 1.0],
+    3: [-1.0, 1.0, 0.0],
+    4: [-1.0, 1.0, -(5**-0.5), 5**-0.5],
+    5: [-1.0, 1.0, -((3 / 7) ** 0.5), 0.0, (3 / 7) ** 0.5],
+}
 
 
 @st.composite
 def curved_elements(draw: st.DrawFn) -> np.ndarray:
-    """Nodes (m, 2) of one beam element: 2 nodes, or 3 on a curve that does not turn back."""
+    """Nodes (m, 2) of one beam element: 2 nodes, or up to 5 on a curve that does not turn back."""
     random = np.random.default_rng(draw(seeds))
-    ends = np.array([[0.0, 0.0], [1.0, 0.0]]) * random.uniform(0.2, 2.0)
-    nodes = ends if draw(st.booleans()) else np.vstack([ends, ends.mean(axis=0)])
-    bend = draw(st.floats(0.0, 0.2)) * ends[1, 0]
-    nodes[2:] += bend * random.uniform(-1, 1, 2)
+    r = np.array(LOBATTO[draw(st.sampled_from([2, 3, 4, 5]))])
+    length = random.uniform(0.2, 2.0)
+    nodes = np.outer((1 + r) / 2, [length, 0.0])
+    bend = draw(st.floats(0.0, 0.2)) * length * random.uniform(-1, 1, 2)
+    nodes += np.outer(1 - r * r, bend)
     turn = Rotation.from_rotvec([0, 0, random.uniform(-3, 3)]).as_matrix()[:2, :2]
     return nodes @ turn.T + random.uniform(-1, 1, 2)

@@ -8,6 +8,7 @@ from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.links.beam import element_mass, element_stiffness, strain_rows
 from tests.laws.strategies import (
     LAW,
+    LOBATTO,
     MATERIAL,
     Beam,
     Motion,
@@ -47,8 +48,8 @@ def test_rigid_modes_strain_nothing_on_straight_and_curved_elements(x: np.ndarra
 def test_det_J_of_a_beam_is_the_rate_of_its_arc_length(x: np.ndarray, seed: int) -> None:
     """det J = √(x_r² + y_r²), [KED, eq. (22)], against the chord between two points close by."""
     r, h = np.random.default_rng(seed).uniform(-0.9, 0.9), 1e-4
-    parabola = np.polynomial.polynomial.polyfit([-1, 1, 0][: len(x)], x, len(x) - 1)
-    there, here = (np.polynomial.polynomial.polyval(r + s, parabola) for s in (h, -h))
+    curve = np.polynomial.polynomial.polyfit(LOBATTO[len(x)], x, len(x) - 1)
+    there, here = (np.polynomial.polynomial.polyval(r + s, curve) for s in (h, -h))
     assert strain_rows(x, r)[1] == pytest.approx(np.linalg.norm(there - here) / (2 * h), rel=1e-7)
 
 

@@ -228,13 +228,14 @@ def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
     x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
                   for s in t])  # fmt: skip
     values, before = np.zeros((9, 3, 4)), np.zeros(3)
-    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), values)
+    forces = np.zeros_like(x)
+    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), forces, values)
     q = np.zeros(3)
     for k in range(9):
         for i, action in enumerate(every):
-            np.testing.assert_allclose(
-                values[k, i], found(action, x[k, i], t=t[k], before=q[i])[1], atol=1e-12
-            )
+            alone = found(action, x[k, i], t=t[k], before=q[i])
+            np.testing.assert_allclose(forces[k, i], alone[0], atol=1e-12)
+            np.testing.assert_allclose(values[k, i], alone[1], atol=1e-12)
         q = values[k, :, 0]
     np.testing.assert_allclose(values[:, 0, 0], 3 * t, atol=1e-12)
     np.testing.assert_array_equal(before, values[-1, :, 0])

@@ -4,7 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from kedfem.bench.accuracy import bench_accuracy
+from kedfem.bench.beams import bench_beams
 from kedfem.bench.elements import bench_elements
+from kedfem.bench.following import bench_following
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
 from kedfem.bench.plane import bench_plane
@@ -21,6 +23,8 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "plane": bench_plane,
     "start": bench_start,
     "elements": bench_elements,
+    "following": bench_following,
+    "beams": bench_beams,
     "suite": bench_suite,
     "reduction": bench_reduction,
     "accuracy": bench_accuracy,

@@ -20,7 +20,7 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import first_states, forcings, motions, steps_of
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows
-from kedfem.scene import Scene, scene_from, time_grid
+from kedfem.scene import Scene, following, scene_from, time_grid
 
 
 def four_bar_with(functions: int) -> tuple[Prepared, Prepared]:
@@ -49,8 +49,9 @@ def loop_time(ready: Prepared, repeats: int = 9) -> float:
     _, motion = next(motions(scene, ready.linkage, ready.path))
     forcing = forcings(model, motion)
     states = first_states(scene, ready.linkage, ready.path, scene.motion, model)
-    solver.advance(solver.begin(states), forcing)  # compiled
-    return seconds(lambda: solver.advance(solver.begin(states), forcing), repeats) / len(motion.t)
+    known = (forcing, motion) if following(scene) else (forcing,)
+    solver.advance(solver.begin(states), *known)  # compiled
+    return seconds(lambda: solver.advance(solver.begin(states), *known), repeats) / len(motion.t)
 
 
 def recorded_rate(ready: Prepared) -> float:

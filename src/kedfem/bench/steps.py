@@ -12,8 +12,8 @@ import numpy as np
 from kedfem.bench.machine import Watch, markdown, write_loglog, write_page
 from kedfem.bench.scenes import bar_four_bar
 from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import LinkMoment
+from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
@@ -88,7 +88,7 @@ class _Stopwatch:
         self.steps: list[float] = []
         if isinstance(solver, CondensedSteps):
             solver.parts = [replace(part, solve=self._timed_solve(part.solve)) for part in solver.parts]
-        if not isinstance(solver, DenseSteps):
+        if isinstance(solver, CondensedSteps | LiteralSteps):
             solver.step = self._timed_step(solver.step)  # type: ignore[method-assign, assignment]
 
     def _timed_solve(self, solve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.action import Action, Table, end_weights, kernel_table, nominal_vectors
+from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
@@ -45,3 +46,26 @@ def over_block(acting: Acting, motion: RigidMotion) -> tuple[Any, ...] | None:
             x[:, i, e], v[:, i, e] = nominal_vectors(end, motion)
     scratch = (*np.zeros((3, A, 2, 2, 3)), np.zeros((A, 4)))
     return acting.owners, acting.weights, acting.table, motion.t, x, v, *scratch
+
+
+def first_forces(
+    every: Sequence[Action], links: Sequence[Link], motion: RigidMotion, rows: Sequence[tuple[Nodal, Nodal]]
+) -> list[Nodal]:
+    """Forces of actions on the rows (n, d) of all links at the start, where nothing has turned yet.
+
+    Parameters
+    ----------
+    motion : at that time only
+    rows : δ and δ' of all links
+    """
+    if not every:
+        return [np.zeros_like(u) for u, _ in rows]
+    from kedfem.dynamics.actions_kernel import external
+
+    acting = acting_on(every, links)
+    u, v, F = np.zeros((3, len(links), *acting.weights.shape[-2:]))
+    for k, (link, each) in enumerate(zip(links, rows, strict=True)):
+        for padded, own in zip((u, v), each, strict=True):
+            padded[k, : link.d, : link.n] = own.T
+    external(over_block(acting, motion), 0, u, v, np.zeros(len(every)), F)
+    return [F[k, : link.d, : link.n].T for k, link in enumerate(links)]

@@ -112,11 +112,10 @@ def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def evaluate_all(t, x, v, before, table, values):  # type: ignore[no-untyped-def]
-    """Values (T, A, 4) at successive times; x, v (T, A, 2, 2, 3); before (A,) is moved on to the last."""
-    forces = np.zeros(x.shape[1:])
+def evaluate_all(t, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
+    """The same at T times: x, v, forces (T, A, 2, 2, 3), values (T, A, 4); before (A,) is moved on to the last."""
     for k in range(len(t)):
-        evaluate(t[k], x[k], v[k], before, table, forces, values[k])
+        evaluate(t[k], x[k], v[k], before, table, forces[k], values[k])
         before[:] = values[k, :, 0]
 
 

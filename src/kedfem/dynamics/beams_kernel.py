@@ -1,15 +1,19 @@
 """Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: strains, and the force they make.
 
-At a point, with x' the derivative of the position by arc length as drawn, |x'| = 1 there, and θ the angle that it has turned,
+At a point, with x' the derivative of the position by arc length as drawn, where |x'| = 1, and θ the angle it has turned,
 
     ε = |x'| − 1,   γ = θ − ψ,   κ = ψ'
 
 exactly what `dynamics.frames` finds with a frame at each point, see `links.segments.beam_segments`. World components:
 ψ and θ count from the nominal motion, so that x' = R t + u' with t the tangent as drawn.
 
-    rows (L, 3, S, E) : x' from u, ψ and ψ' from ψ, at the E points
-    tangent (L, 2, E) : t
-    rigidity (L, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
+    which : (b,) numbers of these segments
+    rows (b, 3, E, S) : x' from u, ψ and ψ' from ψ, at the E points
+    tangent (b, 2, E) : t
+    rigidity (b, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
+    strain (3, b, 3, E) and rates, direction (b, 2, E) of the tangents in the nominal frame, turn (b, E) : state
+
+One call does all segments: a call costs as much as a short beam.
 """
 
 from typing import Any
@@ -23,110 +27,108 @@ SMALL_TURN = 0.05  # tan of half the angle: up to here the series is exact to ro
 
 
 @compiled
-def first_directions(strain_of, beams, R, direction, base):  # type: ignore[no-untyped-def]
-    """Where the tangents would point had only the nominal motion turned since the last step, and R t; world."""
-    _, tangent, _ = beams
-    L, _, E = tangent.shape
-    for i in range(L):
-        if strain_of[i]:
-            a, b, c, d = R[i, 0, 0], R[i, 0, 1], R[i, 1, 0], R[i, 1, 1]
-            for e in range(E):
-                base[i, 0, e] = a * tangent[i, 0, e] + b * tangent[i, 1, e]
-                base[i, 1, e] = c * tangent[i, 0, e] + d * tangent[i, 1, e]
-                x, y = direction[i, 0, e], direction[i, 1, e]
-                base[i, 2, e] = a * x + b * y
-                base[i, 3, e] = c * x + d * y
-
-
-@compiled
-def kept_directions(strain_of, R, now, direction):  # type: ignore[no-untyped-def]
-    """The tangents at the end of a step, seen from the nominal frame."""
-    L, _, E = direction.shape
-    for i in range(L):
-        if strain_of[i]:
-            a, b, c, d = R[i, 0, 0], R[i, 0, 1], R[i, 1, 0], R[i, 1, 1]
-            for e in range(E):
-                direction[i, 0, e] = a * now[i, 0, e] + c * now[i, 1, e]
-                direction[i, 1, e] = b * now[i, 0, e] + d * now[i, 1, e]
-
-
-@compiled
-def bent(rates, i, beams, base, u, before, angle0, now, tangents, angles, f, work):  # type: ignore[no-untyped-def]
-    """Internal force of segment i at the displacement u, added to f, world components.
+def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[no-untyped-def]
+    """What stays for a step: R t, and where tangents would point had they turned as the nominal motion; damped strains.
 
     Parameters
     ----------
     rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
-    base : (L, 4, E) of `first_directions`
-    before, now : (3, L, 3, E) strains and their rates at the beginning and at the end of the step
-    angle0, angles : (L, E) at the beginning, at the end
-    tangents : (L, 2, E) at the end, world
-    work : (7, E)
+    base : (b, 4, E) becomes R t and the directions, world
+    resisted : (b, 3, E) becomes β times the rate of strains that vanish at the end of the step
     """
-    rows, _, rigidity = beams
+    which, _, tangent, _ = beams
     n0, n1, n2, h1, h0, beta = rates
-    n, E = rows.shape[2:]
-    for e in range(E):
-        work[0, e], work[1, e], work[2, e], work[3, e] = base[i, 0, e], base[i, 1, e], 0.0, 0.0
-    for j in range(n):
-        x, y, psi = u[i, 0, j], u[i, 1, j], u[i, 2, j]
+    E = tangent.shape[2]
+    for b in range(len(which)):
+        i = which[b]
+        c, s, z, w = R[i, 0, 0], R[i, 1, 0], R[i, 0, 1], R[i, 1, 1]
         for e in range(E):
-            work[0, e] += rows[i, 0, j, e] * x
-            work[1, e] += rows[i, 0, j, e] * y
-            work[2, e] += rows[i, 1, j, e] * psi
-            work[3, e] += rows[i, 2, j, e] * psi
-    largest = 0.0
-    for e in range(E):
-        x, y = work[0, e], work[1, e]
-        length = np.sqrt(x * x + y * y)
-        x, y = x / length, y / length
-        t = (base[i, 2, e] * y - base[i, 3, e] * x) / (1 + base[i, 2, e] * x + base[i, 3, e] * y)
-        work[4, e], work[5, e], work[6, e] = length, t, np.float64(0.0)
-        tangents[i, 0, e], tangents[i, 1, e] = x, y
-        largest = max(largest, abs(t))
-    for e in range(E):
-        t = work[5, e]
-        q = t * t
-        turn = 2 * t * (1 - q * (1 / 3 - q * (1 / 5 - q * (1 / 7 - q * (1 / 9 - q / 11)))))
-        angles[i, e] = angle0[i, e] + turn
-    if not largest <= SMALL_TURN:
-        for e in range(E):
-            angles[i, e] = angle0[i, e] + 2 * np.arctan(work[5, e])
-    for e in range(E):
-        now[0, i, 0, e] = work[4, e] - 1
-        now[0, i, 1, e] = angles[i, e] - work[2, e]
-        now[0, i, 2, e] = work[3, e]
-    if beta != 0.0:
+            x, y = tangent[b, 0, e], tangent[b, 1, e]
+            base[b, 0, e], base[b, 1, e] = c * x + z * y, s * x + w * y
+            x, y = direction[b, 0, e], direction[b, 1, e]
+            base[b, 2, e], base[b, 3, e] = c * x + z * y, s * x + w * y
         for m in range(3):
             for e in range(E):
-                s = now[0, i, m, e]
-                x2 = n0 * (s - before[0, i, m, e]) - n1 * before[1, i, m, e] - n2 * before[2, i, m, e]
-                x1 = before[1, i, m, e] + h1 * x2 + h0 * before[2, i, m, e]
-                now[1, i, m, e], now[2, i, m, e] = x1, x2
-                work[m, e] = rigidity[i, m, e] * (s + beta * x1)
-    else:
-        for m in range(3):
-            for e in range(E):
-                work[m, e] = rigidity[i, m, e] * now[0, i, m, e]
-    for e in range(E):
-        N, V, x, y = work[0, e], work[1, e] / work[4, e], tangents[i, 0, e], tangents[i, 1, e]
-        work[5, e], work[6, e] = N * x - V * y, N * y + V * x
-    for j in range(n):
-        x, y, psi = 0.0, 0.0, 0.0
-        for e in range(E):
-            x += rows[i, 0, j, e] * work[5, e]
-            y += rows[i, 0, j, e] * work[6, e]
-            psi += rows[i, 2, j, e] * work[2, e] - rows[i, 1, j, e] * work[1, e]
-        f[i, 0, j] += x
-        f[i, 1, j] += y
-        f[i, 2, j] += psi
+                x2 = n0 * strain[0, b, m, e] + n1 * strain[1, b, m, e] + n2 * strain[2, b, m, e]
+                resisted[b, m, e] = beta * (strain[1, b, m, e] - h1 * x2 + h0 * strain[2, b, m, e])
 
 
 @compiled
-def bending_energy(i, rigidity, strain):  # type: ignore[no-untyped-def]
-    """½ Σ rigidity · strain² of segment i."""
-    total = 0.0
-    for m in range(3):
-        for e in range(rigidity.shape[2]):
-            total += rigidity[i, m, e] * strain[0, i, m, e] ** 2
-    return 0.5 * total
+def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[no-untyped-def]
+    """Internal force of all these segments at the displacement u (L, D, S), added to f; world components.
+
+    Parameters
+    ----------
+    stiffer : factor of the strains, for their share in their rates
+    turn0 : (b, E) at the beginning of the step
+    seen : (b, 6, E) becomes ε, γ, κ, the tangent (2) and the turn at u
+    w : (5, E)
+    """
+    which, rows, _, rigidity = beams
+    E, n = rows.shape[2:]
+    for b in range(len(which)):
+        i = which[b]
+        for e in range(E):
+            x, y, psi, kappa = base[b, 0, e], base[b, 1, e], 0.0, 0.0
+            for j in range(n):
+                r = rows[b, 0, e, j]
+                x += r * u[i, 0, j]
+                y += r * u[i, 1, j]
+                psi += rows[b, 1, e, j] * u[i, 2, j]
+                kappa += rows[b, 2, e, j] * u[i, 2, j]
+            w[0, e], w[1, e], w[2, e], seen[b, 2, e] = x, y, psi, kappa
+        largest = 0.0
+        for e in range(E):
+            x, y = w[0, e], w[1, e]
+            length = np.sqrt(x * x + y * y)
+            x, y = x / length, y / length
+            t = (base[b, 2, e] * y - base[b, 3, e] * x) / (1 + base[b, 2, e] * x + base[b, 3, e] * y)
+            q = t * t
+            arc = 2 * t * (1 - q * (1 / 3 - q * (1 / 5 - q * (1 / 7 - q * (1 / 9 - q / 11)))))
+            largest = max(largest, q)
+            w[3, e], w[4, e] = length, t
+            seen[b, 0, e], seen[b, 3, e], seen[b, 4, e], seen[b, 5, e] = length - 1, x, y, turn0[b, e] + arc
+        if not largest <= SMALL_TURN * SMALL_TURN:
+            for e in range(E):
+                seen[b, 5, e] = turn0[b, e] + 2 * np.arctan(w[4, e])
+        for e in range(E):
+            seen[b, 1, e] = seen[b, 5, e] - w[2, e]
+            N = rigidity[b, 0, e] * (stiffer * seen[b, 0, e] + resisted[b, 0, e])
+            V = rigidity[b, 1, e] * (stiffer * seen[b, 1, e] + resisted[b, 1, e])
+            w[2, e], w[4, e] = V, rigidity[b, 2, e] * (stiffer * seen[b, 2, e] + resisted[b, 2, e])
+            V /= w[3, e]
+            x, y = seen[b, 3, e], seen[b, 4, e]
+            w[0, e], w[1, e] = N * x - V * y, N * y + V * x
+        for j in range(n):
+            x, y, moment = 0.0, 0.0, 0.0
+            for e in range(E):
+                r = rows[b, 0, e, j]
+                x += r * w[0, e]
+                y += r * w[1, e]
+                moment += rows[b, 2, e, j] * w[4, e] - rows[b, 1, e, j] * w[2, e]
+            f[i, 0, j] += x
+            f[i, 1, j] += y
+            f[i, 2, j] += moment
+
+
+@compiled
+def ended(t, rates, beams, R, seen, strain, direction, turn, strains, energies):  # type: ignore[no-untyped-def]
+    """The settled end of a step becomes the state, and row t of the history: strains (T, b, 3, E), energies (T, L)."""
+    which, _, _, rigidity = beams
+    n0, n1, n2, h1, h0, _ = rates
+    E = turn.shape[1]
+    for b in range(len(which)):
+        i = which[b]
+        energy = 0.0
+        for m in range(3):
+            for e in range(E):
+                s, s1, s2 = seen[b, m, e], strain[1, b, m, e], strain[2, b, m, e]
+                now = n0 * (s - strain[0, b, m, e]) - n1 * s1 - n2 * s2
+                strain[0, b, m, e], strain[1, b, m, e], strain[2, b, m, e] = s, s1 + h1 * now + h0 * s2, now
+                strains[t, b, m, e] = s
+                energy += rigidity[b, m, e] * s * s
+        energies[t, i] = 0.5 * energy
+        c, s, z, w = R[i, 0, 0], R[i, 1, 0], R[i, 0, 1], R[i, 1, 1]
+        for e in range(E):
+            x, y = seen[b, 3, e], seen[b, 4, e]
+            direction[b, 0, e], direction[b, 1, e], turn[b, e] = c * x + s * y, z * x + w * y, seen[b, 5, e]

@@ -103,7 +103,9 @@ class _Ports:
         )
 
 
-def attachments(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut] = ()) -> dict[str, Attachment]:
+def attachments(
+    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut] = ()
+) -> dict[str, Attachment]:
     """All joints of a scene, and cuts between segments, as attachments of its elastic links.
 
     Parameters
@@ -271,7 +273,10 @@ def on_part(
         That of the nearest segment, if none has it.
     """
     parts = {key: link for key, link in links.items() if link.name == name}
-    gap = {key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min()) for key, link in parts.items()}
+    gap = {
+        key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min())
+        for key, link in parts.items()
+    }
     first: KedfemError | None = None
     for key in sorted(parts, key=lambda key: gap[key]):
         try:

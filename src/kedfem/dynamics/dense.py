@@ -186,9 +186,7 @@ def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
     return np.asarray(np.linalg.inv(np.linalg.cholesky(m)).T)
 
 
-def component_first(
-    T: Sequence[Float[np.ndarray, "n n"]], K: Any
-) -> Float[np.ndarray, "N N"]:
+def component_first(T: Sequence[Float[np.ndarray, "n n"]], K: Any) -> Float[np.ndarray, "N N"]:
     """Tᵀ K T of a matrix on states, component by component."""
     n, d = len(T[0]), len(T)
     blocks = _dense(K).reshape(n, d, n, d).transpose(1, 0, 3, 2)

@@ -18,16 +18,16 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
-from kedfem.dynamics.condensed import effective_coefficients, factored, port_rotation
+from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import (
     Followed,
-    deformation,
     followed,
     frame_force,
     frames_of,
     rotation,
+    seen_from,
     stress_deformation,
 )
 from kedfem.dynamics.history import Forcing, LinkHistory
@@ -36,11 +36,12 @@ from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, 
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
-DEBUG=0
 DEPTH = 4  # sweeps that are remembered
+PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST, FAR = 1e-6, 100.0  # of the links' sizes
 SWEEPS = 40  # in a step, of which it takes 2 to 4
-CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made; what is left of each step adds up
+CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
+FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +89,12 @@ def held_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPart
     """Dense and exact to rounding where the segment is small, whose stiff hubs lose digits otherwise."""
     if link.unknowns <= SMALL:
         return _small_part(link, joint, c_M, c_K)
-    part = factored(link, joint, c_M, c_K)
-    q = len(joint.keep)
+    return held_substructure(factored(link, joint, c_M, c_K))
+
+
+def held_substructure(part: Substructure) -> HeldPart:
+    """A link condensed onto ports and anchors, seen from its ports."""
+    q = len(part.attachment.keep)
     Y = part.Y @ part.S[:, :q]
 
     def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
@@ -112,7 +117,7 @@ def _small_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPa
     return HeldPart(held, Y, part.S)
 
 
-class NotConverged(Exception):
+class NotConverged(Exception):  # noqa: N818 - not a fault yet: such a step is taken in parts
     """A step whose sweeps do not settle.
 
     taken : time points of the block before it
@@ -159,9 +164,16 @@ class FollowingSteps:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        actions: Sequence[Action] = (),
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
+            links,
+            joints,
+            scheme,
+            damping,
+            actions,
+        )
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
@@ -212,20 +224,27 @@ class FollowingSteps:
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
         reached = 0.0
-        for _ in range(SWEEPS):
+        for sweep in range(SWEEPS):
             now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
-            frame_change, forces = self._solved(rhs, RB, factor)
+            frame_change, forces = solved(self.parts, rhs, RB, factor)
             change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
-            sizes = [float(np.vdot(x, mass_times(link.mass, x))) for link, x in zip(self.links, change, strict=True)]
+            sizes = [
+                float(np.vdot(x, mass_times(link.mass, x)))
+                for link, x in zip(self.links, change, strict=True)
+            ]
             self.sweeps += 1
-            taken = self.mixing.step(np.concatenate([x.ravel() for x in change]))
+            tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
+            settled = sum(sizes) <= tolerance**2 * max(self.scale, reached)
+            asked = np.concatenate([x.ravel() for x in change])
+            taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
             now = [
                 self._moved(k, s, n, x.reshape(n.u.shape), nominal)
-                for k, (s, n, x, nominal) in enumerate(zip(states, now, np.split(taken, ends), at, strict=True))
+                for k, (s, n, x, nominal) in enumerate(
+                    zip(states, now, np.split(taken, ends), at, strict=True)
+                )
             ]
-            settled = sum(sizes) <= CONVERGED**2 * max(self.scale, reached)
             reached = sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True))
             if not reached <= self._too_far:
                 break
@@ -264,11 +283,9 @@ class FollowingSteps:
     def _mean(self, k: int, now: SegmentState, at: Nominal) -> Float[np.ndarray, "d d"]:
         """Mean orientation of a segment, link to world."""
         link = self.links[k]
-        if link.fit is None:
-            return at.R
-        if not link.frames:
-            return at.R @ now.frames[0].Q
-        return at.R @ rotation(link, link.fit, position(link, now.u @ at.R), np.eye(link.d), now.frames[0].angle)[0]
+        if link.frames or link.fit is None:
+            return mean_orientation(link, now.u, at.R)
+        return np.asarray(at.R @ now.frames[0].Q)
 
     def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
         """A state of the end of the step moved by a change of δ, with all that follows from it."""
@@ -278,7 +295,8 @@ class FollowingSteps:
         Mv, Ma = accelerated(scheme, Mu, s.Mu, s.Mv, s.Ma)
         y = position(link, u @ at.R)
         frames = tuple(
-            followed(link, frame, y, before, scheme) for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
+            followed(link, frame, y, before, scheme)
+            for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
         )
         damped = s.damped
         if self.damping.alpha:
@@ -295,19 +313,6 @@ class FollowingSteps:
             r += self.scheme.alpha_f * (s.F - s.f)
         return np.asarray(r - self.scheme.alpha_m * s.Ma)
 
-    def _solved(
-        self, rhs: Sequence[NodalOf], RB: Sequence[NodalOf], factor: tuple[np.ndarray, bool] | None
-    ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """Changes in the predicted frames, and port forces: Σ Bᵀ R λ = 0, R W Δ = B z."""
-        held, reactions = zip(*(part.held(r) for part, r in zip(self.parts, rhs, strict=True)), strict=True)
-        z = np.zeros(RB[0].shape[1])
-        if factor is not None:
-            f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
-            z = scipy.linalg.cho_solve(factor, f, check_finite=False)
-        w = [b @ z for b in RB]
-        forces = [part.S @ x - y for part, x, y in zip(self.parts, w, reactions, strict=True)]
-        return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(self.parts, held, w, strict=True)], forces
-
     def _ended(
         self, k: int, s: SegmentState, now: SegmentState, at: Nominal, force: Float[np.ndarray, " q"]
     ) -> SegmentState:
@@ -318,16 +323,48 @@ class FollowingSteps:
         return replace(now, port_forces=world, R=self._mean(k, now, at))
 
     def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))] if taken else []
+        if not taken:
+            return []
+        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
 
     def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
         link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
         g = [stress_deformation(link, frames, s.frames) if frames else s.u @ s.R for s in states]
         forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
-        stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F")}
-        return LinkHistory(
-            **stacked, g=np.stack(g), port_forces=np.stack(forces), strain=np.array([s.strain for s in states])
-        )
+        u, v, a, R, F = (np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F"))
+        strain = np.array([s.strain for s in states])
+        return LinkHistory(u, v, a, np.stack(g), R, F, np.stack(forces), strain)
+
+
+def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
+    """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
+    if link.fit is None:
+        return R
+    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0])
+
+
+def solved(
+    parts: Sequence[HeldPart],
+    rhs: Sequence[NodalOf],
+    RB: Sequence[NodalOf],
+    factor: tuple[np.ndarray, bool] | None,
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
+    """Changes of all segments in their frames, and port forces: A Δ = r + Wᵀ λ, Σ Bᵀ R λ = 0, R W Δ = B z.
+
+    Parameters
+    ----------
+    rhs : r per segment (n, d)
+    RB : Rᵀ B
+    factor : of H = Σ Bᵀ R S Rᵀ B, None without interface unknowns
+    """
+    held, reactions = zip(*(part.held(r) for part, r in zip(parts, rhs, strict=True)), strict=True)
+    z = np.zeros(RB[0].shape[1])
+    if factor is not None:
+        f = np.sum([b.T @ x for b, x in zip(RB, reactions, strict=True)], axis=0)
+        z = scipy.linalg.cho_solve(factor, f, check_finite=False)
+    w = [b @ z for b in RB]
+    forces = [part.S @ x - y for part, x, y in zip(parts, w, reactions, strict=True)]
+    return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(parts, held, w, strict=True)], forces
 
 
 def position(link: Link, u: Nodal) -> Nodal:
@@ -338,7 +375,7 @@ def position(link: Link, u: Nodal) -> Nodal:
 
 def rounding(links: Sequence[Link]) -> float:
     """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
-    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    sizes = [float(link.one @ link.m1[:, 0]) * link.size**2 for link in links]
     return float(LEAST**2 * sum(sizes))
 
 
@@ -350,11 +387,7 @@ def too_far(links: Sequence[Link]) -> float:
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:
     """A segment's state at the first time point."""
     y = position(link, s.u @ s.R)
-    start = Followed(np.eye(link.d), 0.0, *(np.zeros_like(y) for _ in range(3)))
-    frames = []
-    for frame in frames_of(link):
-        Q, angle = rotation(link, frame.fit, y, start.Q, start.angle)
-        frames.append(replace(start, Q=Q, angle=angle, g=deformation(link, y, Q, angle)))
+    frames = [seen_from(link, frame, y) for frame in frames_of(link)]
     damped = np.zeros((3, *y.shape))
     damped[0] = damping.alpha * (s.Mu @ s.R)
     f, strain = internal_force(link, y, s.R, frames, damped, damping.beta)
@@ -365,7 +398,12 @@ def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) 
 
 
 def internal_force(
-    link: Link, y: Nodal, R: Float[np.ndarray, "d d"], frames: Sequence[Followed], damped: np.ndarray, beta: float
+    link: Link,
+    y: Nodal,
+    R: Float[np.ndarray, "d d"],
+    frames: Sequence[Followed],
+    damped: np.ndarray,
+    beta: float,
 ) -> tuple[Nodal, float]:
     """Internal force of a segment with damping, world components, and its strain energy.
 

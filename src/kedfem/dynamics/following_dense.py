@@ -12,7 +12,7 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
 from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding, too_far
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
@@ -29,13 +29,20 @@ class FollowingDense:
 
     def __init__(
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
-        actions: Sequence[Action] = (),
+        actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.actions = links, joints, scheme, damping, actions
+        self.links, self.joints, self.scheme, self.damping, self.actions = (
+            links,
+            joints,
+            scheme,
+            damping,
+            actions,
+        )
+        self.tolerance = tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.coefficients = np.array([
             c_M, c_K, scheme.alpha_f, scheme.alpha_m, *scheme.acceleration, scheme.h, scheme.h * scheme.gamma,
-            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, CONVERGED,
+            scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, tolerance,
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
@@ -58,13 +65,23 @@ class FollowingDense:
     def begin(self, states: Sequence[LinkState]) -> State:
         """The loop's own state, from link states."""
         D, n, P = self._sizes
-        L, E = len(self.links), self._beams[0].shape[3]
+        L, (b, _, E) = len(self.links), self._beams[3].shape
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
         C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, 3, 3)), np.zeros(L)
-        g, strain, direction, turn = np.zeros((3, L, D * n)), np.zeros((3, L, 3, E)), np.zeros((L, 2, E)), np.zeros((L, E))
+        g, strain, direction, turn = (
+            np.zeros((3, L, D * n)),
+            np.zeros((3, b, 3, E)),
+            np.zeros((b, 2, E)),
+            np.zeros((b, E)),
+        )
         Q[:], direction[:, 0] = np.eye(3), 1.0
-        general = [first_state(*each, s) for *each, s in zip(self.links, self.joints, [self.damping] * L, states, strict=True)]
-        for i, (link, joint, part, s) in enumerate(zip(self.links, self.joints, self.parts, general, strict=True)):
+        general = [
+            first_state(link, joint, self.damping, s)
+            for link, joint, s in zip(self.links, self.joints, states, strict=True)
+        ]
+        for i, (link, joint, part, s) in enumerate(
+            zip(self.links, self.joints, self.parts, general, strict=True)
+        ):
             for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
                 out[i, : link.d, : link.n] = coordinates(link, part, rows)
             for out, rows in ((F, s.F), (f, s.f)):
@@ -73,9 +90,10 @@ class FollowingDense:
                 C[m, i, : link.d, : link.n] = work_on(part, s.damped[m])
             force[i] = self._padded_ports(joint, s.port_forces)
             points = points_of(link)
+            k = np.searchsorted(self._beams[0], i)
             for e, (point, seen) in enumerate(zip(points, s.frames, strict=False)):
-                strain[0, i, :, e] = point.strains @ seen.g.ravel()
-                direction[i, :, e], turn[i, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
+                strain[0, k, :, e] = point.strains @ seen.g.ravel()
+                direction[k, :, e], turn[k, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
             for seen in s.frames if not points else ():
                 Q[i, : link.d, : link.d], angle[i] = seen.Q, seen.angle
                 g[0, i].reshape(D, n)[: link.d, : link.n] = coordinates(link, part, seen.g)
@@ -120,12 +138,12 @@ class FollowingDense:
 
     def _history(self, i: int, forcing: Forcing, history: State, taken: int) -> LinkHistory:
         link, part, held = self.links[i], self.parts[i], self._held(self.joints[i])
-        us, vs, as_, gs, strains, Rs, forces, energies = (x[:taken, i] for x in history)
+        strains, points = history[4][:taken, np.searchsorted(self._beams[0], i) :][:, :1], points_of(link)
+        us, vs, as_, gs, Rs, forces, energies = (x[:taken, i] for x in (*history[:4], *history[5:]))
         u, v, a = (rows_of(link, part, x) for x in (us, vs, as_))
-        points = points_of(link)
         if points:
             share = np.concatenate([point.share.T for point in points])  # (3E, 3n)
-            seen = strains[:, :, : len(points)].transpose(0, 2, 1).reshape(taken, 3 * len(points))
+            seen = strains[:, 0, :, : len(points)].transpose(0, 2, 1).reshape(taken, 3 * len(points))
             g = (seen @ share).reshape(u.shape)
         else:
             g = rows_of(link, part, gs)
@@ -179,18 +197,27 @@ class FollowingDense:
 
     def _points(self) -> State:
         """Rows, tangents and rigidities of the planar beams that know their strains, see `dynamics.beams_kernel`."""
-        every = [points_of(link) for link in self.links]
-        L, E = len(every), max(1, *(len(points) for points in every))
-        rows, tangent, rigidity = np.zeros((L, 3, self._sizes[1], E)), np.zeros((L, 2, E)), np.zeros((L, 3, E))
+        which = np.array([i for i, link in enumerate(self.links) if points_of(link)], int)
+        every = [points_of(self.links[i]) for i in which]
+        b, E = len(which), max([1, *(len(points) for points in every)])
+        rows, tangent, rigidity = (
+            np.zeros((b, 3, E, self._sizes[1])),
+            np.zeros((b, 2, E)),
+            np.zeros((b, 3, E)),
+        )
         tangent[:, 0] = 1.0
-        for i, (link, part, points) in enumerate(zip(self.links, self.parts, every, strict=True)):
+        for k, (i, points) in enumerate(zip(which, every, strict=True)):
+            n, T = self.links[i].n, self.parts[i].T
             for e, point in enumerate(points):
-                of_u, of_psi = point.strains.reshape(3, -1, 3)[:, :, :2], point.strains.reshape(3, -1, 3)[:, :, 2]
-                rows[i, 0, : link.n, e] = part.T[0].T @ of_u[0] @ point.tangent
-                rows[i, 1, : link.n, e] = part.T[2].T @ -of_psi[1]
-                rows[i, 2, : link.n, e] = part.T[2].T @ of_psi[2]
-                tangent[i, :, e], rigidity[i, :, e] = point.tangent, point.rigidity
-        return rows, tangent, rigidity
+                of_u, of_psi = (
+                    point.strains.reshape(3, -1, 3)[:, :, :2],
+                    point.strains.reshape(3, -1, 3)[:, :, 2],
+                )
+                rows[k, 0, e, :n] = T[0].T @ of_u[0] @ point.tangent
+                rows[k, 1, e, :n] = T[2].T @ -of_psi[1]
+                rows[k, 2, e, :n] = T[2].T @ of_psi[2]
+                tangent[k, :, e], rigidity[k, :, e] = point.tangent, point.rigidity
+        return which, rows, tangent, rigidity
 
     def _places(self, link: Link) -> Int[np.ndarray, " x"]:
         """Where the coordinates of a link stand among the padded ones."""

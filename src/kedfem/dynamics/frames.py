@@ -90,9 +90,19 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
     return np.asarray(g)
 
 
-def followed(
-    link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme
-) -> Followed:
+def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
+    """A frame that stands still, within half a turn of the nominal one.
+
+    Parameters
+    ----------
+    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
+    """
+    Q, angle = rotation(link, frame.fit, y, np.eye(link.d), 0.0)
+    g = deformation(link, y, Q, angle)
+    return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
+
+
+def followed(link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme) -> Followed:
     """A frame at the end of a step, rates of g by the scheme's own formulas.
 
     Parameters

@@ -75,17 +75,19 @@ def elastic_energy(i, K, g):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def mean_rotation(i, fit, X, R, u, Q):  # type: ignore[no-untyped-def]
-    """Q of a planar beam's segment in the nominal frame: that of Σ y_a ⊗ fit_a; its angle is not needed."""
-    c, s = 0.0, 0.0
-    for j in range(u.shape[2]):
-        x = X[i, 0, j] + R[i, 0, 0] * u[i, 0, j] + R[i, 1, 0] * u[i, 1, j]
-        y = X[i, 1, j] + R[i, 0, 1] * u[i, 0, j] + R[i, 1, 1] * u[i, 1, j]
-        c += x * fit[i, 0, j] + y * fit[i, 1, j]
-        s += y * fit[i, 0, j] - x * fit[i, 1, j]
-    size = np.sqrt(c * c + s * s)
-    c, s = c / size, s / size
-    Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
+def mean_rotation(which, fit, X, R, u, Q):  # type: ignore[no-untyped-def]
+    """Q of some planar beams in the nominal frame: that of Σ y_a ⊗ fit_a; its angle is not needed."""
+    for i in range(len(which)):
+        if which[i]:
+            c, s = 0.0, 0.0
+            for j in range(u.shape[2]):
+                x = X[i, 0, j] + R[i, 0, 0] * u[i, 0, j] + R[i, 1, 0] * u[i, 1, j]
+                y = X[i, 1, j] + R[i, 0, 1] * u[i, 0, j] + R[i, 1, 1] * u[i, 1, j]
+                c += x * fit[i, 0, j] + y * fit[i, 1, j]
+                s += y * fit[i, 0, j] - x * fit[i, 1, j]
+            size = np.sqrt(c * c + s * s)
+            c, s = c / size, s / size
+            Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
 
 
 @compiled

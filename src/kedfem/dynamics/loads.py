@@ -63,7 +63,9 @@ def _weights(where: str, load: Load, links: Mapping[str, Link]) -> dict[str, Flo
     parts = {key: link for key, link in links.items() if link.name == load.link}
     match load:
         case ForceLoad() if parts:
-            key, weights = on_part(parts, load.link, np.asarray(load.at), lambda x: _point_weights(where, load, x))
+            key, weights = on_part(
+                parts, load.link, np.asarray(load.at), lambda x: _point_weights(where, load, x)
+            )
             return {key: weights}
         case BodyLoad():
             return {key: link.volume for key, link in parts.items()}

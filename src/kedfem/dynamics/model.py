@@ -19,8 +19,17 @@ from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
-from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, rayleigh, time_grid
-
+from kedfem.scene import (
+    Body,
+    Flywheel,
+    ForceLoad,
+    PointMass,
+    RigidBody,
+    Scene,
+    inertia_tensor,
+    rayleigh,
+    time_grid,
+)
 
 T = TypeVar("T")
 
@@ -107,7 +116,11 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
         If a load or body does not fit its link.
     """
     cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
-    links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
+    links = {
+        key: part
+        for name, link in cut.items()
+        for key, part in zip(keys(name, link), link.parts, strict=True)
+    }
     for key, body in scene.bodies.items():
         if body.link in cut:
             on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
@@ -128,9 +141,13 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = {key: _rigid(scene, x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()}
+    links = {
+        key: _rigid(scene, x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()
+    }
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
-    joined = attachments(scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)])
+    joined = attachments(
+        scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)]
+    )
     loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads
@@ -153,7 +170,9 @@ def keys(name: str, link: Segments) -> list[str]:
 
 def _shared(name: str, link: Segments) -> list[SharedCut]:
     key = keys(name, link)
-    return [SharedCut((key[a], key[b]), cut.points, cut.weights) for cut in link.cuts for a, b in [cut.segments]]
+    return [
+        SharedCut((key[a], key[b]), cut.points, cut.weights) for cut in link.cuts for a, b in [cut.segments]
+    ]
 
 
 def moves_with_drive(scene: Scene, name: str) -> bool:
@@ -175,6 +194,14 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
     return replace(
         model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders)
     )
+
+
+def segments(model: Model) -> dict[str, list[Link]]:
+    """The segments of each link by its name; of a link with nominal frame itself."""
+    out: dict[str, list[Link]] = {}
+    for link in model.links:
+        out.setdefault(link.name, []).append(link)
+    return out
 
 
 def on_segment(

@@ -7,16 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acting import first_forces
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
-from kedfem.dynamics.following import FollowingSteps
+from kedfem.dynamics.following import CONVERGED, FREE, FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
+from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
@@ -24,13 +27,14 @@ from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, Stiffe
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
+from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
 
-POINTS = 256  # time points of rigid motion found together
+POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
@@ -55,7 +59,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if following(scene):
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
-        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model))
+        tolerance = FREE if scene.driven is None else CONVERGED
+        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model), tolerance)
     if scene.analysis.stiffening:
         return stiffened_steps(scene, model, scheme)
     if scene.analysis.solver == "literal":
@@ -95,7 +100,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     yield Block(0, start, [history([state]) for state in states])
     state: Any = solver.begin(states)
     length = block_length(model)
-    bridge = _bridge(scene, linkage, along, model)
+    bridge = bridged(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
         for k in range(0, len(motion.t), length):
             part = motion.part(k, k + length)
@@ -111,7 +116,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
 
 
-def _bridge(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
+def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
     """Smaller steps for where those of the analysis do not settle."""
     return Bridge(
         time_grid(scene).step, scene.analysis.rho_inf,
@@ -124,9 +129,9 @@ def _stuck(step: int, part: RigidMotion, stuck: Stuck) -> str:
     """What to do about a step that does not settle."""
     k = stuck.taken
     return (
-        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive angle "
-        f"{np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from sweep to "
-        "sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
+        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
+        f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from "
+        "sweep to sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
     )
 
 
@@ -186,14 +191,32 @@ def first_states(
     moments = instants(model, motion, stresses)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
+        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
+        states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
+        if not any(link.rigid and link.fit is not None for link in model.links):
+            return states
+        turning = motion.omega[0] + initial_twists(scene, linkage)[1]
+        spin = cross_matrix(turning) @ cross_matrix(turning) - cross_matrix(motion.omega[0]) @ cross_matrix(
+            motion.omega[0]
+        )
+        each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
+        return rigid_start(model.links, model.joints, states, each)
     u = quasi_static(model.links, model.joints, moments)
+    if following(scene):
+        u = far_deflected(model.links, model.joints, moments, u)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
     if moments[0].turnings is not None:
         start = [
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
+        ]
+    if following(scene):
+        start = [
+            replace(x, stressed=static_excess(link, x.u, now.R))
+            for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
 

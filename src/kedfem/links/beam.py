@@ -24,7 +24,7 @@ def parent_nodes(nodes: int) -> Float[np.ndarray, " m"]:
 
     There the interpolation of any number of nodes is well conditioned; up to 3 they are equally spaced.
     """
-    within = np.polynomial.legendre.Legendre.basis(nodes - 1).deriv().roots()
+    within = np.asarray(np.polynomial.legendre.Legendre.basis(nodes - 1).deriv().roots(), float)
     out = np.array([-1.0, 1.0, *(within - within[::-1]) / 2])  # symmetric to the last digit
     read_only(out)
     return out
@@ -103,7 +103,7 @@ def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3
     """
     _, dN = shape_functions(r, len(x))
     tangent = dN @ x
-    return np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent)
+    return np.asarray(np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent))
 
 
 def element_stiffness(

@@ -64,7 +64,8 @@ def fibre_row(
     points = [(int(e), float(q)) for e in run for q in _gauss(link)]
     s = np.array([(_on_axis(link, e, q) - start) @ along for e, q in points]) / length
     at = float((_on_axis(link, element, r) - start) @ along / length)
-    nearest = np.sort(np.argsort(np.abs(s - at), kind="stable")[:THROUGH])
+    through = max(THROUGH, len(_gauss(link)))  # no fewer than the element has itself
+    nearest = np.sort(np.argsort(np.abs(s - at), kind="stable")[:through])
     weights = [np.prod([(at - s[k]) / (s[j] - s[k]) for k in nearest if k != j]) for j in nearest]
     out = np.zeros((link.n, 3))
     for j, w in zip(nearest, weights, strict=True):

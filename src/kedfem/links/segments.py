@@ -93,16 +93,18 @@ def segmented(
     if len(parts) < count or None in cuts:
         fewer = sum(cut is not None for cut in cuts) + 1
         raise MeshError(
-            f"links.{link.name}.segments: must be at most {min(fewer, count - 1)} for this mesh, whose elements cannot be "
-            f"divided into more slices across the link, got {count}; take a finer mesh"
+            f"links.{link.name}.segments: must be at most {min(fewer, count - 1)} for this mesh, whose elements cannot "
+            f"be divided into more slices across the link, got {count}; take a finer mesh"
         )
     return Segments(
-        tuple(following(part) for part, _ in parts), tuple(cut for cut in cuts if cut), tuple(n for _, n in parts)
+        tuple(following(part) for part, _ in parts),
+        tuple(cut for cut in cuts if cut),
+        tuple(n for _, n in parts),
     )
 
 
 def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
-    """Unit vector across which a link is cut: between its two joints that are furthest apart, else where it is longest."""
+    """Unit vector across which a link is cut: between the two joints furthest apart, else where it is longest."""
     if len(ends) > 1:
         distance = np.linalg.norm(ends[:, None] - ends, axis=2)
         a, b = np.unravel_index(distance.argmax(), distance.shape)
@@ -120,7 +122,9 @@ def _places(count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval]) 
     return places
 
 
-def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> tuple[Link, Int[np.ndarray, " n"]]:
+def _slice(
+    link: Link, material: Material, elements: Int[np.ndarray, " e"]
+) -> tuple[Link, Int[np.ndarray, " n"]]:
     """A link of some elements of another, and which of its functions they are."""
     used, cells = np.unique(link.cells[elements], return_inverse=True)
     cells = cells.reshape(len(elements), -1)
@@ -142,10 +146,12 @@ def _cut(a: Link, b: Link, number: int) -> Cut | None:
     if not len(here):
         return None
     seats = [
-        facet_seat(part, part.basis.mesh.boundary_facets()[facets]) for part, facets in ((a, here), (b, nearest[here]))
+        facet_seat(part, part.basis.mesh.boundary_facets()[facets])
+        for part, facets in ((a, here), (b, nearest[here]))
     ]
     first = seats[0]
-    points = first.origin + np.concatenate([np.zeros((1, 3)), first.spread[: a.d - 1, None] * first.directions[: a.d - 1]])
+    off = first.spread[: a.d - 1, None] * first.directions[: a.d - 1]
+    points = first.origin + np.concatenate([np.zeros((1, 3)), off])
     return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))
 
 
@@ -208,7 +214,9 @@ def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
     axis : of the link
     """
     parts = [_space_part(link, axis, cell, material) for cell in axis.cells]
-    cuts = [_node_cut(parts[k], parts[k + 1], k, axis.frame[axis.cells[k][1], 0]) for k in range(len(parts) - 1)]
+    cuts = [
+        _node_cut(parts[k], parts[k + 1], k, axis.frame[axis.cells[k][1], 0]) for k in range(len(parts) - 1)
+    ]
     return Segments(tuple(parts), tuple(cuts))
 
 

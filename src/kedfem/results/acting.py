@@ -35,7 +35,8 @@ class Measured:
 
             before = np.zeros(len(self.every)) if block.step == 0 else self.turned
             self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
-            evaluate_all(block.motion.t, *vectors(self.every, block), self.turned, self.table, self.values)
+            x, v = vectors(self.every, block)
+            evaluate_all(block.motion.t, x, v, self.turned, self.table, np.zeros_like(x), self.values)
             self.block = block
         return self.values
 

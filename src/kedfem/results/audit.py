@@ -32,7 +32,11 @@ UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long s
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
-    ("work", ("loads", "supports"), "work done by the loads; by the drive and the other supports"),
+    (
+        "work",
+        ("loads", "supports"),
+        "work done by the loads, motors and springs; by the drive and the other supports",
+    ),
     ("dissipated", ("dissipated",), "energy that damping took"),
     (
         "neglected",
@@ -186,9 +190,15 @@ def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], R
     ]
 
 
-def balance_warning(found: Balance) -> tuple[str, ...]:
-    """A warning where the integration loses or makes energy or momentum."""
-    left = {"energy": found.energy, "momentum": found.linear, "angular momentum": found.angular}
+def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
+    """A warning where the integration loses or makes energy or momentum.
+
+    Parameters
+    ----------
+    stiffened : the run has geometric stiffening, whose work is in the residual too: energy is not judged
+    """
+    energy = {} if stiffened else {"energy": found.energy}
+    left = energy | {"momentum": found.linear, "angular momentum": found.angular}
     said = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
     if not said:
         return ()

@@ -318,7 +318,9 @@ def _rigid_torque(model: Model) -> Recorded:
 
 def _holder(model: Model, name: str, joint: str) -> int:
     """The link of a name, or its segment, that a joint holds."""
-    return next(k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints)
+    return next(
+        k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints
+    )
 
 
 def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:

@@ -18,8 +18,11 @@ SHAPES = {
     "plane": ["bar", "plate_link", "extrusion", "part"],
     "beam": ["bar", "polyline"],
 }
-ELEMENTS = {"solid": ["hex27", "hex20", "hex8"], "plane": ["quad9"],
-            "beam": ["beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]}
+ELEMENTS = {
+    "solid": ["hex27", "hex20", "hex8"],
+    "plane": ["quad9"],
+    "beam": ["beam3", "beam2", "beam4", "beam5", "beam7", "beam9"],
+}
 NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from kedfem.scene.checks import fidelity, link_names
+from kedfem.scene.damping import rayleigh
 from kedfem.scene.frames import default_frames
 from kedfem.scene.initial import SLIDING, TURNING
 from kedfem.scene.links import GROUND
@@ -32,6 +33,9 @@ def frame_faults(parts: Parts) -> Iterator[str]:
     """Frames and segments that do not suit a link or the analysis."""
     if not parts.driven and parts.analysis.word("frames") == "nominal":
         yield parts.analysis.fault("frames", "must be 'following' in a scene without a drive, got 'nominal'")
+    if parts.analysis.raw.get("stiffening") is True and any_following(parts):
+        wanted = "must stand with nominal frames (those that follow know all of it)"
+        yield parts.analysis.fault("stiffening", f"{wanted}, got it with frames that follow")
     if parts.analysis.word("solver") == "literal" and any_following(parts):
         yield parts.analysis.fault("solver", "must be 'condensed' for frames that follow, got 'literal'")
     for link in parts.links.values():
@@ -201,6 +205,23 @@ def undriven_faults(parts: Parts) -> Iterator[str]:
         yield analysis.fault("step", "is required in a scene without a drive [s], got nothing")
     if analysis.word("initial") == "quasi-static":
         yield analysis.fault("initial", "must be 'rest' in a scene without a drive, got 'quasi-static'")
+    drawn = parts.animation.record
+    if drawn is not None and drawn.exaggeration != 1.0:
+        message = "must be 1 in a scene without a drive, which has no motion that it deviates from"
+        yield parts.animation.fault("exaggeration", f"{message}, got {drawn.exaggeration:g}")
     if analysis.has("accuracy"):
         wanted = "must be left out in a scene without a drive (trial runs need one)"
         yield analysis.fault("accuracy", f"{wanted}, got {shown(analysis.raw['accuracy'])}")
+    yield from drag_faults(parts)
+
+
+def drag_faults(parts: Parts) -> Iterator[str]:
+    """Damping in proportion to the mass, where no nominal motion tells the motion that it should leave alone."""
+    damping = parts.damping
+    alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
+    if alpha:
+        key = "ratio" if damping.has("ratio") else "alpha"
+        wanted = f"must be given as beta alone in a scene without a drive, such as beta = {beta:.3g} [s]"
+        yield damping.fault(
+            key, f"{wanted}: alpha resists the motion as a whole, got alpha = {alpha:.3g} 1/s"
+        )

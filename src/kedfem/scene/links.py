@@ -15,6 +15,7 @@ from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
+Element = Literal["hex27", "hex20", "hex8", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
 Count = Annotated[StrictInt, Field(ge=1)]
 
 
@@ -49,9 +50,10 @@ class LinkScene(Record):
     """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
     `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
     reduced: StrictBool = False
-    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for"""
+    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for; with
+    frames that follow each segment does, and beams stay in full"""
     functions: Count | None = None
-    """number of these functions, instead of `analysis.reduction`"""
+    """number of these functions, instead of `analysis.reduction`; with frames that follow of each segment"""
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
@@ -60,8 +62,9 @@ class LinkScene(Record):
     """mass of a rigid slider (a rigid link without a shape)"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
-    element: Literal["hex27", "hex20", "hex8", "quad9", "beam2", "beam3", "beam4", "beam5", "beam7", "beam9"] | None = None
-    """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2, 4, 5, 7, 9: nodes per element) for a beam"""
+    element: Element | None = None
+    """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2, 4, 5, 7, 9: nodes per element) for a
+    beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of the elements of a solid or plane link"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
@@ -71,7 +74,8 @@ class LinkScene(Record):
     frames: Frames | None = None
     """frames of this link, if other than those of the analysis"""
     segments: Count | None = None
-    """number of segments, each with a frame of its own, of a link with frames that follow; of a beam: its elements"""
+    """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given, or
+    as many as its mesh has layers; chosen where `analysis.accuracy` is given; those of a beam are its elements"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
