@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.stability import stability_warning
 from kedfem.analysis import analyse
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import SolveError
@@ -135,11 +136,11 @@ def flight_energy(rho_inf: float, steps: int, h: float = 2e-4) -> np.ndarray:
     return np.array(out[2:]) / out[2]
 
 
-@pytest.mark.parametrize("rho_inf", [0.95, 0.8])
+@pytest.mark.parametrize("rho_inf", [0.95, 0.8, 1.0])
 def test_free_flight_of_a_hundred_thousand_steps_does_not_gain_energy(rho_inf: float) -> None:
     energy = flight_energy(rho_inf, 100_000)
-    assert energy.max() < 1 + 1e-6
-    assert energy[-1] > 0.9
+    assert energy.max() < 1 + 1e-3
+    assert energy.min() > 1 - 1e-3
 
 
 # -- steps that do not settle -------------------------------------------------------------------------------
@@ -153,3 +154,39 @@ def struck(step: float, elements: int, end: float) -> dict[str, Any]:
         "loads": {"F": {"kind": "force", "link": "strip", "at": [0, 0], "vector": [3, 6]}},
         "analysis": {"end_time": end, "step": step, "rho_inf": 0.9},
     }
+
+
+def test_steps_that_do_not_settle_are_taken_in_parts() -> None:
+    """Steps of 2 ms of a strip struck on one end: nearly each in parts, and near to what steps of 0.1 ms find."""
+    coarse, fine = ran(struck(2e-3, 2, 0.06)), ran(struck(1e-4, 2, 0.06))
+    ends = [made.position("strip", [x, 0])[:, :2] for made in (coarse, fine) for x in (0, 1)]
+    way = np.ptp(ends[2], axis=0).max()
+    for rough, exact in zip(ends[:2], ends[2:], strict=True):
+        assert np.abs(rough - exact[::20]).max() < 0.02 * way
+
+
+def test_a_step_that_cannot_be_saved_says_where_and_keeps_what_was_done(tmp_path: Path) -> None:
+    raw = struck(4e-3, 4, 0.2) | {"output": {"folder": str(tmp_path), "plots": False, "picture": False, "animation": False}}
+    message = (
+        r"^analysis: the sweeps of a step must settle, got none that do at step (\d+), t = .* s, drive angle .* deg, not "
+        r"even in 64 parts; link 'strip' moves most .*: give it more elements or segments, take a smaller step, or more "
+        r"numerical damping \(rho_inf\)$"
+    )
+    with pytest.raises(SolveError, match=message) as said:
+        analyse(scene_from(raw))
+    step = int(str(said.value).split("at step ")[1].split(",")[0])
+    kept = read_results(tmp_path / "results.h5")
+    assert len(kept.time) == step > 0
+    assert np.isfinite(kept.time).all()
+
+
+@pytest.mark.parametrize(("rho_inf", "said"), [(0.95, "grows in links that turn"), (0.8, "")])
+def test_links_that_turn_too_far_in_a_step_are_warned_of(rho_inf: float, said: str) -> None:
+    """0.15 rad a step: more than 1 − ρ∞ lets what no step resolves grow, without any damping."""
+    motion = {"kind": "ramp", "speed": 15.0, "time": 1.0}
+    raw = driven(motion, bar([0, 0], [1, 0], (0.02, 0.01), 2), ALLOY, end_time=4.0, step=0.01)
+    raw["analysis"]["rho_inf"] = rho_inf
+    raw["links"]["arm"] |= {"element": "beam3"}
+    warned = stability_warning(scene_from(raw))
+    assert bool(warned) == bool(said)
+    assert all(said in text and "frames that follow" in text for text in warned)
