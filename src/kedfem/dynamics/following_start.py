@@ -24,6 +24,7 @@ from kedfem.links.record import Link, mass_times
 
 SWEEPS = 60
 SETTLED = 1e-10  # change of a sweep, of the deflection
+LEAST = 1e-3  # of a link's size: what counts as a deflection, so that none settles too
 
 
 def far_deflected(
@@ -79,7 +80,8 @@ def _balanced(
         change = [x @ r.T for x, r in zip(solved(parts, rhs, RB, factor)[0], R, strict=True)]
         taken = mixing.step(np.concatenate([x.ravel() for x in change]))
         u = [x + y.reshape(x.shape) for x, y in zip(u, np.split(taken, ends), strict=True)]
-        if max(np.abs(x).max() for x in change) <= SETTLED * max(np.abs(x).max() for x in u):
+        least = LEAST * max((link.full or link).size for link in links)
+        if max(np.abs(x).max() for x in change) <= SETTLED * max(least, *(np.abs(x).max() for x in u)):
             return u
     raise SolveError(
         'analysis.initial: must be a deflection that can be found, got none that settles: take initial = "rest"'
