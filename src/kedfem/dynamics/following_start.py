@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
 
 from kedfem.dynamics.condensed import port_rotation
 from kedfem.dynamics.coupling import Attachment
@@ -11,6 +10,7 @@ from kedfem.dynamics.following import (
     HeldPart,
     Mixing,
     held_part,
+    interface_factor,
     internal_force,
     mean_orientation,
     position,
@@ -75,8 +75,7 @@ def _balanced(
             for link, x, now, S, r in zip(links, u, instant.at, instant.spin, R, strict=True)
         ]
         RB = [port_rotation(joint, r).T @ joint.B for joint, r in zip(joints, R, strict=True)]
-        H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
-        factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
+        factor = interface_factor(parts, RB)
         change = [x @ r.T for x, r in zip(solved(parts, rhs, RB, factor)[0], R, strict=True)]
         taken = mixing.step(np.concatenate([x.ravel() for x in change]))
         u = [x + y.reshape(x.shape) for x, y in zip(u, np.split(taken, ends), strict=True)]

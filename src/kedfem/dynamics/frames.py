@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import Nodal, accelerated
+from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Frame, Link
 
 
@@ -97,19 +96,6 @@ def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
     return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
 
 
-def followed(link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme) -> Followed:
-    """A frame at the end of a step, rates of g by the scheme's own formulas.
-
-    Parameters
-    ----------
-    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
-    before : at the beginning of the step
-    """
-    Q, angle = rotation(link, frame.fit, y, before.angle)
-    g = deformation(link, y, Q, angle)
-    return Followed(Q, angle, g, *accelerated(scheme, g, before.g, before.g1, before.g2))
-
-
 def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:
     """Internal force of a frame in the nominal frame: (∂g/∂y)ᵀ K0 (g + β g'), and its strain energy."""
     Kg = _times(frame.K0, now.g)
@@ -135,10 +121,10 @@ def _times(K: np.ndarray, g: Nodal) -> Nodal:
     return np.asarray((K @ g.ravel()).reshape(g.shape))
 
 
-def stress_deformation(link: Link, frames: Sequence[Frame], now: Sequence[Followed]) -> Nodal:
+def stress_deformation(link: Link, frames: Sequence[Frame], seen: Sequence[Nodal]) -> Nodal:
     """The g from which stresses come: that of a single frame, or of a beam one with the strains that its points see."""
     points = [frame.point for frame in frames if frame.point]
     if not points:
-        return now[0].g
-    strains = (point.share @ (point.strains @ x.g.ravel()) for point, x in zip(points, now, strict=True))
+        return seen[0]
+    strains = (point.share @ (point.strains @ g.ravel()) for point, g in zip(points, seen, strict=True))
     return np.asarray(sum(strains)).reshape(link.n, link.d)
