@@ -79,17 +79,23 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     return [*before, table, *balance, spent]
 
 
-def balance_table(found: Balance, geometric: float) -> Table:
-    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
-    table = Table(title="Balance and geometric error", show_header=False)
+def balance_table(found: Balance, geometric: float | None) -> Table:
+    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend.
+
+    Parameters
+    ----------
+    geometric : estimated error of the peak stress; None where frames follow, which do not err so
+    """
+    table = Table(title="Balance" if geometric is None else "Balance and geometric error", show_header=False)
     for what, share in (
         ("energy, left over by the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
         table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
-    table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
-    table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
+    if geometric is not None:
+        table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
+        table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 
 
