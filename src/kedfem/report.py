@@ -136,7 +136,8 @@ def plan_tables(plan: Plan) -> list[Table]:
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
     mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
-    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "")
+    segments = "" if link.segments is None else f", {link.segments} segments"
+    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "") + segments
 
 
 def reduction_table(reduction: Reduction) -> Table:

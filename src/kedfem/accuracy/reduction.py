@@ -27,6 +27,7 @@ from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
 from kedfem.links.record import Link
+from kedfem.errors import SceneError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -109,7 +110,17 @@ def reduced(
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
     counts : number of functions of links that have it given
+
+    Raises
+    ------
+    SceneError
+        If the drive leaves motions free.
     """
+    if full.linkage.mobility:
+        raise SceneError(
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a motion "
+            f"that the drive prescribes), got {full.linkage.mobility} free"
+        )
     stage("functions")
     parts = static_parts(full.model)
     needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
@@ -148,12 +159,14 @@ def first_reduced(
 ) -> Prepared:
     """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
 
+    None is where the drive leaves motions free.
+
     Parameters
     ----------
     known : functions of links that need not be found any more, link by link
     """
     links = full.model.links
-    if all(link.unknowns <= SMALL and link.full is None for link in links):
+    if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):
         return full
     model = full.model if known is None else reduced_model(full.model, known)
     left = {link.name for link in model.links if link.unknowns > MINUTE and link.full is None}
