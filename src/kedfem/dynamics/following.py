@@ -18,7 +18,6 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
-from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import (
@@ -31,8 +30,10 @@ from kedfem.dynamics.frames import (
     stress_deformation,
 )
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.substructure import Substructure, effective_coefficients, factored
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion
 
