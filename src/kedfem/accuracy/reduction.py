@@ -37,6 +37,7 @@ Stage = Callable[[str], None]
 INSTANTS = 16  # where the linkage is looked at before the first run
 MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
+CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
 ADDED = 8  # functions that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
@@ -117,12 +118,15 @@ def reduced(
         return Reduction(full, {}, tolerance)
     found = bases(full.model, instants(full.model, _training(full)), parts, needed)
     given = counts or {}
-    Q: Functions = [
-        None if basis is None else basis.first(given.get(link.name, _count(link, basis, tolerance)))
-        for link, basis in zip(full.model.links, found, strict=True)
-    ]
+
+    def first(share: float) -> Functions:
+        return [
+            None if basis is None else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
+            for link, basis in zip(full.model.links, found, strict=True)
+        ]
+
     stage("error of the reduction")
-    Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
+    Q, estimate = _settled(full, parts, first, tolerance, chosen, given)
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
 
@@ -163,24 +167,39 @@ def first_reduced(
 
 
 def _settled(
-    full: Prepared, parts: Sequence[Substructure], Q: Functions, tolerance: float, chosen: Collection[str],
-    fixed: Collection[str],
+    full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Functions], tolerance: float,
+    chosen: Collection[str], fixed: Collection[str],
 ) -> tuple[Functions, dict[str, float]]:  # fmt: skip
-    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate."""
-    moments = _moments(full)
+    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate.
+
+    Parameters
+    ----------
+    first : functions to begin with, for a share of the tolerance
+    fixed : names of links whose number of functions is given
+    """
+    moments, Q = _moments(full), first(1.0)
     small, run = _run(full, Q, moments)
-    for left in reversed(range(ROUNDS + 1)):
+    for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)
         richer, better = _run(full, more, moments)
         estimate = {name: CAUTION * error for name, error in relative_errors(run, better).items()}
-        if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or not left:
+        if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or k == ROUNDS:
             break
+        segments = _closer(full.model, Q, first(CLOSER ** (k + 1)), more)
         Q = [
             old if link.name in fixed else new
-            for link, old, new in zip(full.model.links, Q, more, strict=True)
+            for link, old, new in zip(full.model.links, Q, segments, strict=True)
         ]
-        small, run = (richer, better) if not fixed else _run(full, Q, moments)
+        unchanged = all(new is tried for new, tried in zip(Q, more, strict=True))
+        small, run = (richer, better) if unchanged else _run(full, Q, moments)
     return Q, estimate
+
+
+def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
+    """The next functions of segments, of which few count, as long as there are any; else those of the richer run."""
+    lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
+    segments = [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    return [some if ours else more for ours, some, more in zip(segments, next_ones, richer, strict=True)]
 
 
 def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:

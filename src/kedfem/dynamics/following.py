@@ -39,8 +39,8 @@ from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
 PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
-LEAST = 1e-6  # of the links' sizes
-SWEEPS = 15  # in a step, of which it takes 2 to 4
+LEAST, FAR = 1e-6, 100.0  # of the links' sizes
+SWEEPS = 40  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
 FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
@@ -178,7 +178,7 @@ class FollowingSteps:
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
-        self.scale = rounding(links)
+        self.scale, self._too_far = rounding(links), too_far(links)
         self.mixing = Mixing()
         self._acting = acting_on(actions, links)
         self._turned = np.zeros(len(actions))
@@ -224,6 +224,7 @@ class FollowingSteps:
         H = np.sum([b.T @ part.S @ b for part, b in zip(self.parts, RB, strict=True)], axis=0)
         factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
         self.mixing.begin()
+        reached = 0.0
         for sweep in range(SWEEPS):
             now, _ = self._acted(now, at, acting, t)
             rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
@@ -235,7 +236,7 @@ class FollowingSteps:
             ]
             self.sweeps += 1
             tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
-            settled = sum(sizes) <= tolerance**2 * self.scale
+            settled = sum(sizes) <= tolerance**2 * max(self.scale, reached)
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
@@ -245,18 +246,17 @@ class FollowingSteps:
                     zip(states, now, np.split(taken, ends), at, strict=True)
                 )
             ]
-            self.scale = max(
-                self.scale,
-                sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)),
-            )
-            if not np.isfinite(sizes).all():
+            reached = sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True))
+            if not reached <= self._too_far:
                 break
             if settled:
+                self.scale = max(self.scale, reached)
                 now, self._turned = self._acted(now, at, acting, t)
                 return [
                     self._ended(k, s, n, nominal, force)
                     for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
                 ]
+        self.mixing = Mixing()
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
 
     def _acted(
@@ -376,8 +376,13 @@ def position(link: Link, u: Nodal) -> Nodal:
 
 def rounding(links: Sequence[Link]) -> float:
     """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
-    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    sizes = [float(link.one @ link.m1[:, 0]) * link.size**2 for link in links]
     return float(LEAST**2 * sum(sizes))
+
+
+def too_far(links: Sequence[Link]) -> float:
+    """Square of what no step moves, in the same norm: the links' sizes many times over, where sweeps have run away."""
+    return FAR**2 / LEAST**2 * rounding(links)
 
 
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:
