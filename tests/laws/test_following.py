@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
 from kedfem.links.beam import beam_link
 from kedfem.links.beam_axis import straight_axis
-from kedfem.links.record import Frame, Link
+from kedfem.links.record import Link
 from kedfem.links.section import rectangle
-from kedfem.links.segments import Segments, beam_segments, following, segmented, space_segments
+from kedfem.links.segments import Segments, beam_segments, segmented, space_segments
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
 from tests.runs import Ran, ran
@@ -77,7 +77,9 @@ def moved(link: Link, y: np.ndarray, R: np.ndarray, angle: float, shift: np.ndar
     return np.asarray(out)
 
 
-def force(link: Link, y: np.ndarray, R: np.ndarray | None = None, angle: float = 0.0) -> tuple[np.ndarray, float]:
+def force(
+    link: Link, y: np.ndarray, R: np.ndarray | None = None, angle: float = 0.0
+) -> tuple[np.ndarray, float]:
     """Internal force of all frames, which are near R, and the strain energy."""
     total, energy, zero = np.zeros_like(y), 0.0, np.zeros_like(y)
     for frame in frames_of(link):
@@ -155,7 +157,12 @@ def tip_deflection(whole: Segments | Link, load: np.ndarray) -> np.ndarray:
         for number, weights, sign in ((a, cut.weights[0], 1.0), (b, cut.weights[1], -1.0)):
             blocks[number] = sp.kron(sp.csr_array(sign * weights), sp.eye_array(parts[number].d))
         height = len(cut.points) * parts[a].d
-        rows.append([sp.csr_array((height, part.unknowns)) if x is None else x for x, part in zip(blocks, parts, strict=True)])
+        rows.append(
+            [
+                sp.csr_array((height, part.unknowns)) if x is None else x
+                for x, part in zip(blocks, parts, strict=True)
+            ]
+        )
     C = sp.block_array(rows).tocsr() if rows else sp.csr_array((0, first[-1]))
     ends = [end_weights(parts[0], 0.0), end_weights(parts[-1], 1.0)]
     held = np.concatenate([first[0] + d for d in [np.flatnonzero(_held(parts[0]))]])
@@ -262,16 +269,29 @@ def merged(raw: dict[str, Any], changes: dict[str, dict[str, Any]]) -> dict[str,
 def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
     """The source's four-bar at 60 rpm, E and G multiplied, half a turn; settled by its damping."""
     raw: dict[str, Any] = four_bar(
-        {"turns": 0.5, "steps_per_turn": 720, "initial": "rest", **({"frames": "following"} if follow else {})},
+        {
+            "turns": 0.5,
+            "steps_per_turn": 720,
+            "initial": "rest",
+            **({"frames": "following"} if follow else {}),
+        },
         {"mesh": {"elements": 3}},
-        materials={"alloy": {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}},
+        materials={
+            "alloy": {
+                "density": 2796,
+                "youngs_modulus": factor * 7.031e10,
+                "shear_modulus": factor * 2.712e10,
+            }
+        },
         drive={"joint": "A", "motion": {"kind": "ramp", "speed": "60 rpm", "time": 0.3}},
         damping={"ratio": 0.3, "frequencies": [20, 200]},
     ).model_dump(mode="json", exclude_unset=True)
     return raw
 
 
-def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_square_of_their_stiffness() -> None:
+def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_square_of_their_stiffness() -> (
+    None
+):
     apart = []
     for factor in (0.25, 1, 4):
         nominal, free = (ran(slow_four_bar(factor, follow)) for follow in (False, True))
@@ -348,7 +368,11 @@ def flight(kind: str, h: float) -> dict[str, Any]:
         link |= {"beam": kind, "mesh": {"elements": 3}}
     elif kind != "rigid":
         link |= {"mesh": {"elements": [4, 1] if flat else [4, 1, 1]}, "segments": 2}
-    start = {"at": [0.25, 0], "velocity": [1, 2, 0 if flat else 0.5], "spin": [0, 0, 30] if flat else [5, 10, 30]}
+    start = {
+        "at": [0.25, 0],
+        "velocity": [1, 2, 0 if flat else 0.5],
+        "spin": [0, 0, 30] if flat else [5, 10, 30],
+    }
     return {
         "materials": {"m": ALLOY},
         "links": {"arm": link},
