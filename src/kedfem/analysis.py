@@ -17,7 +17,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -29,7 +29,7 @@ from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
-from kedfem.scene import Scene, following, time_grid, turn_steps
+from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
@@ -55,7 +55,7 @@ class Run:
     """What a run leaves: results, files, highest stress, seconds per stage, warnings for the user, choices made.
 
     balance : of energy and momentum, as far as it was kept account of
-    geometric : estimated error of the peak stress because links bend [-]
+    geometric : estimated error of the peak stress because links bend [-]; None where all frames follow
     """
 
     folder: FilePath
@@ -66,7 +66,7 @@ class Run:
     reduction: Reduction | None = None
     plan: Plan | None = None
     balance: Balance | None = None
-    geometric: float = 0.0
+    geometric: float | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -96,19 +96,19 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         "steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch)
     )
     results = read_results(folder / "results.h5")
+    nominal = any(link.fit is None for link in ready.model.links)
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
         *stability_warning(scene),
-        *(() if following(scene) else geometric_warning(geometric)),
+        *(geometric_warning(geometric) if nominal else ()),
         *reduction_warning(reduction),
         *plan_warning(plan),
         *resolution_warnings(frequencies, error),
         *balance_warning(account.balance, scene.analysis.stiffening),
         *warnings,
     )
-    return Run(
-        folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, geometric.estimate
-    )
+    estimate = geometric.estimate if nominal else None
+    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, estimate)
 
 
 @dataclass
@@ -180,6 +180,8 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
+    notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:

@@ -1,5 +1,7 @@
 """Summary tables of a check and of a run, for the terminal."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from rich.table import Table
 from rich.text import Text
@@ -12,7 +14,7 @@ from kedfem.accuracy.study import Measured, Study
 from kedfem.analysis import Run, frame_steps
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, segments
 from kedfem.links.record import Link
 from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
 from kedfem.motion.initial import initial_twists
@@ -77,17 +79,25 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     return [*before, table, *balance, spent]
 
 
-def balance_table(found: Balance, geometric: float) -> Table:
-    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend."""
-    table = Table(title="Balance and geometric error", show_header=False)
+def balance_table(found: Balance, geometric: float | None) -> Table:
+    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend.
+
+    Parameters
+    ----------
+    geometric : estimated error of the peak stress; None where frames follow, which do not err so
+    """
+    table = Table(title="Balance" if geometric is None else "Balance and geometric error", show_header=False)
     for what, share in (
         ("energy, left over by the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
         table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
-    table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
-    table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
+    if geometric is not None:
+        table.add_row(
+            "energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
+        )
+        table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 
 
@@ -126,7 +136,8 @@ def plan_tables(plan: Plan) -> list[Table]:
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
     mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
-    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "")
+    segments = "" if link.segments is None else f", {link.segments} segments"
+    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "") + segments
 
 
 def reduction_table(reduction: Reduction) -> Table:
@@ -158,10 +169,11 @@ def _links(model: Model) -> Table:
     table = Table(title="Links")
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
-    for link in model.links:
-        table.add_row(
-            link.name, _kind(link), str(len(link.cells)), str(link.unknowns), _mass(link), _quality(link)
+    for name, parts in segments(model).items():
+        elements, unknowns = (
+            str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
         )
+        table.add_row(name, _kind(parts), elements, unknowns, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
     for slider in model.sliders:
@@ -178,25 +190,35 @@ def _links(model: Model) -> Table:
     return table
 
 
-def _kind(link: Link) -> str:
+def _kind(parts: Sequence[Link]) -> str:
     """Its elements, and what was made of them."""
-    if link.rigid:
-        return "rigid"
-    return ELEMENTS[link.cell_type] + (f", {link.n} functions" if link.full else "")
+    first, functions = parts[0], [link.n for link in parts]
+    kind = "rigid" if first.rigid else ELEMENTS[first.cell_type]
+    if first.fit is not None and not first.rigid:
+        kind += f", {len(parts)} segments that follow" if len(parts) > 1 else ", 1 segment that follows"
+    elif first.fit is not None:
+        kind += ", following"
+    if first.full and not first.rigid:
+        low, high = min(functions), max(functions)
+        kind += f", {low} functions" if low == high else f", {low} to {high} functions"
+        kind += " each" if len(parts) > 1 else ""
+    return kind
 
 
-def _mass(link: Link) -> str:
-    return f"{float(link.one @ link.m1[:, 0]):.4g} kg"
+def _mass(*parts: Link) -> str:
+    return f"{sum(float(link.one @ link.m1[:, 0]) for link in parts):.4g} kg"
 
 
-def _quality(link: Link) -> str:
+def _quality(*parts: Link) -> str:
     """The worst scaled Jacobian of a meshed link."""
-    link = link.full or link
-    if not link.meshed:
+    full = [link.full or link for link in parts]
+    if not full[0].meshed:
         return "-"
-    plane = link.kind == "plane"
-    mesh = QuadMesh(link.X, link.cells, link.thickness) if plane else HexMesh(link.X, link.cells)
-    return f"{mesh_quality(mesh).least:.2f}"
+    meshes = [
+        QuadMesh(link.X, link.cells, link.thickness) if link.kind == "plane" else HexMesh(link.X, link.cells)
+        for link in full
+    ]
+    return f"{min(mesh_quality(mesh).least for mesh in meshes):.2f}"
 
 
 def _motion(ready: Prepared) -> Table:
@@ -264,7 +286,10 @@ def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []
     v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
-    speeds = [f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s" for s, w in zip(v, omega, strict=True)]
+    speeds = [
+        f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s"
+        for s, w in zip(v, omega, strict=True)
+    ]
     return [(f"link {x} starts with", y) for x, y in zip(ready.linkage.bodies[1:], speeds[1:], strict=True)]
 
 

@@ -24,6 +24,7 @@ MODULES = (
     "kinematics",
     "mechanisms",
     "nominal_frames",
+    "following",
 )
 
 

@@ -4,9 +4,12 @@ The estimate: the residual of the reduced run in the full equation, at some mome
 the full linkage; these are added to the functions, and the run is repeated. What changes, times a factor found on full
 runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
 tolerance, the richer functions are kept and the same is done again.
+
+Of links with frames that follow each segment is reduced, with functions that nominal frames give; the runs that estimate
+the error have frames that follow. Of the residual in their frames only what moments do in turning these is left out.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,13 +18,16 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.cache import kept
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.condensed import Substructure
+from kedfem.dynamics.bases import bases
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
-from kedfem.dynamics.reduction import bases, enriched, static_parts
+from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
+from kedfem.dynamics.substructure import Substructure
 from kedfem.dynamics.transient import instants
+from kedfem.errors import SceneError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -32,10 +38,12 @@ Stage = Callable[[str], None]
 INSTANTS = 16  # where the linkage is looked at before the first run
 MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
+CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
 ADDED = 8  # functions that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
 FIRST = 0.1  # of the tolerance: what the first functions leave out of the training deflections' energy norm
+SEGMENT = 1.0  # the same of segments, whose functions are sorted by what they are needed for
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
 
@@ -102,63 +110,113 @@ def reduced(
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
     counts : number of functions of links that have it given
+
+    Raises
+    ------
+    SceneError
+        If the drive leaves motions free.
     """
+    if full.linkage.mobility:
+        raise SceneError(
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a motion "
+            f"that the drive prescribes), got {full.linkage.mobility} free"
+        )
     stage("functions")
     parts = static_parts(full.model)
-    needed = [link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL]
+    needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
+    needed &= reducible(full.model)
+    if not needed:
+        return Reduction(full, {}, tolerance)
     found = bases(full.model, instants(full.model, _training(full)), parts, needed)
     given = counts or {}
-    Q: Functions = [
-        None if basis is None else basis.first(given.get(link.name, basis.count(FIRST * tolerance)))
-        for link, basis in zip(full.model.links, found, strict=True)
-    ]
+
+    def first(share: float) -> Functions:
+        return [
+            None
+            if basis is None
+            else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
+            for link, basis in zip(full.model.links, found, strict=True)
+        ]
+
     stage("error of the reduction")
-    Q, estimate = _settled(full, parts, Q, tolerance, chosen, fixed=given)
+    Q, estimate = _settled(full, parts, first, tolerance, chosen, given)
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
 
 
+def reducible(model: Model) -> set[str]:
+    """Names of the links that can be reduced: not beams with frames that follow, which are elements of few functions."""
+    return {link.name for link in model.links if link.fit is None or link.meshed}
+
+
+def _count(link: Link, basis: Basis, tolerance: float) -> int:
+    """How many functions serve a tolerance to begin with."""
+    return basis.count((FIRST if link.fit is None else SEGMENT) * tolerance)
+
+
 def first_reduced(
-    full: Prepared, tolerance: float, known: Mapping[str, Float[np.ndarray, "_ _"]] | None = None
+    full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
     """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
 
+    None is where the drive leaves motions free.
+
     Parameters
     ----------
-    known : functions of links that need not be found any more
+    known : functions of links that need not be found any more, link by link
     """
     links = full.model.links
-    if all(link.unknowns <= SMALL and link.full is None for link in links):
+    if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):
         return full
-    given = [None if known is None else known.get(link.name) for link in links]
-    model = reduced_model(full.model, given)
-    left = [link.name for link in model.links if link.unknowns > MINUTE and link.full is None]
+    model = full.model if known is None else reduced_model(full.model, known)
+    left = {link.name for link in model.links if link.unknowns > MINUTE and link.full is None}
+    left &= reducible(model)
     if not left:
         return replace(full, model=model)
     found = bases(model, instants(model, _training(full)), static_parts(model), only=left)
-    Q = [None if basis is None else basis.first(basis.count(FIRST * tolerance)) for basis in found]
+    Q = [
+        None if basis is None else basis.first(_count(link, basis, tolerance))
+        for link, basis in zip(model.links, found, strict=True)
+    ]
     return replace(full, model=reduced_model(model, Q))
 
 
 def _settled(
-    full: Prepared, parts: Sequence[Substructure], Q: Functions, tolerance: float, chosen: Collection[str],
-    fixed: Collection[str],
+    full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Functions], tolerance: float,
+    chosen: Collection[str], fixed: Collection[str],
 ) -> tuple[Functions, dict[str, float]]:  # fmt: skip
-    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate."""
-    moments = _moments(full)
+    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate.
+
+    Parameters
+    ----------
+    first : functions to begin with, for a share of the tolerance
+    fixed : names of links whose number of functions is given
+    """
+    moments, Q = _moments(full), first(1.0)
     small, run = _run(full, Q, moments)
-    for left in reversed(range(ROUNDS + 1)):
+    for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)
         richer, better = _run(full, more, moments)
         estimate = {name: CAUTION * error for name, error in relative_errors(run, better).items()}
-        if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or not left:
+        if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or k == ROUNDS:
             break
+        segments = _closer(full.model, Q, first(CLOSER ** (k + 1)), more)
         Q = [
             old if link.name in fixed else new
-            for link, old, new in zip(full.model.links, Q, more, strict=True)
+            for link, old, new in zip(full.model.links, Q, segments, strict=True)
         ]
-        small, run = (richer, better) if not fixed else _run(full, Q, moments)
+        unchanged = all(new is tried for new, tried in zip(Q, more, strict=True))
+        small, run = (richer, better) if unchanged else _run(full, Q, moments)
     return Q, estimate
+
+
+def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
+    """The next functions of segments, of which few count, as long as there are any; else those of the richer run."""
+    lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
+    segments = (
+        [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    )
+    return [some if ours else more for ours, some, more in zip(segments, next_ones, richer, strict=True)]
 
 
 def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:

@@ -80,12 +80,12 @@ class Trials:
 
     def _reduced(self, full: Prepared) -> Prepared:
         """With the functions of links that an earlier trial had too: the difference is then of the others alone."""
-        texts = {link.name: _text(full.scene, link.name) for link in full.model.links}
-        known = {name: self.functions[text] for name, text in texts.items() if text in self.functions}
-        ready = first_reduced(full, TRIAL * self.asked, known)
-        for link in ready.model.links:
+        texts = _texts(full)
+        known = [self.functions.get(text) for text in texts]
+        ready = first_reduced(full, TRIAL * self.asked, known if any(Q is not None for Q in known) else None)
+        for link, text in zip(ready.model.links, texts, strict=True):
             if link.Q is not None and not link.rigid:
-                self.functions[texts[link.name]] = link.Q
+                self.functions[text] = link.Q
         return ready
 
 
@@ -97,6 +97,13 @@ def shortened(scene: Scene) -> Scene:
     return with_analysis(
         scene, end_time=TRIAL_STEPS * grid.step, turns=None, step=grid.step, steps_per_turn=None
     )
+
+
+def _texts(full: Prepared) -> list[str]:
+    """All that the functions of each link of a model depend on, or of each segment."""
+    names = [link.name for link in full.model.links]
+    number = [f"{names[:k].count(name)} of {names.count(name)}" for k, name in enumerate(names)]
+    return [f"{_text(full.scene, name)} {place}" for name, place in zip(names, number, strict=True)]
 
 
 def _text(scene: Scene, name: str) -> str:

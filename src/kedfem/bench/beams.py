@@ -77,6 +77,6 @@ _NOTE = (
     f"The source's four-bar from rest at 600 rpm, 2 % damping, {TURNS} turns. Error: largest difference of the stress "
     "on the outer side of the rocker's midpoint over all time, of its peak. First table: against 2 elements of 9 nodes a "
     f"link, all with {STEPS:,} steps a turn, each equation against itself. Second table: 2 elements of 9 nodes against "
-    "the same with twice as many steps as the last line; of second order. A step: median of the loop alone, compiled, rigid "
-    "motion and loads known.",
+    "the same with twice as many steps as the last line; of second order. A step: median of the loop alone, compiled, "
+    "rigid motion and loads known.",
 )

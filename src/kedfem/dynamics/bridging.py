@@ -1,7 +1,7 @@
 """Steps with frames that follow, taken in parts where their sweeps do not settle."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.following import FollowingSteps, NotConverged
 from kedfem.dynamics.following_dense import FollowingDense
-from kedfem.dynamics.history import LinkHistory
+from kedfem.dynamics.history import LinkHistory, joined
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.motion.rigid import RigidMotion
 
@@ -101,14 +101,3 @@ class Bridge:
                 solver.links, solver.joints, scheme, solver.damping, solver.actions, solver.tolerance
             )
         return self.finer[level]
-
-
-def joined(parts: Sequence[list[LinkHistory]]) -> list[LinkHistory]:
-    """Histories of the links over successive time points, one after the other."""
-    if len(parts) < 2:
-        return parts[0] if parts else []
-    names = [each.name for each in fields(LinkHistory) if each.name != "products"]
-    return [
-        LinkHistory(**{name: np.concatenate([getattr(x, name) for x in each]) for name in names})
-        for each in zip(*parts, strict=True)
-    ]

@@ -16,6 +16,7 @@ LINK_BYTES, ASSEMBLY_BYTES = (
     1.5e4,
 )  # times N: kept for each link; for one link at a time while it is assembled
 PLANE_FILL = 0.1  # of that a plane mesh has, from 18,000 to 240,000 unknowns
+SWEEPS = 4.0  # times the work of a step with nominal frames, where frames follow
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
@@ -40,6 +41,8 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     step = (LOOP if small else OVERHEAD) + float(
         (SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()
     ) / bandwidth
+    if any(link.fit is not None for link in model.links):
+        step *= SWEEPS
     return Cost(
         factor=FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=time_grid(scene).steps * step,

@@ -18,11 +18,11 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
-from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, seen_from, stress_deformation
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.stacks import (
     Each,
@@ -36,13 +36,15 @@ from kedfem.dynamics.stacks import (
     stacks,
 )
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Rayleigh, accelerated
+from kedfem.dynamics.substructure import Substructure, effective_coefficients, factored
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
 SAME = 1e-8  # pairs that repeat each other
-LEAST = 1e-6  # of the links' sizes
-SWEEPS = 15  # in a step, of which it takes 2 to 4
+PATIENCE, EASIER = 12, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
+LEAST, FAR = 1e-6, 100.0  # of the links' sizes
+SWEEPS = 40  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
 FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
@@ -231,7 +233,7 @@ class FollowingSteps:
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
-        self.scale = rounding(links)
+        self.scale, self._too_far = rounding(links), too_far(links)
         self.mixing, self.stacks = Mixing(), stacks(links)
         self._acting = acting_on(actions, links)
         self._turned = np.zeros(len(actions))
@@ -284,14 +286,15 @@ class FollowingSteps:
         RB = self._interface(frames)
         factor = interface_factor(self.parts, RB)
         self.mixing.begin()
-        sizes = np.zeros(len(self.links))
-        for _ in range(SWEEPS):
+        sizes, moved = np.zeros(len(self.links)), 0.0
+        for sweep in range(SWEEPS):
             now, _ = self._acted(now, before, F, acting, t)
             change, forces = self._asked(before, now, frames, RB, factor)
             for stack, x in zip(self.stacks, change, strict=True):
                 sizes[list(stack.members)] = stack.dots(x, stack.lumped * x)
             self.sweeps += 1
-            settled = sizes.sum() <= self.tolerance**2 * self.scale
+            tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
+            settled = sizes.sum() <= tolerance**2 * max(self.scale, moved)
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
@@ -300,12 +303,13 @@ class FollowingSteps:
                 for stack, s, n, x, r in zip(self.stacks, before, now, np.split(taken, ends), R, strict=True)
             ]
             moved = sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, before, strict=True))
-            self.scale = max(self.scale, moved)
-            if not np.isfinite(sizes).all():
+            if not moved <= self._too_far:
                 break
             if settled:
+                self.scale = max(self.scale, moved)
                 now, self._turned = self._acted(now, before, F, acting, t)
                 return self._ended(state, now, R, frames, forces)
+        self.mixing = Mixing()
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
 
     def _interface(self, frames: Sequence[Each]) -> list[NodalOf]:
@@ -372,9 +376,8 @@ class FollowingSteps:
             return R
         if not stack.points:
             return np.asarray(R @ now.frames[0].Q)
-        upright = np.broadcast_to(np.eye(R.shape[1]), R.shape)
         y = stack.X + stack.turned(now.u, R)
-        return np.asarray(R @ rotations(stack, stack.fit, y, upright, np.zeros(len(R)))[0])
+        return np.asarray(R @ rotations(stack, stack.fit, y, np.zeros(len(R)))[0])
 
     def _moved(self, stack: Stack, s: StackState, now: StackState, change: Rows, R: Each) -> StackState:
         """A state of the end of the step moved by a change of δ, with all that a sweep needs to know of it."""
@@ -400,7 +403,7 @@ class FollowingSteps:
             return (), Kg, 0.5 * stack.dots(g, Kg)
         f, strain, frames = np.zeros_like(y), np.zeros(len(stack.members)), []
         for fit, times, s in zip(stack.fits, stack.stiffness, before, strict=True):
-            Q, angle = rotations(stack, fit, y, s.Q, s.angle)
+            Q, angle = rotations(stack, fit, y, s.angle)
             g = deformations(stack, y, Q, angle)
             Kg = times(g)
             # K0 is constant, so that K0 g' follows from K0 g by the formulas of g' itself
@@ -463,7 +466,7 @@ def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float
     """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
     if link.fit is None:
         return R
-    return R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0]
+    return R @ rotation(link, link.fit, position(link, u @ R), 0.0)[0]
 
 
 def interface_factor(parts: Sequence[HeldPart], RB: Sequence[NodalOf]) -> tuple[np.ndarray, bool] | None:
@@ -510,8 +513,13 @@ def position(link: Link, u: Nodal) -> Nodal:
 
 def rounding(links: Sequence[Link]) -> float:
     """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
-    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    sizes = [float(link.one @ link.m1[:, 0]) * link.size**2 for link in links]
     return float(LEAST**2 * sum(sizes))
+
+
+def too_far(links: Sequence[Link]) -> float:
+    """Square of what no step moves, in the same norm: the links' sizes many times over, where sweeps have run away."""
+    return FAR**2 / LEAST**2 * rounding(links)
 
 
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -77,6 +78,18 @@ class LinkHistory:
         """Some of the time points, without products."""
         names = [each.name for each in fields(self) if each.name != "products"]
         return LinkHistory(**{name: getattr(self, name)[which] for name in names})
+
+
+def joined(parts: Sequence[list[LinkHistory]]) -> list[LinkHistory]:
+    """Histories of all links over successive time points, one after the other, without products."""
+    if len(parts) < 2:
+        return parts[0] if parts else []
+    names = [each.name for each in fields(LinkHistory) if each.name != "products"]
+    every: list[dict[str, Any]] = [
+        {name: np.concatenate([getattr(x, name) for x in each]) for name in names}
+        for each in zip(*parts, strict=True)
+    ]
+    return [LinkHistory(**each) for each in every]
 
 
 @dataclass(frozen=True, slots=True)

@@ -196,6 +196,14 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
     )
 
 
+def segments(model: Model) -> dict[str, list[Link]]:
+    """The segments of each link by its name; of a link with nominal frame itself."""
+    out: dict[str, list[Link]] = {}
+    for link in model.links:
+        out.setdefault(link.name, []).append(link)
+    return out
+
+
 def on_segment(
     model: Model, name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
 ) -> tuple[int, T]:

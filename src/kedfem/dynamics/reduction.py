@@ -5,18 +5,19 @@ vibration modes that this deflection excites (Lanczos steps K⁻¹ M on the whol
 later. Taken apart into scalar components and sorted by strain energy, the first few of them make the basis.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Rotation, Substructure, coupled, factored
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
+from kedfem.dynamics.substructure import Substructure, coupled, factored
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import (
     mass_orthonormal,
@@ -53,28 +54,6 @@ class Basis:
         """How many functions leave out no more than a part of the strain-energy norm."""
         left = np.sqrt(np.cumsum((self.weights**2)[::-1])[::-1])
         return int(self.needed.shape[1] + np.count_nonzero(left > tolerance))
-
-
-def bases(
-    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure],
-    only: Collection[str] | None = None,
-) -> list[Basis | None]:  # fmt: skip
-    """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
-
-    Parameters
-    ----------
-    parts : `static_parts` of the model
-    only : names of the links that need one; all if not given
-    """
-    deflections: list[list[NodalOf]] = [[] for _ in model.links]
-    for instant in instants:
-        for kept, found in zip(deflections, excited(model, parts, instant), strict=True):
-            kept.extend(found)
-    return [
-        energy_sorted(link, port_functions(link, joint, part), found)
-        if only is None or link.name in only else None
-        for link, joint, part, found in zip(model.links, model.joints, parts, deflections, strict=True)
-    ]  # fmt: skip
 
 
 def static_parts(model: Model) -> list[Substructure]:
@@ -160,9 +139,9 @@ def energy_sorted(
     S = np.concatenate(deflections, axis=1)
     rigid = mass_orthonormal(link, rigid_functions(link))
     S, E = (x - rigid @ (rigid.T @ np.asarray(link.mass[0] @ x)) for x in (S, ports))
-    E = _orthonormal(E, H, 1e-10)[0]
+    E = orthonormal(E, H, 1e-10)[0]
     S = S - E @ (E.T @ np.asarray(H @ S))
-    functions, weights = _orthonormal(S, H, INDEPENDENT)
+    functions, weights = orthonormal(S, H, INDEPENDENT)
     size = np.sqrt((weights**2).sum()) or 1.0
     return Basis(np.concatenate([rigid, E], axis=1), functions, weights / size)
 
@@ -180,10 +159,10 @@ def enriched(
     full, Q = link.full or link, on_functions(link)
     H = energy_product(full)
     S = np.concatenate(deflections, axis=1)
-    own = _orthonormal(Q, H, INDEPENDENT)[0]
+    own = orthonormal(Q, H, INDEPENDENT)[0]
     S = S - Q @ (Q.T @ np.asarray(full.mass[0] @ S))
     S = S - own @ (own.T @ np.asarray(H @ S))
-    return np.concatenate([Q, _orthonormal(S, H, 1e-10)[0][:, :most]], axis=1)
+    return np.concatenate([Q, orthonormal(S, H, 1e-10)[0][:, :most]], axis=1)
 
 
 def energy_product(link: Link) -> sp.csr_array:
@@ -201,7 +180,7 @@ def port_functions(link: Link, joint: Attachment, part: Substructure) -> Float[n
     return out
 
 
-def _orthonormal(
+def orthonormal(
     S: Float[np.ndarray, "n k"], H: sp.csr_array, least: float
 ) -> tuple[Float[np.ndarray, "n f"], Float[np.ndarray, " f"]]:
     """Principal functions of S in the product H, and their weights; those below `least` of the first's energy go."""

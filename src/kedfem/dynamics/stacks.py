@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.frames import SETTLED, TURNS, Followed, frames_of
+from kedfem.dynamics.frames import Followed, frames_of
 from kedfem.links.record import Link
 
 Rows = Float[np.ndarray, "N d"]
@@ -163,25 +163,22 @@ def first_frames(stack: Stack, every: Sequence[tuple[Followed, ...]]) -> tuple[S
 
 
 def rotations(
-    stack: Stack, fit: Rows, y: Rows, before: Each, angle: Float[np.ndarray, " s"]
+    stack: Stack, fit: Rows, y: Rows, angle: Float[np.ndarray, " s"]
 ) -> tuple[Each, Float[np.ndarray, " s"]]:
     """`frames.rotation` of all segments."""
     A = stack.moments(y, fit)
     if stack.planar:
         turn = np.arctan2(A[:, 1, 0] - A[:, 0, 1], A[:, 0, 0] + A[:, 1, 1])
         turn += 2 * np.pi * np.round((angle - turn) / (2 * np.pi))
-        Q = np.zeros_like(before)
+        Q = np.zeros((len(turn), y.shape[1], y.shape[1]))
         Q[:, -1, -1] = 1.0
         cos, sin = np.cos(turn), np.sin(turn)
         Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1] = cos, -sin, sin, cos
         return Q, turn
-    Q = before
-    for _ in range(TURNS):
-        turn = _axial_solved(Q.transpose(0, 2, 1) @ A, None)
-        Q = Q @ _turned(turn)
-        if np.abs(turn).max() <= SETTLED:
-            break
-    return Q, np.zeros(len(Q))
+    left, _, right = np.linalg.svd(A)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    Q = left @ right
+    return Q @ _turned(_axial_solved(Q.transpose(0, 2, 1) @ A, None)), np.zeros(len(Q))
 
 
 def deformations(stack: Stack, y: Rows, Q: Each, angle: Float[np.ndarray, " s"]) -> Rows:

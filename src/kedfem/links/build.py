@@ -35,6 +35,8 @@ from kedfem.scene import (
     spatial_beams,
 )
 
+SEGMENTS = 6  # of a solid or plane link with frames that follow, where none are given
+
 
 def bare_links(scene: Scene) -> dict[str, Link]:
     """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
@@ -101,9 +103,26 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case _:
             joints = [joint for joint in scene.joints.values() if name in joint.links]
             ends = np.array([joint.at for joint in joints]).reshape(-1, 3)
-            return segmented(
-                link, material, given.segments or 1, ends, _whole(scene, name, link, along(link, ends))
-            )
+            whole = _whole(scene, name, link, along(link, ends))
+            if given.segments is not None:
+                return segmented(link, material, given.segments, ends, whole)
+            return _usual_segments(link, material, ends, whole)
+
+
+def _usual_segments(
+    link: Link, material: Material, ends: Float[np.ndarray, "p 3"], whole: list[Interval]
+) -> Segments:
+    """SEGMENTS of a link, or as many as its mesh can be divided into.
+
+    Their error falls with the square of their number: 6 leave 1 to 2 % of the peak stress of links that bend by 2 % of
+    their length (docs/theory.md).
+    """
+    for count in range(SEGMENTS, 1, -1):
+        try:
+            return segmented(link, material, count, ends, whole)
+        except MeshError:
+            continue
+    return segmented(link, material, 1, ends, whole)
 
 
 def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:

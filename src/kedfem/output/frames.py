@@ -11,6 +11,24 @@ from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von
 from kedfem.output.vtu import LinkField
 
 
+def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
+    """Segments of one link as one field; at a cut both sides keep their own nodes and stresses."""
+    out: dict[str, list[LinkField]] = {}
+    for field in fields:
+        out.setdefault(field.name, []).append(field)
+    return [each[0] if len(each) == 1 else _one(each) for each in out.values()]
+
+
+def _one(parts: Sequence[LinkField]) -> LinkField:
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    cells = np.concatenate([part.cells + n0 for part, n0 in zip(parts, first, strict=False)])
+    points, displacement, stress, von = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("points", "displacement", "stress", "von_mises")
+    )
+    return LinkField(parts[0].name, parts[0].cell_type, cells, points, displacement, stress, von)
+
+
 def link_fields(
     model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, exaggeration: float
 ) -> list[LinkField]:
@@ -44,4 +62,4 @@ def link_fields(
         none = np.zeros((len(X), 6))
         name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
         fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0]))
-    return fields
+    return _joined(fields)

@@ -65,7 +65,7 @@ class Animation(Record):
     frames_per_turn: Count = 36
     """frames in a turn; in the whole analysis if the drive has no turns, or there is none"""
     exaggeration: Positive = 1.0
-    """factor on the elastic displacement"""
+    """factor on the elastic displacement; 1 in a scene without a drive"""
     last_turns: Positive | None = None
     """only so many turns, the last ones; all if not given"""
 

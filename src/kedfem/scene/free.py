@@ -205,6 +205,10 @@ def undriven_faults(parts: Parts) -> Iterator[str]:
         yield analysis.fault("step", "is required in a scene without a drive [s], got nothing")
     if analysis.word("initial") == "quasi-static":
         yield analysis.fault("initial", "must be 'rest' in a scene without a drive, got 'quasi-static'")
+    drawn = parts.animation.record
+    if drawn is not None and drawn.exaggeration != 1.0:
+        message = "must be 1 in a scene without a drive, which has no motion that it deviates from"
+        yield parts.animation.fault("exaggeration", f"{message}, got {drawn.exaggeration:g}")
     if analysis.has("accuracy"):
         wanted = "must be left out in a scene without a drive (trial runs need one)"
         yield analysis.fault("accuracy", f"{wanted}, got {shown(analysis.raw['accuracy'])}")
@@ -218,4 +222,6 @@ def drag_faults(parts: Parts) -> Iterator[str]:
     if alpha:
         key = "ratio" if damping.has("ratio") else "alpha"
         wanted = f"must be given as beta alone in a scene without a drive, such as beta = {beta:.3g} [s]"
-        yield damping.fault(key, f"{wanted}: alpha resists the motion as a whole, got alpha = {alpha:.3g} 1/s")
+        yield damping.fault(
+            key, f"{wanted}: alpha resists the motion as a whole, got alpha = {alpha:.3g} 1/s"
+        )

@@ -50,9 +50,10 @@ class LinkScene(Record):
     """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
     `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
     reduced: StrictBool = False
-    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for"""
+    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for; with
+    frames that follow each segment does, and beams stay in full"""
     functions: Count | None = None
-    """number of these functions, instead of `analysis.reduction`"""
+    """number of these functions, instead of `analysis.reduction`; with frames that follow of each segment"""
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
@@ -73,7 +74,8 @@ class LinkScene(Record):
     frames: Frames | None = None
     """frames of this link, if other than those of the analysis"""
     segments: Count | None = None
-    """number of segments, each with a frame of its own, of a link with frames that follow; of a beam: its elements"""
+    """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given,
+    or as many as its mesh has layers; chosen where `analysis.accuracy` is given; those of a beam are its elements"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:

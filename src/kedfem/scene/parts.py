@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from kedfem.scene.analysis import Analysis, Probe
+from kedfem.scene.analysis import Analysis, Animation, Probe
 from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive
 from kedfem.scene.faults import line
@@ -31,6 +31,7 @@ TYPES: dict[str, Any] = {
     "drive": Drive,
     "damping": Damping,
     "analysis": Analysis,
+    "animation": Animation,
 }
 
 
@@ -98,6 +99,7 @@ class Parts:
     drive: Entry
     damping: Entry
     analysis: Entry
+    animation: Entry
     gravity: tuple[float, ...]
     materials: list[str]
     folder: Path
@@ -118,9 +120,9 @@ def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
     }
 
 
-def single(section: str, raw: Any) -> Entry:
+def single(section: str, raw: Any, *above: str) -> Entry:
     """A section that is one table."""
-    return Entry((section,), raw if isinstance(raw, Mapping) else {}, good(section, raw))
+    return Entry((*above, section), raw if isinstance(raw, Mapping) else {}, good(section, raw))
 
 
 def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path) -> Parts:
@@ -138,6 +140,9 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
         damping=single("damping", raw.get("damping")),
         analysis=single("analysis", raw.get("analysis")),
+        animation=single(
+            "animation", output.get("animation") if isinstance(output, Mapping) else None, "output"
+        ),
         gravity=gravity,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
         folder=folder,

@@ -28,7 +28,8 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     known = {section: _entries(section, table) for section, table in tables.items()}
     probes = _entries("probes", scene.output.probes, "output")
     parts = Parts(
-        **known, probes=probes, drive=NONE, damping=NONE, analysis=NONE, gravity=scene.gravity, materials=[], folder=scene.folder
+        **known, probes=probes, drive=NONE, damping=NONE, analysis=NONE, animation=NONE,
+        gravity=scene.gravity, materials=[], folder=scene.folder,
     )  # fmt: skip
     return spatial_names(parts)
 
@@ -43,7 +44,9 @@ def _entries(section: str, records: Mapping[str, Any], *above: str) -> dict[str,
 
 def spatial_names(parts: Parts) -> frozenset[str]:
     """The same of a scene under validation, as far as its parts are good."""
-    beams = {link.name: link for link in parts.links.values() if fidelity(link) == "beam"}
+    beams = {
+        link.name: link for link in parts.links.values() if fidelity(link) == "beam" or _rigid_line(link)
+    }
     free = {name: link.word("beam") for name, link in beams.items()}
     found = {
         name for name, kind in free.items() if kind == "spatial" or (kind is None and any(obstacles(parts, name)))
@@ -51,6 +54,11 @@ def spatial_names(parts: Parts) -> frozenset[str]:
     while more := {n for n, kind in free.items() if kind is None and welded(parts, n) & found} - found:
         found |= more
     return frozenset(found)
+
+
+def _rigid_line(link: Entry) -> bool:
+    """Whether a link is a rigid polyline, which has a beam's record."""
+    return fidelity(link) == "rigid" and isinstance(getattr(link.record, "shape", None), Polyline)
 
 
 def welded(parts: Parts, name: str) -> set[str]:
