@@ -41,7 +41,7 @@ from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
-RIDGE, TINY = 1e-13, 1e-300  # of a pair's own square: pairs that repeat each other; for pairs of nothing
+SAME = 1e-8  # pairs that repeat each other
 PATIENCE, EASIER = 12, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST, FAR = 1e-6, 100.0  # of the links' sizes
 SWEEPS = 40  # in a step, of which it takes 2 to 4
@@ -191,7 +191,6 @@ class Mixing:
     def __init__(self) -> None:
         self._known, self._slot = 0, 0
         self._steps = self._changes = np.zeros((DEPTH, 0))
-        self._products = np.zeros((DEPTH, DEPTH))
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def begin(self) -> None:
@@ -204,10 +203,9 @@ class Mixing:
             self._learn(change)
         taken, m = change, self._known
         if m:
-            size = np.sqrt(self._products[:m, :m].diagonal()) + TINY
-            A = self._products[:m, :m] / np.outer(size, size)
-            A[np.diag_indices(m)] = 1 + RIDGE
-            gamma = np.linalg.solve(A, (self._changes[:m] @ change) / size) / size
+            dF = self._changes[:m]
+            scale = np.linalg.norm(dF, axis=1)
+            gamma = np.linalg.lstsq((dF / scale[:, None]).T, change, rcond=SAME)[0] / scale
             taken = change - gamma @ self._steps[:m]
         self._last = taken, change
         return np.asarray(taken)
@@ -220,8 +218,6 @@ class Mixing:
         slot, self._known = self._slot, min(DEPTH, self._known + 1)
         np.subtract(change, before, out=self._changes[slot])
         np.add(taken, self._changes[slot], out=self._steps[slot])
-        products = self._changes[: self._known] @ self._changes[slot]
-        self._products[slot, : self._known] = self._products[: self._known, slot] = products
         self._slot = (slot + 1) % DEPTH
 
 
