@@ -90,7 +90,7 @@ def slices(link: Link, joint: Attachment) -> Slices:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, looked at block by block; over links with nominal frames, others have no such error.
+    """Largest sums over time of a run, looked at block by block; links with frames that follow have no such error.
 
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]

@@ -26,8 +26,8 @@ from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_m
 from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.transient import instants
-from kedfem.links.record import Link
 from kedfem.errors import SceneError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -118,8 +118,8 @@ def reduced(
     """
     if full.linkage.mobility:
         raise SceneError(
-            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a motion "
-            f"that the drive prescribes), got {full.linkage.mobility} free"
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a "
+            f"motion that the drive prescribes), got {full.linkage.mobility} free"
         )
     stage("functions")
     parts = static_parts(full.model)

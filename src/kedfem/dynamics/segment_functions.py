@@ -1,9 +1,9 @@
 """Functions for reduced segments of links whose frames follow: as few as bend like the segment itself.
 
 A segment bends under the forces of its cuts and joints: a handful of deflections, whose strain energy is small beside
-what each of their components alone would take (a bar bends by s² across and s y along it, and its section changes by y z:
-without any one of these it is stiff). So functions are not sorted by their size. From all of them the one goes first whose
-loss costs the deflections least strain energy, the others free to answer. With K the stiffness on the functions and C a
+what each of their components alone would take (a bar bends by s² across and s y along it, its section changes by y z:
+without any one of these it is stiff). So functions are not sorted by size. From all of them the one goes first whose loss
+costs the deflections least strain energy, the others free to answer. With K the stiffness on the functions and C a
 deflection's coefficients, the loss of qᵀ C costs
 
     J(q) = tr[(qᵀ C)ᵀ (qᵀ C) F(q)⁻¹],   F(q) = (q ⊗ I)ᵀ K⁻¹ (q ⊗ I),
