@@ -94,7 +94,9 @@ def balance_table(found: Balance, geometric: float | None) -> Table:
     ):
         table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
     if geometric is not None:
-        table.add_row("energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged")
+        table.add_row(
+            "energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
+        )
         table.add_row("geometric error, estimated", f"{_percent(geometric)} of the peak stress")
     return table
 
@@ -168,7 +170,9 @@ def _links(model: Model) -> Table:
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for name, parts in segments(model).items():
-        elements, unknowns = (str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts]))
+        elements, unknowns = (
+            str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
+        )
         table.add_row(name, _kind(parts), elements, unknowns, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
@@ -282,7 +286,10 @@ def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []
     v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
-    speeds = [f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s" for s, w in zip(v, omega, strict=True)]
+    speeds = [
+        f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s"
+        for s, w in zip(v, omega, strict=True)
+    ]
     return [(f"link {x} starts with", y) for x, y in zip(ready.linkage.bodies[1:], speeds[1:], strict=True)]
 
 

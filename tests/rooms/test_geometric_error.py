@@ -70,7 +70,9 @@ def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_
     rpm: float, true: float
 ) -> None:
     found = estimated(four_bar(rpm))
-    assert 0.5 < found.estimate / true < 1.3 or true < 0.01  # where it is small, more is due to time than to stiffness
+    assert (
+        0.5 < found.estimate / true < 1.3 or true < 0.01
+    )  # where it is small, more is due to time than to stiffness
     warning = geometric_warning(found)
     assert bool(warning) == (true > 0.02)
     if warning:

@@ -24,10 +24,9 @@ from .mechanisms import STRESS, four_bar, histories
 
 EXACT = "geometrically exact beams, converged in step and mesh (tests/exact)"
 SLENDER = {"density": 1000.0, "poisson_ratio": -0.999}  # G = 500 E: without shear
-THIN = 1e-3  # √(I/A) of a beam of unit length
 
 
-def slender(elements: int, radius: float = THIN, nodes: int = 3) -> tuple[dict[str, Any], dict[str, Any]]:
+def slender(elements: int, radius: float, nodes: int = 3) -> tuple[dict[str, Any], dict[str, Any]]:
     """Material and link of a beam along x from the origin, without shear: L = 1, EI = 0.1 N m², EI/(ρ A) = 1."""
     area, side = 1e-4, np.sqrt(12) * radius
     second = area * radius**2
@@ -42,43 +41,54 @@ def slender(elements: int, radius: float = THIN, nodes: int = 3) -> tuple[dict[s
 def bar(length: float, height: float, thickness: float, elements: int, nodes: int = 3) -> dict[str, Any]:
     """A planar beam along x."""
     shape = {"kind": "bar", "between": [[0, 0], [length, 0]], "width": height, "thickness": thickness}
-    return {"material": "m", "fidelity": "beam", "element": f"beam{nodes}", "shape": shape, "mesh": {"elements": elements}}
+    return {
+        "material": "m",
+        "fidelity": "beam",
+        "element": f"beam{nodes}",
+        "shape": shape,
+        "mesh": {"elements": elements},
+    }
 
 
-def hinge(link: str, kind: str = "revolute") -> dict[str, Any]:
-    return {"A": {"kind": kind, "links": ["ground", link], "at": [0, 0]}}
+def hinge(link: str) -> dict[str, Any]:
+    return {"A": {"kind": "revolute", "links": ["ground", link], "at": [0, 0]}}
 
 
 # -- static: slow loading, damped ---------------------------------------------------------------------------
 
 
-def loaded(**change: Any) -> Ran:
-    """A cantilever, EI = 0.1 N m², damped nearly critically, loaded in 2 s and left to settle."""
-    material, link = slender(8)
+def loaded(radius: float = 0.01, elements: int = 12, step: float = 0.01, **change: Any) -> Ran:
+    """A cantilever, EI = 0.1 N m², its root driven so slowly that it stands, loaded in 2 s and left to settle."""
+    material, link = slender(elements, radius)
     return ran({
         "materials": {"m": material, **change.pop("materials", {})},
         "links": {"arm": link, **change.pop("links", {})},
-        "joints": {**hinge("arm", "weld"), **change.pop("joints", {})},
+        "joints": {**hinge("arm"), **change.pop("joints", {})},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-9}},
         "damping": {"alpha": 6.0},
-        "analysis": {"end_time": 8.0, "step": 0.02, "rho_inf": 0.8},
+        "analysis": {"end_time": 8.0, "step": step, "rho_inf": 0.5, "frames": "following"},
         **change,
     })  # fmt: skip
 
 
-@case("Elastica: cantilever with a dead load", "Mattiasson, Int. J. Num. Meth. Eng. 17 (1981), elliptic integrals")
+@case(
+    "Elastica: cantilever with a dead load",
+    "Mattiasson, Int. J. Num. Meth. Eng. 17 (1981), elliptic integrals",
+    long=True,
+)
 def elastica() -> list[Row]:
-    """Nearly inextensible, without shear; loaded slowly, with damping."""
+    """L √(A/I) = 100, without shear, loaded slowly, with damping; stretch is worth 1e-4 to 1e-3."""
     rows = []
     for load, (across, along) in ELASTICA.items():
         factor = {"time": [0, 2], "value": [0, 1]}
         push = {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 0.1 * load], "factor": factor}
         u = loaded(loads={"P": push}).displaced("arm", [1, 0])[-1]
-        rows.append(Row(f"w/L, PL²/EI = {load:g}", across, float(u[1]), 1e-3, "8 beam3"))
-        rows.append(Row(f"u/L, PL²/EI = {load:g}", along, float(-u[0]), 1e-3, "8 beam3"))
+        rows.append(Row(f"w/L, PL²/EI = {load:g}", across, float(u[1]), 2e-3, "12 beam3"))
+        rows.append(Row(f"u/L, PL²/EI = {load:g}", along, float(-u[0]), 2e-3, "12 beam3"))
     return rows
 
 
-@case("Elastica: a full circle", "end moment 2π EI/L")
+@case("Elastica: a full circle", "end moment 2π EI/L", long=True)
 def circle() -> list[Row]:
     """A motor between the tip and a light disc of great inertia, which takes the moment; loaded slowly, with damping."""
     disc = {"fidelity": "rigid", "material": "light",
@@ -86,6 +96,9 @@ def circle() -> list[Row]:
     wheel = {"kind": "rigid_body", "link": "disc", "at": [1, 0], "mass": 1e-6, "centre": [1, 0],
              "inertia": [1e4, 1e4, 1e4, 0, 0, 0]}  # fmt: skip
     made = loaded(
+        0.05,  # nothing pulls
+        20,
+        0.02,
         materials={"light": {"density": 1.0, "youngs_modulus": 2e11, "poisson_ratio": 0.3}},
         links={"disc": disc},
         joints={"B": {"kind": "revolute", "links": ["arm", "disc"], "at": [1, 0]}},
@@ -95,8 +108,8 @@ def circle() -> list[Row]:
     tip = made.position("arm", [1, 0])[-1]
     middle = made.position("arm", [0.5, 0])[-1]
     return [
-        Row("tip, distance from the root / L", 0.0, float(np.hypot(*tip[:2])), 1e-3, "8 beam3"),
-        Row("middle, height / L", 1 / np.pi, float(abs(middle[1])), 1e-3, "8 beam3"),
+        Row("tip, distance from the root / L", 0.0, float(np.hypot(*tip[:2])), 1e-4, "20 beam3"),
+        Row("middle, height / L", 1 / np.pi, float(abs(middle[1])), 1e-4, "20 beam3"),
     ]
 
 
@@ -114,8 +127,7 @@ def kicked(mu: float) -> float:
         "joints": hinge("arm"),
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": mu}},
         "loads": {"kick": {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 3e-6], "frame": "link"}},
-        "analysis": {"end_time": 6 * period, "step": period / steps, "frames": "following", "rho_inf": 0.8,
-                     "initial": "quasi-static"},
+        "analysis": {"end_time": 6 * period, "step": period / steps, "frames": "following", "rho_inf": 0.8},
     })  # fmt: skip
     t = made.t
     u = made.displaced("arm", [1, 0])
@@ -206,7 +218,7 @@ def flown(h: float) -> np.ndarray:
 def flight_errors(h: float) -> np.ndarray:
     """Largest differences from the reference: ends, energy, spin; energy lost from 0.1 s to the end."""
     found = flown(h)
-    free = found[:, 0] > 0.102
+    free = found[:, 0] > 0.12
     energy = found[free, 5]
     return np.append(history("flying_rod").difference(found[:, 0], found[:, 1:7]), 1 - energy[-1] / energy[0])
 
@@ -219,10 +231,13 @@ def flying_rod() -> list[Row]:
     h = 2.5e-4
     errors, text = flight_errors(h), f"8 beam5, step {h:g} s"
     names = ("x0", "y0", "x1", "y1", "energy", "spin")
-    drift = float(flown(h)[flown(h)[:, 0] > 0.102, -1].max())
+    drift = float(flown(h)[flown(h)[:, 0] > 0.12, -1].max())
     return [
-        *(Row(f"{name}: difference / largest", 0.0, float(e), 3e-4, text) for name, e in zip(names, errors, strict=False)),
-        Row("linear momentum: change / value", 0.0, drift, 1e-10, text),
+        *(
+            Row(f"{name}: difference / largest", 0.0, float(e), 3e-4, text)
+            for name, e in zip(names, errors, strict=False)
+        ),
+        Row("linear momentum: change / value", 0.0, drift, 1e-9, text),
     ]
 
 
@@ -319,7 +334,10 @@ def double() -> list[Row]:
     """Steel rods of 0.5 m and 0.3 m, let go from the horizontal, 1.5 s; energy of what they can lose."""
     found = double_errors(5e-4)
     names = ("first angle [rad]", "second angle [rad]", "energy")
-    return [Row(f"largest error, {n}", 0.0, e, c, "step 5e-4 s") for n, e, c in zip(names, found, (5e-3, 1e-2, 1e-4), strict=True)]
+    return [
+        Row(f"largest error, {n}", 0.0, e, c, "step 5e-4 s")
+        for n, e, c in zip(names, found, (5e-3, 1e-2, 1e-4), strict=True)
+    ]
 
 
 # -- the source's four-bar from rest ------------------------------------------------------------------------
@@ -330,7 +348,12 @@ def four_bar_error(rpm: float, ratio: float, elements: int, h: float, nodes: int
     """Largest difference of the rocker's outer stress from the reference, of its peak."""
     kept = history(f"four_bar_{rpm:g}_{'damped' if ratio else 'undamped'}")
     turns = kept.t[-1] * rpm / 60
-    analysis = {"turns": turns, "steps_per_turn": round(60 / rpm / h), "initial": "rest", "frames": "following"}
+    analysis = {
+        "turns": turns,
+        "steps_per_turn": round(60 / rpm / h),
+        "initial": "rest",
+        "frames": "following",
+    }
     scene = four_bar(
         analysis, {"mesh": {"elements": elements}, "element": f"beam{nodes}"},
         drive={"joint": "A", "motion": {"kind": "constant_speed", "speed": f"{rpm:g} rpm"}},
@@ -345,8 +368,8 @@ def four_bar_from_rest() -> list[Row]:
     """2 % damping at 20 and 200 Hz, three turns (60 rpm: one): the same rows as for nominal frames, whose errors are 0.6,
 
     3.8, 14, 25, 40 % of the peak. Largest difference of the stress on the rocker's outer side, of its peak."""
-    caps = {60: (1e-4, 2e-3), 150: (1e-4, 3e-3), 300: (5e-5, 3e-3), 400: (5e-5, 5e-3), 600: (2.5e-5, 5e-3)}
-    return [
-        Row(f"{rpm} rpm", 0.0, four_bar_error(rpm, 0.02, 8, h, 3), cap, f"8 beam3 a link, steps of {h:g} s")
-        for rpm, (h, cap) in caps.items()
-    ]
+    rows = []
+    for rpm, h in {60: 5e-5, 150: 5e-5, 300: 2.5e-5, 400: 2.5e-5, 600: 2.5e-5}.items():
+        text = f"4 beam5 a link, steps of {h:g} s"
+        rows.append(Row(f"{rpm} rpm", 0.0, four_bar_error(rpm, 0.02, 4, h, 5), 2e-3, text))
+    return rows

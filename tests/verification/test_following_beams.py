@@ -38,7 +38,7 @@ def force(parts: Sequence[Link], u: np.ndarray) -> np.ndarray:
         here = slice(first, first + part.n)
         y, frames = position(part, u[here]), []
         for frame in frames_of(part):
-            Q, angle = rotation(part, frame.fit, y, np.eye(3), float(u[here, 2].mean()))
+            Q, angle = rotation(part, frame.fit, y, float(u[here, 2].mean()))
             none = np.zeros_like(y)
             frames.append(Followed(Q, angle, deformation(part, y, Q, angle), none, none))
         f[here] += internal_force(part, y, np.eye(3), frames, np.zeros((3, *y.shape)), 0.0)[0]

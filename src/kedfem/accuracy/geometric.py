@@ -15,7 +15,8 @@ Equation (20) turns K with the nominal rigid motion, which leaves two things out
 All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
 factor of e is measured, on the four-bar of [KED] (docs/theory.md): 3. One is the change of stiffness itself; the rest is
 the joint forces, which change as the deflected links pass them on, and the time that a changed stiffness shifts. An arm
-alone on its foot does not have that, and the estimate is then up to four times too large. c is that of the elastica under a load across its tip.
+alone on its foot does not have that, and the estimate is then up to four times too large. c is that of the elastica
+under a load across its tip.
 
 N comes from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean
 displacements of slices across the link's axis; so both take scalar weights only.
@@ -90,7 +91,7 @@ def slices(link: Link, joint: Attachment) -> Slices:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, looked at block by block; links with frames that follow have no such error.
+    """Largest sums over time of a run, looked at block by block, over links with nominal frames: others do not err so.
 
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]
@@ -112,7 +113,9 @@ class GeometricError:
 
     def add(self, block: Block) -> None:
         """Look at some time points of a block."""
-        looked_at = [history.strain for of, history in zip(self._of, block.links, strict=True) if of is not None]
+        looked_at = [
+            history.strain for of, history in zip(self._of, block.links, strict=True) if of is not None
+        ]
         if not looked_at:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))

@@ -132,7 +132,9 @@ def reduced(
 
     def first(share: float) -> Functions:
         return [
-            None if basis is None else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
+            None
+            if basis is None
+            else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
             for link, basis in zip(full.model.links, found, strict=True)
         ]
 
@@ -211,7 +213,9 @@ def _settled(
 def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
     """The next functions of segments, of which few count, as long as there are any; else those of the richer run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
-    segments = [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    segments = (
+        [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    )
     return [some if ours else more for ours, some, more in zip(segments, next_ones, richer, strict=True)]
 
 

@@ -21,25 +21,29 @@ from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
-from kedfem.dynamics.frames import (
-    Followed,
-    followed,
-    frame_force,
-    frames_of,
-    rotation,
-    seen_from,
-    stress_deformation,
-)
+from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, seen_from, stress_deformation
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
-from kedfem.links.record import Link, mass_times
+from kedfem.dynamics.stacks import (
+    Each,
+    Rows,
+    Stack,
+    StackFrame,
+    deformations,
+    first_frames,
+    frame_forces,
+    rotations,
+    stacks,
+)
+from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Rayleigh, accelerated
+from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
 DEPTH = 4  # sweeps that are remembered
-PATIENCE, EASIER = 6, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
-LEAST = 1e-6  # of the links' sizes
-SWEEPS = 15  # in a step, of which it takes 2 to 4
+RIDGE, TINY = 1e-13, 1e-300  # of a pair's own square: pairs that repeat each other; for pairs of nothing
+PATIENCE, EASIER = 12, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
+LEAST, FAR = 1e-6, 100.0  # of the links' sizes
+SWEEPS = 40  # in a step, of which it takes 2 to 4
 CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
 FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
@@ -117,6 +121,52 @@ def _small_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPa
     return HeldPart(held, Y, part.S)
 
 
+@dataclass(frozen=True, slots=True)
+class StackState:
+    """The segments of a stack at one time; rows (N, d) in world components, but for `frames` and `damped`.
+
+    u, v, a : δ, δ', δ''; Mu, Mv, Ma : times the mass; in a sweep v, a, Mv are those of the beginning
+    f : internal force
+    F : P − M R0''
+    R : (s, d, d) mean orientation, link to world
+    frames : what follows; none of links with nominal frame
+    damped : α M δ and rates in the nominal frame, (3, N, d)
+    strain : (s,) energy [J]
+    """
+
+    u: Rows
+    v: Rows
+    a: Rows
+    Mu: Rows
+    Mv: Rows
+    Ma: Rows
+    f: Rows
+    F: Rows
+    R: Each
+    frames: tuple[StackFrame, ...]
+    damped: Float[np.ndarray, "3 N d"]
+    strain: Float[np.ndarray, " s"]
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """All segments at one time; port_forces : per segment (q,) λ, world components."""
+
+    stacks: tuple[StackState, ...]
+    port_forces: tuple[Float[np.ndarray, " _"], ...]
+
+
+def stacked(stack: Stack, general: Sequence[SegmentState]) -> StackState:
+    """The segments of a stack at the first time point."""
+    names = ("u", "v", "a", "Mu", "Mv", "Ma", "f", "F")
+    rows = [np.concatenate([getattr(s, name) for s in general]) for name in names]
+    damped = np.concatenate([s.damped for s in general], axis=1)
+    frames = first_frames(stack, [s.frames for s in general])
+    return StackState(
+        *rows, np.stack([s.R for s in general]), frames, damped, np.array([s.strain for s in general])
+    )
+
+
 class NotConverged(Exception):  # noqa: N818 - not a fault yet: such a step is taken in parts
     """A step whose sweeps do not settle.
 
@@ -138,7 +188,9 @@ class Mixing:
     """
 
     def __init__(self) -> None:
-        self._pairs: list[tuple[np.ndarray, np.ndarray]] = []
+        self._known, self._slot = 0, 0
+        self._steps = self._changes = np.zeros((DEPTH, 0))
+        self._products = np.zeros((DEPTH, DEPTH))
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def begin(self) -> None:
@@ -148,15 +200,28 @@ class Mixing:
     def step(self, change: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """The step to take after a sweep that asks for a change."""
         if self._last is not None:
-            self._pairs = [(self._last[0], change - self._last[1]), *self._pairs[: DEPTH - 1]]
-        taken = change
-        if self._pairs:
-            dX, dF = (np.stack(each, axis=1) for each in zip(*self._pairs, strict=True))
-            scale = np.linalg.norm(dF, axis=0)
-            gamma = np.linalg.lstsq(dF / scale, change, rcond=1e-8)[0] / scale
-            taken = change - (dX + dF) @ gamma
+            self._learn(change)
+        taken, m = change, self._known
+        if m:
+            size = np.sqrt(self._products[:m, :m].diagonal()) + TINY
+            A = self._products[:m, :m] / np.outer(size, size)
+            A[np.diag_indices(m)] = 1 + RIDGE
+            gamma = np.linalg.solve(A, (self._changes[:m] @ change) / size) / size
+            taken = change - gamma @ self._steps[:m]
         self._last = taken, change
         return np.asarray(taken)
+
+    def _learn(self, change: Float[np.ndarray, " N"]) -> None:
+        """Keep what the last step did to the change, in place of the oldest."""
+        if not self._steps.size:
+            self._steps, self._changes = np.zeros((2, DEPTH, len(change)))
+        taken, before = self._last if self._last is not None else (change, change)
+        slot, self._known = self._slot, min(DEPTH, self._known + 1)
+        np.subtract(change, before, out=self._changes[slot])
+        np.add(taken, self._changes[slot], out=self._steps[slot])
+        products = self._changes[: self._known] @ self._changes[slot]
+        self._products[slot, : self._known] = self._products[: self._known, slot] = products
+        self._slot = (slot + 1) % DEPTH
 
 
 class FollowingSteps:
@@ -166,36 +231,32 @@ class FollowingSteps:
         self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
         actions: Sequence[Action] = (), tolerance: float = CONVERGED,
     ) -> None:  # fmt: skip
-        self.links, self.joints, self.scheme, self.damping, self.actions = (
-            links,
-            joints,
-            scheme,
-            damping,
-            actions,
-        )
-        self.tolerance = tolerance
+        self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self.actions, self.tolerance = actions, tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations, self.sweeps = len(self.parts), 0
-        self.scale = rounding(links)
-        self.mixing = Mixing()
+        self.scale, self._too_far = rounding(links), too_far(links)
+        self.mixing, self.stacks = Mixing(), stacks(links)
         self._acting = acting_on(actions, links)
         self._turned = np.zeros(len(actions))
 
-    def begin(self, states: Sequence[LinkState]) -> list[SegmentState]:
+    def begin(self, states: Sequence[LinkState]) -> State:
         """The state of the first time point."""
-        return [
+        every = [
             first_state(link, joint, self.damping, s)
             for link, joint, s in zip(self.links, self.joints, states, strict=True)
         ]
+        of = tuple(stacked(stack, [every[k] for k in stack.members]) for stack in self.stacks)
+        return State(of, tuple(s.port_forces for s in every))
 
-    def copied(self, state: list[SegmentState]) -> list[SegmentState]:
+    def copied(self, state: State) -> State:
         """A state that a solver may use up."""
-        return list(state)
+        return state
 
     def advance(
-        self, state: list[SegmentState], forcing: Sequence[Forcing], motion: RigidMotion
-    ) -> tuple[list[LinkHistory], list[SegmentState]]:
+        self, state: State, forcing: Sequence[Forcing], motion: RigidMotion
+    ) -> tuple[list[LinkHistory], State]:
         """All time points of a block; see `DenseSteps.advance`.
 
         Raises
@@ -203,109 +264,163 @@ class FollowingSteps:
         NotConverged
             With what was done before.
         """
-        taken: list[list[SegmentState]] = []
+        taken: list[State] = []
         acting = over_block(self._acting, motion)
+        R = [np.stack([forcing[k].R for k in stack.members], axis=1) for stack in self.stacks]
+        F = [np.concatenate([forcing[k].F for k in stack.members], axis=1) for stack in self.stacks]
         for t in range(len(forcing[0].R)):
-            now = self.step(state, [each.at(t) for each in forcing], acting, t)
+            now = self.step(state, [x[t] for x in R], [x[t] for x in F], acting, t)
             if isinstance(now, str):
                 raise NotConverged(t, self._histories(taken), state, now)
             state = now
             taken.append(now)
         return self._histories(taken), state
 
-    def step(
-        self, states: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
-    ) -> list[SegmentState] | str:
-        """States of all segments one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle."""
-        now = [self._predicted(k, s, nominal) for k, (s, nominal) in enumerate(zip(states, at, strict=True))]
-        R = [s.R for s in now]
-        RB = [port_rotation(joint, each).T @ joint.B for joint, each in zip(self.joints, R, strict=True)]
-        H = np.sum([b.T @ part.S @ b for part, b in zip(self.parts, RB, strict=True)], axis=0)
-        factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
+    def step(self, state: State, R: Sequence[Each], F: Sequence[Rows], acting: Any, t: int) -> State | str:
+        """The state one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle.
+
+        Parameters
+        ----------
+        R, F : nominal orientation and P − M R0'' of each stack at the end of the step
+        """
+        before = state.stacks
+        now = [self._predicted(*each) for each in zip(self.stacks, before, R, F, strict=True)]
+        frames = [self._mean(*each) for each in zip(self.stacks, now, R, strict=True)]
+        RB = self._interface(frames)
+        factor = interface_factor(self.parts, RB)
         self.mixing.begin()
+        sizes, moved = np.zeros(len(self.links)), 0.0
         for sweep in range(SWEEPS):
-            now, _ = self._acted(now, at, acting, t)
-            rhs = [self._residual(s, n) @ r for s, n, r in zip(states, now, R, strict=True)]
-            frame_change, forces = solved(self.parts, rhs, RB, factor)
-            change = [x @ r.T for x, r in zip(frame_change, R, strict=True)]
-            sizes = [
-                float(np.vdot(x, mass_times(link.mass, x)))
-                for link, x in zip(self.links, change, strict=True)
-            ]
+            now, _ = self._acted(now, before, F, acting, t)
+            change, forces = self._asked(before, now, frames, RB, factor)
+            for stack, x in zip(self.stacks, change, strict=True):
+                sizes[list(stack.members)] = stack.dots(x, stack.lumped * x)
             self.sweeps += 1
             tolerance = self.tolerance * (1 if sweep < PATIENCE else EASIER)
-            settled = sum(sizes) <= tolerance**2 * self.scale
+            settled = sizes.sum() <= tolerance**2 * max(self.scale, moved)
             asked = np.concatenate([x.ravel() for x in change])
             taken = asked if settled else self.mixing.step(asked)
             ends = np.cumsum([x.size for x in change])[:-1]
             now = [
-                self._moved(k, s, n, x.reshape(n.u.shape), nominal)
-                for k, (s, n, x, nominal) in enumerate(
-                    zip(states, now, np.split(taken, ends), at, strict=True)
-                )
+                self._moved(stack, s, n, x.reshape(n.u.shape), r)
+                for stack, s, n, x, r in zip(self.stacks, before, now, np.split(taken, ends), R, strict=True)
             ]
-            self.scale = max(
-                self.scale,
-                sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, states, strict=True)),
-            )
-            if not np.isfinite(sizes).all():
+            moved = sum(float(np.vdot(n.u - s.u, n.Mu - s.Mu)) for n, s in zip(now, before, strict=True))
+            if not moved <= self._too_far:
                 break
             if settled:
-                now, self._turned = self._acted(now, at, acting, t)
-                return [
-                    self._ended(k, s, n, nominal, force)
-                    for k, (s, n, nominal, force) in enumerate(zip(states, now, at, forces, strict=True))
-                ]
+                self.scale = max(self.scale, moved)
+                now, self._turned = self._acted(now, before, F, acting, t)
+                return self._ended(state, now, R, frames, forces)
+        self.mixing = Mixing()
         return self.links[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))].name
 
+    def _interface(self, frames: Sequence[Each]) -> list[NodalOf]:
+        """Rᵀ B of all segments."""
+        of = self._by_segment(frames)
+        return [port_rotation(joint, R).T @ joint.B for joint, R in zip(self.joints, of, strict=True)]
+
+    def _by_segment(self, stacked: Sequence[Sequence[np.ndarray]]) -> list[Any]:
+        """What is given stack by stack, in the order of the segments."""
+        out: list[Any] = [None] * len(self.links)
+        for stack, every in zip(self.stacks, stacked, strict=True):
+            for k, each in zip(stack.members, every, strict=True):
+                out[k] = each
+        return out
+
+    def _asked(
+        self, before: Sequence[StackState], now: Sequence[StackState], frames: Sequence[Each], RB: Sequence[NodalOf],
+        factor: tuple[np.ndarray, bool] | None,
+    ) -> tuple[list[Rows], list[Float[np.ndarray, " _"]]]:  # fmt: skip
+        """The change of δ that a sweep asks for, world components, and the port forces in the predicted frames."""
+        rhs = [
+            stack.parts(stack.turned(self._residual(s, n), r))
+            for stack, s, n, r in zip(self.stacks, before, now, frames, strict=True)
+        ]
+        found, forces = solved(self.parts, self._by_segment(rhs), RB, factor)
+        change = [
+            stack.turned(np.concatenate([found[k] for k in stack.members]), r.transpose(0, 2, 1))
+            for stack, r in zip(self.stacks, frames, strict=True)
+        ]
+        return change, forces
+
     def _acted(
-        self, now: Sequence[SegmentState], at: Sequence[Nominal], acting: Any, t: int
-    ) -> tuple[list[SegmentState], Float[np.ndarray, " A"]]:
+        self, now: Sequence[StackState], before: Sequence[StackState], F: Sequence[Rows], acting: Any, t: int
+    ) -> tuple[list[StackState], Float[np.ndarray, " A"]]:
         """States with the forces of motors and springs where they are now, and the coordinates of these."""
         if acting is None:
             return list(now), self._turned
         from kedfem.dynamics.actions_kernel import external
 
-        u, v, F = np.zeros((3, len(self.links), *self._acting.weights.shape[3:]))
-        for padded, rows in ((u, [s.u for s in now]), (v, [s.v for s in now]), (F, [n.F for n in at])):
-            for each, x in zip(padded, rows, strict=True):
+        rates = [self._rates(n.u, s.u, s.v, s.a)[0] for n, s in zip(now, before, strict=True)]
+        u, v, P = np.zeros((3, len(self.links), *self._acting.weights.shape[3:]))
+        for padded, rows in ((u, [s.u for s in now]), (v, rates), (P, F)):
+            every = self._by_segment([stack.parts(x) for stack, x in zip(self.stacks, rows, strict=True)])
+            for each, x in zip(padded, every, strict=True):
                 each[: x.shape[1], : len(x)] = x.T
-        turned = external(acting, t, u, v, self._turned, F).copy()
-        return [replace(s, F=x[: s.u.shape[1], : len(s.u)].T) for s, x in zip(now, F, strict=True)], turned
+        turned = external(acting, t, u, v, self._turned, P).copy()
+        of = [
+            np.concatenate(
+                [P[k, : x.shape[1], :n].T for k, n in zip(stack.members, np.diff(stack.bounds), strict=True)]
+            )
+            for stack, x in zip(self.stacks, F, strict=True)
+        ]
+        return [replace(s, F=x) for s, x in zip(now, of, strict=True)], turned
 
-    def _predicted(self, k: int, s: SegmentState, at: Nominal) -> SegmentState:
+    def _predicted(self, stack: Stack, s: StackState, R: Each, F: Rows) -> StackState:
         """The end of the step with an acceleration that stays, seen from frames there."""
         h = self.scheme.h
-        u = s.u + h * s.v + (h * h / 2) * s.a
-        now = self._moved(k, s, replace(s, u=s.u, Mu=s.Mu, F=at.F), u - s.u, at)
-        return replace(now, R=self._mean(k, now, at))
+        change = h * s.v + (h * h / 2) * s.a
+        return self._moved(stack, s, replace(s, F=F), change, R)
 
-    def _mean(self, k: int, now: SegmentState, at: Nominal) -> Float[np.ndarray, "d d"]:
-        """Mean orientation of a segment, link to world."""
-        link = self.links[k]
-        if link.frames or link.fit is None:
-            return mean_orientation(link, now.u, at.R)
-        return np.asarray(at.R @ now.frames[0].Q)
+    def _mean(self, stack: Stack, now: StackState, R: Each) -> Each:
+        """Mean orientation of the segments, link to world."""
+        if not stack.follows:
+            return R
+        if not stack.points:
+            return np.asarray(R @ now.frames[0].Q)
+        y = stack.X + stack.turned(now.u, R)
+        return np.asarray(R @ rotations(stack, stack.fit, y, np.zeros(len(R)))[0])
 
-    def _moved(self, k: int, s: SegmentState, now: SegmentState, change: Nodal, at: Nominal) -> SegmentState:
-        """A state of the end of the step moved by a change of δ, with all that follows from it."""
-        link, scheme = self.links[k], self.scheme
-        u, Mu = now.u + change, now.Mu + mass_times(link.mass, change)
-        v, a = accelerated(scheme, u, s.u, s.v, s.a)
-        Mv, Ma = accelerated(scheme, Mu, s.Mu, s.Mv, s.Ma)
-        y = position(link, u @ at.R)
-        frames = tuple(
-            followed(link, frame, y, before, scheme)
-            for frame, before in zip(frames_of(self.links[k]), s.frames, strict=True)
-        )
+    def _moved(self, stack: Stack, s: StackState, now: StackState, change: Rows, R: Each) -> StackState:
+        """A state of the end of the step moved by a change of δ, with all that a sweep needs to know of it."""
+        u, Mu = now.u + change, now.Mu + stack.mass(change)
+        Ma = self._rates(Mu, s.Mu, s.Mv, s.Ma)[1]
         damped = s.damped
         if self.damping.alpha:
-            C = self.damping.alpha * (Mu @ at.R)
-            damped = np.stack([C, *accelerated(scheme, C, *s.damped)])
-        f, strain = internal_force(link, y, at.R, frames, damped, self.damping.beta)
-        return SegmentState(u, v, a, Mu, Mv, Ma, f, now.F, now.R, frames, damped, s.port_forces, strain)
+            C = self.damping.alpha * stack.turned(Mu, R)
+            damped = np.stack([C, *self._rates(C, *s.damped)])
+        frames, f, strain = self._forces(stack, stack.X + stack.turned(u, R), s.frames)
+        if self.damping.alpha:
+            f = f + damped[1]
+        f = stack.turned(f, R.transpose(0, 2, 1))
+        return StackState(u, now.v, now.a, Mu, now.Mv, Ma, f, now.F, s.R, frames, damped, strain)
 
-    def _residual(self, s: SegmentState, now: SegmentState) -> Nodal:
+    def _forces(
+        self, stack: Stack, y: Rows, before: tuple[StackFrame, ...]
+    ) -> tuple[tuple[StackFrame, ...], Rows, Float[np.ndarray, " s"]]:
+        """Frames at the end of the step; internal force in the nominal frame, and its strain energy."""
+        if not stack.follows:
+            g = y - stack.X
+            Kg = stack.stiffness[0](g)
+            return (), Kg, 0.5 * stack.dots(g, Kg)
+        f, strain, frames = np.zeros_like(y), np.zeros(len(stack.members)), []
+        for fit, times, s in zip(stack.fits, stack.stiffness, before, strict=True):
+            Q, angle = rotations(stack, fit, y, s.angle)
+            g = deformations(stack, y, Q, angle)
+            Kg = times(g)
+            # K0 is constant, so that K0 g' follows from K0 g by the formulas of g' itself
+            rates = self._rates(Kg, *s.K) if self.damping.beta else s.K[1:]
+            frames.append(StackFrame(Q, angle, g, np.stack([Kg, *rates])))
+            strain += 0.5 * stack.dots(g, Kg)
+            Kg = Kg + self.damping.beta * rates[0] if self.damping.beta else Kg
+            f += frame_forces(stack, fit, frames[-1], Kg, y)
+        return tuple(frames), f, strain
+
+    def _rates(self, x1: Rows, x: Rows, v: Rows, a: Rows) -> tuple[Rows, Rows]:
+        return accelerated(self.scheme, x1, x, v, a)
+
+    def _residual(self, s: StackState, now: StackState) -> Rows:
         """What is missing to balance at the end of the step, without joint forces, world components."""
         c_m, c_f = 1 - self.scheme.alpha_m, 1 - self.scheme.alpha_f
         r = c_f * (now.F - now.f) - c_m * now.Ma
@@ -314,33 +429,59 @@ class FollowingSteps:
         return np.asarray(r - self.scheme.alpha_m * s.Ma)
 
     def _ended(
-        self, k: int, s: SegmentState, now: SegmentState, at: Nominal, force: Float[np.ndarray, " q"]
-    ) -> SegmentState:
-        """The state in balance, with the port forces at the end of the step."""
-        world = port_rotation(self.joints[k], now.R) @ force
-        if self.scheme.alpha_f:
-            world = (world - self.scheme.alpha_f * s.port_forces) / (1 - self.scheme.alpha_f)
-        return replace(now, port_forces=world, R=self._mean(k, now, at))
+        self, state: State, now: Sequence[StackState], R: Sequence[Each], frames: Sequence[Each],
+        forces: Sequence[Float[np.ndarray, " _"]],
+    ) -> State:  # fmt: skip
+        """The state in balance, with all rates, and the port forces at the end of the step."""
+        ended = []
+        for stack, s, n, r in zip(self.stacks, state.stacks, now, R, strict=True):
+            v, a = self._rates(n.u, s.u, s.v, s.a)
+            Mv, Ma = self._rates(n.Mu, s.Mu, s.Mv, s.Ma)
+            ended.append(replace(n, v=v, a=a, Mv=Mv, Ma=Ma, R=self._mean(stack, n, r)))
+        alpha = self.scheme.alpha_f
+        of = zip(self.joints, self._by_segment(frames), forces, state.port_forces, strict=True)
+        world = (
+            (port_rotation(joint, r) @ force - alpha * start) / (1 - alpha) for joint, r, force, start in of
+        )
+        return State(tuple(ended), tuple(world))
 
-    def _histories(self, taken: Sequence[Sequence[SegmentState]]) -> list[LinkHistory]:
-        if not taken:
-            return []
-        return [self._history(k, [states[k] for states in taken]) for k in range(len(self.links))]
-
-    def _history(self, k: int, states: Sequence[SegmentState]) -> LinkHistory:
-        link, joint, frames = self.links[k], self.joints[k], frames_of(self.links[k])
-        g = [stress_deformation(link, frames, s.frames) if frames else s.u @ s.R for s in states]
-        forces = [port_rotation(joint, s.R).T @ s.port_forces for s in states]
-        u, v, a, R, F = (np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "R", "F"))
-        strain = np.array([s.strain for s in states])
-        return LinkHistory(u, v, a, np.stack(g), R, F, np.stack(forces), strain)
+    def _histories(self, taken: Sequence[State]) -> list[LinkHistory]:
+        found: list[Any] = [None] * len(self.links)
+        for i, stack in enumerate(self.stacks if taken else ()):
+            states = [state.stacks[i] for state in taken]
+            rows = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "F")}
+            R, strain = (np.stack([getattr(s, name) for s in states]) for name in ("R", "strain"))
+            for e, k in enumerate(stack.members):
+                here, link = slice(stack.bounds[e], stack.bounds[e + 1]), self.links[k]
+                frames = frames_of(link)
+                g = [stress_deformation(link, frames, [x.g[here] for x in s.frames]) if frames else s.u[here] @ s.R[e]
+                     for s in states]  # fmt: skip
+                forces = [
+                    port_rotation(self.joints[k], r).T @ state.port_forces[k]
+                    for r, state in zip(R[:, e], taken, strict=True)
+                ]
+                u, v, a, F = (rows[name][:, here] for name in ("u", "v", "a", "F"))
+                found[k] = LinkHistory(u, v, a, np.stack(g), R[:, e], F, np.stack(forces), strain[:, e])
+        return found if taken else []
 
 
 def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
     """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
     if link.fit is None:
         return R
-    return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), np.eye(link.d), 0.0)[0])
+    return R @ rotation(link, link.fit, position(link, u @ R), 0.0)[0]
+
+
+def interface_factor(parts: Sequence[HeldPart], RB: Sequence[NodalOf]) -> tuple[np.ndarray, bool] | None:
+    """Factor of H = Σ Bᵀ R S Rᵀ B, None without interface unknowns; a segment has a share in few rows of it."""
+    H = np.zeros((RB[0].shape[1], RB[0].shape[1]))
+    if not len(H):
+        return None
+    for part, b in zip(parts, RB, strict=True):
+        own = np.flatnonzero(b.any(axis=0))
+        known = b[:, own]
+        H[np.ix_(own, own)] += known.T @ part.S @ known
+    return scipy.linalg.cho_factor(H, check_finite=False)
 
 
 def solved(
@@ -355,7 +496,7 @@ def solved(
     ----------
     rhs : r per segment (n, d)
     RB : Rᵀ B
-    factor : of H = Σ Bᵀ R S Rᵀ B, None without interface unknowns
+    factor : of `interface_factor`
     """
     held, reactions = zip(*(part.held(r) for part, r in zip(parts, rhs, strict=True)), strict=True)
     z = np.zeros(RB[0].shape[1])
@@ -375,8 +516,13 @@ def position(link: Link, u: Nodal) -> Nodal:
 
 def rounding(links: Sequence[Link]) -> float:
     """Square of what counts as a step even where nothing moves, in the norm of the mass: far above rounding."""
-    sizes = [float(link.m1[:, 0].sum()) * (link.full or link).size ** 2 for link in links]
+    sizes = [float(link.one @ link.m1[:, 0]) * link.size**2 for link in links]
     return float(LEAST**2 * sum(sizes))
+
+
+def too_far(links: Sequence[Link]) -> float:
+    """Square of what no step moves, in the same norm: the links' sizes many times over, where sweeps have run away."""
+    return FAR**2 / LEAST**2 * rounding(links)
 
 
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:

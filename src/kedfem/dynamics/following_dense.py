@@ -13,7 +13,7 @@ from kedfem.dynamics.action import Action
 from kedfem.dynamics.condensed import effective_coefficients, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
-from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding
+from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding, too_far
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
@@ -46,7 +46,7 @@ class FollowingDense:
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
-        self._counts = np.array([0.0, rounding(links), 0.0, 0.0])
+        self._counts = np.array([0.0, rounding(links), 0.0, 0.0, too_far(links)])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]

@@ -18,7 +18,8 @@ near the diagonal: from column `first` of each row on.
     history : u, v, a, g (T, L, D, S), strain (T, b, 3, E), R (T, L, D, D), port forces (T, L, Q) in that frame, strain
         energy (T, L)
     memory : of `dynamics.mixing_kernel`
-    counts : sweeps, square of what counts as a step, pairs that are known, the next pair to be forgotten
+    counts : sweeps, square of what counts as a step, pairs that are known, the next pair to be forgotten, square of a
+        step that is too far
 
 Imported when it is first needed. Plain loops, so that nothing is allocated in a step; few calls, and what a step does not
 change is found once in it.
@@ -36,7 +37,7 @@ from kedfem.dynamics.mixing_kernel import factored, mixed, solved
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
-SWEEPS, PATIENCE, EASIER = 15, 6, 100.0  # as in `dynamics.following`
+SWEEPS, PATIENCE, EASIER = 40, 12, 100.0  # as in `dynamics.following`
 
 
 @compiled
@@ -93,7 +94,7 @@ def follow_block(  # type: ignore[no-untyped-def]
         R = Rs[t]
         begin_step(coefficients, R, state, u1, lasting, resisted)
         begun(rates, beams, R, strain0, direction, base, damped)
-        settled, worst = False, -1
+        settled, worst, reached = False, -1, 0.0
         for sweep in range(SWEEPS + 1):
             f1[:] = 0.0
             bent(1 + beta * h1 * n0, beams, u1, base, damped, turn0, seen, f1, points)
@@ -136,15 +137,18 @@ def follow_block(  # type: ignore[no-untyped-def]
             moved, worst = swept(
                 coefficients, parts, Rp, F, f1, u1, lasting, H, first, force, change, swept_work
             )
-            if not np.isfinite(moved):
-                break
             allowed = tolerance if sweep < PATIENCE else EASIER * tolerance
-            settled = moved <= allowed * allowed * counts[1]
+            settled = moved <= allowed * allowed * max(counts[1], reached)
             if not settled:
                 mixed(memory, counts, sweep, change.ravel())
-            counts[1] = max(counts[1], advanced(change, u1, u))
+            reached = advanced(change, u1, u)
+            if not reached <= counts[4]:
+                settled = False
+                break
         if not settled:
+            counts[2] = 0.0
             return t, worst
+        counts[1] = max(counts[1], reached)
         ended(t, rates, beams, R, seen, strain0, direction, turn0, history[4], history[7])
         if others:
             for i in range(L):

@@ -1,9 +1,9 @@
 """Functions for reduced segments of links whose frames follow: as few as bend like the segment itself.
 
 A segment bends under the forces of its cuts and joints: a handful of deflections, whose strain energy is small beside
-what each of their components alone would take (a bar bends by s² across and s y along it, its section changes by y z:
-without any one of these it is stiff). So functions are not sorted by size. From all of them the one goes first whose loss
-costs the deflections least strain energy, the others free to answer. With K the stiffness on the functions and C a
+what each of their components alone would take (a bar bends by s² across and s y along it, and its section changes by y z:
+without any one of these it is stiff). So functions are not sorted by size. From all of them the one goes first whose
+loss costs the deflections least strain energy, the others free to answer. With K the stiffness on the functions and C a
 deflection's coefficients, the loss of qᵀ C costs
 
     J(q) = tr[(qᵀ C)ᵀ (qᵀ C) F(q)⁻¹],   F(q) = (q ⊗ I)ᵀ K⁻¹ (q ⊗ I),
@@ -51,7 +51,11 @@ def segment_basis(
     deflections = [_relative(link, modes, x) for x in deflections]
     shapes = _shapes(
         link,
-        [*_answers(link, joint, part, deflections), *_turned_ports(link, joint, part, deflections), *deflections],
+        [
+            *_answers(link, joint, part, deflections),
+            *_turned_ports(link, joint, part, deflections),
+            *deflections,
+        ],
     )
     rigid = mass_orthonormal(link, rigid_functions(link))
     H = energy_product(link)
@@ -67,10 +71,14 @@ def segment_basis(
     at_ports = (joint.weights @ x[joint.nodes] for x in (rigid, functions))
     kept, others, losses = _eliminated(K, C, *at_ports)
     whole = float(np.vdot(C, (C.reshape(len(C), -1) @ K).reshape(C.shape)))
-    return Basis(np.concatenate([rigid, functions @ kept], axis=1), functions @ others, np.sqrt(losses / whole))
+    return Basis(
+        np.concatenate([rigid, functions @ kept], axis=1), functions @ others, np.sqrt(losses / whole)
+    )
 
 
-def _relative(link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
+def _relative(
+    link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n d"]:
     """A deflection without the segment's mean rigid motion."""
     M = np.stack([mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in modes.T], axis=1)
     return np.asarray(g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape))
@@ -94,7 +102,9 @@ def _free(
     balanced = scipy.linalg.null_space(rigid_modes(link).T @ W[:, here], rcond=1e-9)
     q = W.shape[1]
     y = part.Y[:, here] @ balanced
-    F = np.linalg.inv(part.S)[q:, q:]  # what the anchors take is given back: forces in balance need none of it
+    F = np.linalg.inv(part.S)[
+        q:, q:
+    ]  # what the anchors take is given back: forces in balance need none of it
     return np.asarray(y - part.Y[:, q:] @ np.linalg.lstsq(F, y[part.anchors], rcond=1e-9)[0])
 
 
@@ -121,7 +131,9 @@ def _turned_ports(
         arms = joint.points[port[here]] - joint.points[group].mean(axis=0)
         e = np.eye(3)[joint.keep[here] % link.d]
         needed = np.stack([_shortened(w, arms, e, link.d) for w in moved.T], axis=1)
-        c = np.linalg.lstsq(np.concatenate([W[:, here].T @ answers, modes[here]], axis=1), needed, rcond=1e-9)[0]
+        c = np.linalg.lstsq(
+            np.concatenate([W[:, here].T @ answers, modes[here]], axis=1), needed, rcond=1e-9
+        )[0]
         out.append(answers @ c[: answers.shape[1]])
     return [x.reshape(link.n, link.d) for each in out for x in each.T]
 
@@ -137,7 +149,9 @@ def _shortened(
 def _groups(joint: Attachment, d: int) -> list[Int[np.ndarray, " p"]]:
     """Ports that belong together: of each joint, and of each cut the d that follow each other."""
     cuts = np.flatnonzero([name == "" for name in joint.joints])
-    named = [np.flatnonzero([x == name for x in joint.joints]) for name in dict.fromkeys(joint.joints) if name]
+    named = [
+        np.flatnonzero([x == name for x in joint.joints]) for name in dict.fromkeys(joint.joints) if name
+    ]
     return [*named, *(cuts[k : k + d] for k in range(0, len(cuts), d))]
 
 

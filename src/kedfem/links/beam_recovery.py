@@ -2,7 +2,8 @@
 
 A probe takes the cubic through the nearest four of them: its error falls with the third power of the elements' length,
 at nodes and in the middle between them with the fourth, where the moment is smooth along a straight run of elements, as
-with loads spread along it. Joints, bodies and forces at a point (kinks) end a run.
+with loads spread along it. Joints, bodies and forces at a point (kinks) end a run. Elements of more than five nodes have
+more such points each: then it takes as many.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from jaxtyping import Float, Int
 from kedfem.links.beam import parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 
-THROUGH = 4  # Gauss points of a probe
+THROUGH = 4  # Gauss points of a probe at least
 STRAIGHT = 1e-9  # sine of the angle between elements of a run
 ON_AXIS = 1e-6  # how near to a node or to the axis counts as on it, of an element's length
 Points = Float[np.ndarray, "_ 3"]
@@ -50,7 +51,7 @@ def beam_coordinates(
 def fibre_row(
     link: Link, element: int, r: float, offset: float, kinks: Points | None = None
 ) -> Float[np.ndarray, " k"]:
-    """σ_xx = E (ε − offset κ) of a fibre (3n,): the strains at the nearest four Gauss points, interpolated to r.
+    """σ_xx = E (ε − offset κ) of a fibre (3n,): the strains at the nearest Gauss points, interpolated to r.
 
     Parameters
     ----------

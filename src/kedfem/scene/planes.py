@@ -44,7 +44,9 @@ def _entries(section: str, records: Mapping[str, Any], *above: str) -> dict[str,
 
 def spatial_names(parts: Parts) -> frozenset[str]:
     """The same of a scene under validation, as far as its parts are good."""
-    beams = {link.name: link for link in parts.links.values() if fidelity(link) == "beam" or _rigid_line(link)}
+    beams = {
+        link.name: link for link in parts.links.values() if fidelity(link) == "beam" or _rigid_line(link)
+    }
     free = {name: link.word("beam") for name, link in beams.items()}
     found = {
         name for name, kind in free.items() if kind == "spatial" or (kind is None and any(obstacles(parts, name)))
