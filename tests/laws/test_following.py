@@ -269,7 +269,12 @@ def merged(raw: dict[str, Any], changes: dict[str, dict[str, Any]]) -> dict[str,
 def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
     """The source's four-bar at 60 rpm, E and G multiplied, half a turn; settled by its damping."""
     raw: dict[str, Any] = four_bar(
-        {"turns": 0.5, "steps_per_turn": 720, "initial": "rest", **({"frames": "following"} if follow else {})},
+        {
+            "turns": 0.5,
+            "steps_per_turn": 720,
+            "initial": "rest",
+            **({"frames": "following"} if follow else {}),
+        },
         {"mesh": {"elements": 3}},
         materials={
             "alloy": {

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics import condensed
-from kedfem.dynamics.condensed import CondensedSteps, port_values, port_vectors
+from kedfem.dynamics import substructure
+from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.ports import port_values, port_vectors
 from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
 from kedfem.links.record import mass_times
@@ -310,7 +311,7 @@ def test_condensed_is_literal_over_a_turn_of_the_examples(
     raw = tomllib.loads(file.read_text(encoding="utf-8"))
     raw["analysis"] |= {"turns": 1, "steps_per_turn": steps}
     _, _, fast = run(raw)
-    monkeypatch.setattr(condensed, "ANCHORAGE", 1.0)  # another Ã, so other rounding errors
+    monkeypatch.setattr(substructure, "ANCHORAGE", 1.0)  # another Ã, so other rounding errors
     _, _, again = run(raw)
     assert worst_difference(again, fast) < 5e-9
     raw["analysis"]["solver"] = "literal"

@@ -106,6 +106,8 @@ def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
 class Breaking:
     """A solver whose displacements are not finite from one step on."""
 
+    stiffening = None
+
     def __init__(self, solver: Steps, step: int) -> None:
         self.solver, self.left = solver, step
 

@@ -11,11 +11,12 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffened_kernel, stiffening
-from kedfem.dynamics.condensed import CondensedSteps, add_port_forces, coupled
+from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.ports import add_port_forces
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
+from kedfem.dynamics.substructure import coupled
 from kedfem.dynamics.transient import forcings, steps_of, transient
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.recovery import point_rows
@@ -94,8 +95,8 @@ def test_dense_condensed_and_literal_stiffened_steps_are_one(
     model, scheme = ready.model, generalised_alpha(time_grid(ready.scene).step, rho_inf)
     stresses = stiffening.stiffening(model)
     dense, condensed, literal = (
-        displacements(ready, kind(model, scheme, stresses))
-        for kind in (StiffenedDense, StiffenedCondensed, StiffenedLiteral)
+        displacements(ready, kind(model.links, model.joints, scheme, model.damping, stresses))
+        for kind in (DenseSteps, CondensedSteps, LiteralSteps)
     )
     for other in (condensed, literal):
         for got, wanted in zip(dense, other, strict=True):
@@ -106,20 +107,20 @@ def test_dense_condensed_and_literal_stiffened_steps_are_one(
 
 
 @pytest.mark.parametrize(
-    ("kind", "solver", "plain", "stiffened_kind"),
+    ("kind", "solver", "taken"),
     [
-        ("beam", "condensed", DenseSteps, StiffenedDense),
-        ("plate", "condensed", CondensedSteps, StiffenedCondensed),
-        ("beam", "literal", LiteralSteps, StiffenedLiteral),
+        ("beam", "condensed", DenseSteps),
+        ("plate", "condensed", CondensedSteps),
+        ("beam", "literal", LiteralSteps),
     ],
 )
-def test_a_scene_that_does_not_ask_for_stiffening_has_the_plain_solver(
-    kind: str, solver: str, plain: type, stiffened_kind: type
-) -> None:
+def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str, taken: type) -> None:
     raw = four_bar(kind, solver=solver)
     ready = meshed(scene_from(raw))
-    assert type(steps_of(ready.scene, ready.model)) is plain
-    assert type(steps_of(scene_from(stiff(raw)), ready.model)) is stiffened_kind
+    for scene, wanted in ((ready.scene, False), (scene_from(stiff(raw)), True)):
+        found = steps_of(scene, ready.model)
+        assert isinstance(found, taken)
+        assert (found.stiffening is not None) is wanted
 
 
 def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,7 +178,9 @@ def test_two_sweeps_a_step_do(monkeypatch: pytest.MonkeyPatch) -> None:
     ready = meshed(scene_from(stiff(four_bar("beam", steps_per_turn=720, turns=0.5))))
     scheme = generalised_alpha(time_grid(ready.scene).step, 0.95)
     stresses = stiffening.stiffening(ready.model)
-    steps = len(displacements(ready, StiffenedCondensed(ready.model, scheme, stresses))[0]) - 1
+    model = ready.model
+    solver = CondensedSteps(model.links, model.joints, scheme, model.damping, stresses)
+    steps = len(displacements(ready, solver)[0]) - 1
     assert steps == 360
     assert 1.9 * steps < len(solved) < 2.2 * steps
 

@@ -27,10 +27,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import turned_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import turned_vectors
 from kedfem.links.record import Link, in_space
 from kedfem.motion.rigid import RigidMotion
 

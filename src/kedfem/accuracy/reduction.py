@@ -19,12 +19,12 @@ from kedfem.accuracy.cache import kept
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.bases import bases
-from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
 from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
+from kedfem.dynamics.substructure import Substructure
 from kedfem.dynamics.transient import instants
 from kedfem.errors import SceneError
 from kedfem.links.record import Link

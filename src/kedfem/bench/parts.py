@@ -14,8 +14,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from kedfem.bench.machine import seconds
 from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.condensed import effective_matrix
 from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.substructure import effective_matrix
 from kedfem.links.build import link_axes
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import point_rows, von_mises

@@ -11,8 +11,8 @@ import scipy.sparse.linalg
 from kedfem.bench.machine import Watch, markdown, seconds, write_page
 from kedfem.bench.scenes import bar_four_bar
 from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.condensed import effective_matrix
 from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.substructure import effective_matrix
 from kedfem.links.build import bare_links
 
 SIZES = ((18, 3, 2), (36, 6, 4), (48, 9, 7))

@@ -2,12 +2,12 @@
 
 from collections.abc import Collection, Sequence
 
-from kedfem.dynamics.condensed import Substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.reduction import Basis, energy_sorted, excited, port_functions
 from kedfem.dynamics.segment_functions import segment_basis
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
+from kedfem.dynamics.substructure import Substructure
 
 
 def bases(

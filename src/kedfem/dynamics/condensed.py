@@ -1,154 +1,21 @@
 """The condensed step: one constant factorisation per link, joints solved on a dozen unknowns.
 
-Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
+With geometric stiffening what K_σ δ is at the end of a step goes to the right-hand side, and sweeps make it right.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
+from kedfem.dynamics.ports import Rotation, add_port_forces, port_rotation
 from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh, accelerated
-from kedfem.errors import SolveError
+from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.stiffening import Stiffening, Turning, predicted, swept, with_turnings
+from kedfem.dynamics.substructure import coupled, effective_coefficients, factored
 from kedfem.links.record import Link, mass_times
-
-ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
-Rotation = Float[np.ndarray, "d d"]
-
-
-@dataclass(frozen=True, slots=True)
-class Substructure:
-    """A link seen from its q port components and e anchors, all constant in the link frame.
-
-    A holds a free link by its inertia only, so a long step would leave it nearly singular. Factored is therefore
-    Ã = A + κ E Eᵀ, E a few components of nodes far apart (the anchors): A g = r + Wᵀ λ is Ã g = r + Wᵀ λ + E μ with
-    μ = κ Eᵀ g. Exact for every κ. With C = [Wᵀ E] and y = Ã⁻¹ r,
-
-        [λ; μ] = S ([W g; 0] − Cᵀ y),   S = (Cᵀ Ã⁻¹ C − diag(0, 1/κ))⁻¹,   g = y + Ã⁻¹ C [λ; μ].
-
-    solve : (n, d) → (n, d), Ã⁻¹
-    Y : (dn, q + e) Ã⁻¹ C
-    S : (q + e, q + e)
-    anchors : (e,) components of the state
-    """
-
-    solve: Callable[[Nodal], Nodal]
-    attachment: Attachment
-    Y: Float[np.ndarray, "k c"]
-    S: Float[np.ndarray, "c c"]
-    anchors: Int[np.ndarray, " e"]
-
-    def seen(self, y: Nodal) -> Float[np.ndarray, " c"]:
-        """Cᵀ y: values at ports and anchors."""
-        return np.concatenate([port_values(self.attachment, y), y.ravel()[self.anchors]])
-
-
-def substructure(
-    attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
-    anchors: Int[np.ndarray, " e"] | None = None, kappa: Float[np.ndarray, " e"] | None = None,
-) -> Substructure:  # fmt: skip
-    """Condense a link onto its ports and anchors.
-
-    Parameters
-    ----------
-    n : functions of the link
-    solve, solve_many : Ã⁻¹ for one state (n, d) and for columns (dn, k)
-    anchors, kappa : components that Ã holds in addition to A, none if not given, and how stiffly [N/m]
-    """
-    held = np.zeros(0, int) if anchors is None else anchors
-    E = np.zeros((attachment.components * n, len(held)))
-    E[held, np.arange(len(held))] = 1.0
-    C = np.concatenate([port_columns(attachment, n), E], axis=1)
-    Y = solve_many(C)
-    F = C.T @ Y
-    if kappa is not None:
-        at = np.arange(len(F) - len(held), len(F))
-        F[at, at] -= 1 / kappa
-    return Substructure(solve, attachment, Y, np.linalg.inv(F), held)
-
-
-def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
-    """Wᵀ for all held components of a link with n functions, (dn, q)."""
-    p, d = len(attachment.weights), attachment.components
-    W = np.zeros((p, d, n, d))
-    for k in range(d):
-        W[:, k, attachment.nodes, k] = attachment.weights
-    return np.asarray(W.reshape(d * p, d * n)[attachment.keep].T)
-
-
-def port_values(attachment: Attachment, u: Nodal) -> Float[np.ndarray, " q"]:
-    """W u, the held components."""
-    return np.asarray((attachment.weights @ u[attachment.nodes]).ravel()[attachment.keep])
-
-
-def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q"]:
-    """R on all held components."""
-    port, component = np.divmod(attachment.keep, attachment.components)
-    return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
-
-
-def turned_vectors(
-    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
-) -> Float[np.ndarray, "T p d"]:
-    """R λ over time, a row per port in world components, zero where a component is not held."""
-    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
-    vectors.reshape(len(force), -1)[:, attachment.keep] = force
-    return np.asarray(vectors @ R.transpose(0, 2, 1))
-
-
-def turned_ports(
-    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
-) -> Float[np.ndarray, "T q"]:
-    """R λ over time: port forces of the link frame in world components."""
-    return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
-
-
-def coupled(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf]
-) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-    """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
-
-    The mechanism of [KED, eq. (19)]: joints make shared points move together.
-
-    Parameters
-    ----------
-    parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
-
-    Returns
-    -------
-    g : per link (n, d), link frame
-    forces : per link (q,) λ on the link at its ports, link frame
-    """
-    y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
-    v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
-    RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
-    z = np.zeros(parts[0].attachment.B.shape[1])
-    if len(z):
-        # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-        H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
-        f = np.sum([b.T @ (part.S @ x) for part, b, x in zip(parts, RB, v, strict=True)], axis=0)
-        try:
-            z = scipy.linalg.solve(H, f, assume_a="pos", check_finite=False)
-        except np.linalg.LinAlgError as error:
-            raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
-    forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
-    g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
-    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
-
-
-def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:
-    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns."""
-    B = part.attachment.B
-    out = np.zeros((len(part.S), B.shape[1]))
-    out[: len(B)] = port_rotation(part.attachment, R).T @ B
-    return out
 
 
 class CondensedSteps:
@@ -158,9 +25,10 @@ class CondensedSteps:
     """
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
-        self.links, self.scheme, self.damping = links, scheme, damping
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        stiffening: Stiffening | None = None,
+    ) -> None:  # fmt: skip
+        self.links, self.scheme, self.damping, self.stiffening = links, scheme, damping, stiffening
         self.c_M, self.c_K = effective_coefficients(scheme, damping)
         self.parts = [
             factored(link, joint, self.c_M, self.c_K) for link, joint in zip(links, joints, strict=True)
@@ -175,6 +43,8 @@ class CondensedSteps:
         self, state: list[LinkState], forcing: Sequence[Forcing]
     ) -> tuple[list[LinkHistory], list[LinkState]]:
         """All time points of a block; see `DenseSteps.advance`."""
+        if self.stiffening is not None:
+            forcing = self.stiffening.stressed(forcing)
         return stepwise(self.step, state, forcing)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
@@ -186,8 +56,21 @@ class CondensedSteps:
         at : orientation and P − M R0'' of each link at the end of the step
         """
         rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
+        if self.stiffening is not None:
+            return self._stiffened(states, at, rhs, self.stiffening.turnings(at))
         g, forces = coupled(self.parts, [nominal.R for nominal in at], rhs)
         return [self._next(k, states[k], at[k], g[k], rhs[k], forces[k]) for k in range(len(self.links))]
+
+    def _stiffened(
+        self, states: Sequence[LinkState], at: Sequence[Nominal], rhs: Sequence[Nodal],
+        turnings: Sequence[Turning],
+    ) -> list[LinkState]:  # fmt: skip
+        """The same with K_σ δ in the internal force; each sweep is one more pair of triangular solves per link."""
+        first = [predicted(s, self.scheme.h) @ nominal.R for s, nominal in zip(states, at, strict=True)]
+        share = 1 - self.scheme.alpha_f
+        full, g, forces = swept(self.parts, [now.R for now in at], rhs, first, turnings, share)
+        new = [self._next(k, states[k], at[k], g[k], full[k], forces[k]) for k in range(len(self.links))]
+        return with_turnings(new, turnings)
 
     def _rhs(self, s: LinkState, at: Nominal) -> Nodal:
         """History + (P − M R0''), link frame at the end of the step."""
@@ -244,91 +127,3 @@ def end_forces(
         return force
     before = port_rotation(joint, R.T @ s.R) @ s.port_forces
     return np.asarray((force - scheme.alpha_f * before) / (1 - scheme.alpha_f))
-
-
-def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray, " q"]) -> None:
-    """Add Wᵀ λ to nodal forces in place."""
-    out[attachment.nodes] += attachment.weights.T @ port_vectors(attachment, force)
-
-
-def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p d"]:
-    """Port forces as one row per port, zero where a component is not held."""
-    full = np.zeros((len(attachment.weights), attachment.components))
-    full.ravel()[attachment.keep] = force
-    return full
-
-
-def effective_coefficients(scheme: Scheme, damping: Rayleigh) -> tuple[float, float]:
-    """c_M [1/s²] and c_K [-] of A = c_M M + c_K K0 = (1 − α_m) a0 M + (1 − α_f) (K0 + a1 C0)."""
-    c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
-    return c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha, c_f * (1 + scheme.a1 * damping.beta)
-
-
-def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
-    """A = c_M M + c_K K0 in the link frame, (dn, dn): constant because of [KED, eqs. (12)(14)]."""
-    return sp.csr_array(c_M * mass_matrix(link) + c_K * link.K0)
-
-
-def mass_matrix(link: Link) -> sp.csr_array:
-    """M = m ⊗ I, (dn, dn), [KED, eqs. (9)(11)]."""
-    unit = np.eye(link.d)
-    return sp.csr_array(
-        sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass))
-    )
-
-
-def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
-    """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
-    if link.full is not None:
-        # as functions are mass-orthonormal, those with most of 1 and x move the link most
-        share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()
-        return (link.d * np.argsort(share)[::-1][: link.d + 1, None] + np.arange(link.d)).ravel()
-    if link.kind == "beam":
-        return np.arange(3) + 3 * (link.n // 2)
-    if link.kind == "spatial_beam":
-        # its nodes may be in line: the turn about it is held by the slopes of one
-        values = np.flatnonzero(link.one)
-        return np.asarray(np.arange(9) + 3 * values[len(values) // 2])
-    nodes = np.flatnonzero(link.one)
-    X = link.X[nodes]
-    first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
-    arms = X - X[first]
-    second = int(np.linalg.norm(arms, axis=1).argmax())
-    third = int(np.linalg.norm(np.cross(arms, arms[second]), axis=1).argmax())
-    far = nodes[[first, second, third][: link.d]]
-    return (link.d * far[:, None] + np.arange(link.d)).ravel()
-
-
-def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
-    """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
-    anchors = anchors_of(link)
-    if link.full is not None:
-        return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
-    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
-    springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
-    factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
-    return substructure(
-        joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
-    )
-
-
-def _dense_factored(
-    link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
-) -> Substructure:
-    """`factored` of a reduced link, whose matrices are dense."""
-    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal().mean()))
-    dense = A.toarray()
-    dense[anchors, anchors] += kappa
-    try:
-        factor = scipy.linalg.cho_factor(dense, check_finite=False)
-    except np.linalg.LinAlgError as error:
-        raise SolveError(
-            f"links.{link.name}: effective matrix must be positive definite, got {error}"
-        ) from error
-
-    def solve_many(B: np.ndarray) -> np.ndarray:
-        return np.asarray(scipy.linalg.cho_solve(factor, B, check_finite=False))
-
-    return substructure(
-        joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
-    )

@@ -9,11 +9,14 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import effective_coefficients, port_columns, port_vectors
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.ports import port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
+from kedfem.dynamics.stiffened import stress_terms
+from kedfem.dynamics.stiffening import SETTLED, SWEEPS, Stiffening
+from kedfem.dynamics.substructure import effective_coefficients
 from kedfem.links.record import Link
 
 SMALL = 360  # unknowns of a link: up to here dense matrices beat a sparse factor (docs/performance)
@@ -39,8 +42,9 @@ class DenseSteps:
     """Advances all links by generalised-α steps, block by block; everything constant is made here, once."""
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        stiffening: Stiffening | None = None,
+    ) -> None:  # fmt: skip
         self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
         c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
         c_M, c_K = effective_coefficients(scheme, damping)
@@ -55,6 +59,9 @@ class DenseSteps:
             max(link.d for link in links), max(link.n for link in links), max(len(j.weights) for j in joints)
         )  # fmt: skip
         self._unknowns = _known([joint.B for joint in joints])
+        self.stiffening = stiffening
+        T = [part.T for part in self.parts]
+        self._stress = None if stiffening is None else stress_terms(links, T, stiffening)
         self._matrices = self._padded()
 
     def begin(self, states: Sequence[LinkState]) -> tuple[np.ndarray, ...]:
@@ -112,8 +119,14 @@ class DenseSteps:
     ) -> None:
         """Advance the state and fill the history in place."""
         from kedfem.dynamics.kernel import advance_block
+        from kedfem.dynamics.stiffened_kernel import advance_stiffened
 
-        advance_block(self.coefficients, self._matrices, *self._unknowns, padded, state, history)
+        known = (self._matrices, *self._unknowns, padded)
+        if self._stress is None:
+            advance_block(self.coefficients, *known, state, history)
+            return
+        limits, stressed = (self.scheme.h, SETTLED, SWEEPS), self._stress.over_block(forcing)
+        advance_stiffened(self.coefficients, limits, *known, stressed, state, history)
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
         link, joint, part = self.links[i], self.joints[i], self.parts[i]

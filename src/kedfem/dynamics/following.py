@@ -18,11 +18,11 @@ from jaxtyping import Float
 
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
-from kedfem.dynamics.condensed import Substructure, effective_coefficients, factored, port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
 from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, seen_from, stress_deformation
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.stacks import (
     Each,
@@ -36,6 +36,7 @@ from kedfem.dynamics.stacks import (
     stacks,
 )
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Rayleigh, accelerated
+from kedfem.dynamics.substructure import Substructure, effective_coefficients, factored
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 

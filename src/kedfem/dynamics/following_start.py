@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kedfem.dynamics.condensed import port_rotation
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.following import (
     HeldPart,
@@ -17,6 +16,7 @@ from kedfem.dynamics.following import (
     solved,
 )
 from kedfem.dynamics.frames import frames_of, seen_from
+from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import Nodal, NodalOf
 from kedfem.errors import SolveError

@@ -11,11 +11,14 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Rotation, end_forces, mass_matrix, port_columns, port_vectors
+from kedfem.dynamics.condensed import end_forces
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
+from kedfem.dynamics.ports import Rotation, port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.stiffening import Stiffening, with_turnings
+from kedfem.dynamics.substructure import mass_matrix
 from kedfem.links.record import Link
 
 
@@ -70,9 +73,11 @@ class LiteralSteps:
     """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
 
     def __init__(
-        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh
-    ) -> None:
+        self, links: Sequence[Link], joints: Sequence[Attachment], scheme: Scheme, damping: Rayleigh,
+        stiffening: Stiffening | None = None,
+    ) -> None:  # fmt: skip
         self.links, self.joints, self.scheme, self.damping = links, joints, scheme, damping
+        self.stiffening = stiffening
         self.T, self.dependent = shared_nodes(links, joints)
         self.Wt = [port_columns(joint, link.n) for link, joint in zip(links, joints, strict=True)]
         self.M = [mass_matrix(link) for link in links]
@@ -86,6 +91,8 @@ class LiteralSteps:
         self, state: list[LinkState], forcing: Sequence[Forcing]
     ) -> tuple[list[LinkHistory], list[LinkState]]:
         """All time points of a block; see `DenseSteps.advance`."""
+        if self.stiffening is not None:
+            forcing = self.stiffening.stressed(forcing)
         return stepwise(self.step, state, forcing)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
@@ -99,15 +106,20 @@ class LiteralSteps:
         self.factorisations += 1
         u = self.T @ lu.solve(self.T.T @ np.concatenate([r.ravel() for r in rhs]))
         parts = np.split(u, np.cumsum([link.unknowns for link in self.links])[:-1])
-        return [
+        new = [
             self._next(k, states[k], at[k], parts[k].reshape(rhs[k].shape), A[k], rhs[k])
             for k in range(len(self.links))
         ]
+        return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
 
     def _matrices(self, at: Sequence[Nominal]) -> list[sp.csr_array]:
-        """Effective matrices of all links, world frame."""
+        """Effective matrices of all links, world frame; stress stiffness is assembled like the rest."""
         K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
-        return [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
+        A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
+        if self.stiffening is None:
+            return A
+        share = 1 - self.scheme.alpha_f
+        return [sp.csr_array(x + share * k) for x, k in zip(A, self.stiffening.stiffness(at), strict=True)]
 
     def _effective(self, M: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
         s, d = self.scheme, self.damping

@@ -12,11 +12,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Rotation, Substructure, coupled, factored
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
+from kedfem.dynamics.substructure import Substructure, coupled, factored
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import (
     mass_orthonormal,

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import Substructure, add_port_forces, coupled
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import add_port_forces
 from kedfem.dynamics.start import damping_times
 from kedfem.dynamics.state import NodalOf, Rayleigh
+from kedfem.dynamics.substructure import Substructure, coupled
 from kedfem.dynamics.transient import forcings
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix

@@ -16,9 +16,9 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import port_rotation, port_values
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.following import HeldPart, held_part, held_substructure
+from kedfem.dynamics.ports import port_rotation, port_values
 from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf
 from kedfem.links.record import Link, mass_times

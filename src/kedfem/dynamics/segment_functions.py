@@ -19,9 +19,10 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import Substructure, port_columns
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.ports import port_columns
 from kedfem.dynamics.reduction import Basis, energy_product, orthonormal
+from kedfem.dynamics.substructure import Substructure
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import mass_orthonormal, projected_stiffness, rigid_functions, rigid_modes
 

@@ -8,16 +8,11 @@ from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.condensed import (
-    Rotation,
-    Substructure,
-    coupled,
-    factored,
-    substructure,
-)
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
+from kedfem.dynamics.substructure import Substructure, coupled, factored, substructure
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.initial import initial_twists

@@ -13,19 +13,13 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import (
-    Rotation,
-    Substructure,
-    coupled,
-    factored,
-    mass_matrix,
-    port_columns,
-)
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.state import Nodal, NodalOf, Nominal
+from kedfem.dynamics.ports import Rotation, port_columns
+from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal
+from kedfem.dynamics.substructure import Substructure, coupled, factored, mass_matrix
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
@@ -233,6 +227,16 @@ def swept(
             break
         before = change
     return full, [np.full_like(x, np.nan) for x in g], forces
+
+
+def with_turnings(states: Sequence[LinkState], turnings: Sequence[Turning]) -> list[LinkState]:
+    """The states with k g P in their internal force, so that it is part of all that the scheme says of f."""
+    return [replace(s, f=s.f + k(s.g)) for s, k in zip(states, turnings, strict=True)]
+
+
+def predicted(s: LinkState, h: float) -> Nodal:
+    """δ one step later with constant δ''."""
+    return s.u + h * s.v + h**2 / 2 * s.a
 
 
 def _given(now: Nominal) -> Float[np.ndarray, " m"]:

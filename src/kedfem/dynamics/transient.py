@@ -20,10 +20,9 @@ from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
-from kedfem.dynamics.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
-from kedfem.dynamics.stiffened import StiffenedCondensed, StiffenedDense, StiffenedLiteral
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
@@ -38,8 +37,6 @@ POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-
-StiffenedSteps = StiffenedCondensed | StiffenedLiteral | StiffenedDense
 Steps = CondensedSteps | LiteralSteps | DenseSteps | FollowingSteps | FollowingDense
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
@@ -61,23 +58,12 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         follower = FollowingDense if dense else FollowingSteps
         tolerance = FREE if scene.driven is None else CONVERGED
         return follower(model.links, model.joints, scheme, model.damping, actions(scene, model), tolerance)
-    if scene.analysis.stiffening:
-        return stiffened_steps(scene, model, scheme)
-    if scene.analysis.solver == "literal":
-        return LiteralSteps(model.links, model.joints, scheme, model.damping)
     small = all(map(_is_small, model.links)) and find_spec("numba")
-    solver = DenseSteps if small else CondensedSteps
-    return solver(model.links, model.joints, scheme, model.damping)
-
-
-def stiffened_steps(scene: Scene, model: Model, scheme: Scheme) -> StiffenedSteps:
-    """The same with geometric stiffening."""
-    kind: type[StiffenedSteps] = StiffenedCondensed
+    solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
-        kind = StiffenedLiteral
-    elif all(map(_is_small, model.links)) and find_spec("numba"):
-        kind = StiffenedDense
-    return kind(model, scheme, stiffening(model))
+        solver = LiteralSteps
+    stresses = stiffening(model) if scene.analysis.stiffening else None
+    return solver(model.links, model.joints, scheme, model.damping, stresses)
 
 
 def _is_small(link: Link) -> bool:
@@ -94,7 +80,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         If a displacement is not finite: with step, time and drive angle.
     """
     law = scene.motion
-    stresses = solver.stiffening if isinstance(solver, StiffenedSteps) else None
+    stresses = None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
     states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, [history([state]) for state in states])

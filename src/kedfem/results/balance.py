@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from kedfem.dynamics.condensed import turned_vectors
 from kedfem.dynamics.history import LinkHistory, Products
+from kedfem.dynamics.ports import turned_vectors
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
 from kedfem.results.moments import (

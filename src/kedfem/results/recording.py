@@ -7,11 +7,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.condensed import turned_ports
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Carried, Model, Slider, on_segment
+from kedfem.dynamics.ports import turned_ports
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
