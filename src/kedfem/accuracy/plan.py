@@ -1,8 +1,8 @@
 """The cheapest model of a scene that is near enough: `analysis.accuracy`.
 
 Everything is found by short trial runs of the scene itself, with reduced links: the step by halving it, the mesh by
-making it finer, segments of links with frames that follow by taking more, simpler links by putting them in. What the scene
-states stays; what it leaves open is chosen.
+making it finer, segments of links with frames that follow by taking more, simpler links by putting them in. What the
+scene states stays; what it leaves open is chosen.
 """
 
 import math

@@ -118,8 +118,8 @@ def reduced(
     """
     if full.linkage.mobility:
         raise SceneError(
-            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a motion "
-            f"that the drive prescribes), got {full.linkage.mobility} free"
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a "
+            f"motion that the drive prescribes), got {full.linkage.mobility} free"
         )
     stage("functions")
     parts = static_parts(full.model)

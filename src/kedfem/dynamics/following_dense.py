@@ -12,10 +12,11 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
-from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding, too_far
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.mixing import DEPTH
 from kedfem.dynamics.ports import port_vectors
 from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.segment import CONVERGED, NotConverged, first_state, rounding, too_far
 from kedfem.dynamics.state import LinkState, Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
 from kedfem.links.record import BeamPoint, Link
