@@ -40,4 +40,6 @@ def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, 
 
 
 def _segmented(scene: Scene, names: list[str], count: int) -> Scene:
-    return with_links(scene, {name: scene.links[name].model_copy(update={"segments": count}) for name in names})
+    return with_links(
+        scene, {name: scene.links[name].model_copy(update={"segments": count}) for name in names}
+    )
