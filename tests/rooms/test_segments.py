@@ -80,10 +80,18 @@ def test_beams_with_frames_that_follow_stay_in_full() -> None:
 
 def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
     bar = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}
-    arm = {"fidelity": "plane", "material": "steel", "reduced": True, "shape": bar, "mesh": {"elements": [4, 1]}}
+    arm = {
+        "fidelity": "plane",
+        "material": "steel",
+        "reduced": True,
+        "shape": bar,
+        "mesh": {"elements": [4, 1]},
+    }
     joint = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}
     raw = {"links": {"arm": arm}, "joints": {"A": joint}, "analysis": {"end_time": 0.1, "step": 0.01}}
-    with pytest.raises(SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"):
+    with pytest.raises(
+        SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"
+    ):
         prepared(scene_from(raw))
 
 
@@ -213,7 +221,9 @@ def test_only_links_with_nominal_frames_have_a_geometric_error() -> None:
     raw["links"]["rocker"].pop("segments")
     found = ready(raw)
     error, alone = GeometricError(found.model), 0.0
-    for block in transient(found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)):
+    for block in transient(
+        found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)
+    ):
         error.add(block)
         alone = max(alone, float(block.links[-1].strain.max()))
     assert found.model.links[-1].name == "rocker"
@@ -224,6 +234,8 @@ def test_only_links_with_nominal_frames_have_a_geometric_error() -> None:
 def test_a_mechanism_that_follows_everywhere_has_none() -> None:
     found = ready(bars(3, segments=3))
     error = GeometricError(found.model)
-    for block in transient(found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)):
+    for block in transient(
+        found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)
+    ):
         error.add(block)
     assert (error.axial, error.strain, error.estimate) == (0.0, 0.0, 0.0)

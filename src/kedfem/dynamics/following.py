@@ -19,7 +19,7 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.frames import frames_of, stress_deformation
-from kedfem.dynamics.held import held_part, interface_factor, solved
+from kedfem.dynamics.held import closed, closure, held_part, interface_factor, on_nodes, solved
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.ports import port_rotation
@@ -69,6 +69,9 @@ class FollowingSteps:
         self.mixing, self.stacks = Mixing(), stacks(links)
         self._acting = acting_on(actions, links)
         self._turned = np.zeros(len(actions))
+        self._closure = closure(
+            joints, [on_nodes(link, joint) for link, joint in zip(links, joints, strict=True)]
+        )
 
     def begin(self, states: Sequence[LinkState]) -> State:
         """The state of the first time point."""
@@ -94,6 +97,7 @@ class FollowingSteps:
             With what was done before.
         """
         taken: list[State] = []
+        state = self._closed(state)
         acting = over_block(self._acting, motion)
         R = [np.stack([forcing[k].R for k in stack.members], axis=1) for stack in self.stacks]
         F = [np.concatenate([forcing[k].F for k in stack.members], axis=1) for stack in self.stacks]
@@ -104,6 +108,23 @@ class FollowingSteps:
             state = now
             taken.append(now)
         return self._histories(taken), state
+
+    def _closed(self, state: State) -> State:
+        """The state with its joints closed, in displacement and rates."""
+        out = list(state.stacks)
+        for name, times in (("u", "Mu"), ("v", "Mv"), ("a", "Ma")):
+            rows = self._by_segment(
+                [stack.parts(getattr(s, name)) for stack, s in zip(self.stacks, out, strict=True)]
+            )
+            at_ports = [x[joint.nodes].ravel() for joint, x in zip(self.joints, rows, strict=True)]
+            rows = [x.copy() for x in rows]
+            for joint, x, y in zip(self.joints, rows, closed(self._closure, at_ports), strict=True):
+                x[joint.nodes] = y.reshape(-1, x.shape[1])
+            for i, stack in enumerate(self.stacks):
+                x = np.concatenate([rows[k] for k in stack.members])
+                changed: dict[str, Any] = {name: x, times: stack.mass(x)}
+                out[i] = replace(out[i], **changed)
+        return replace(state, stacks=tuple(out))
 
     def step(self, state: State, R: Sequence[Each], F: Sequence[Rows], acting: Any, t: int) -> State | str:
         """The state one step later, [KED, eq. (20)]; the name of a link if the sweeps do not settle.

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import SMALL, dense_part
+from kedfem.dynamics.ports import port_columns
 from kedfem.dynamics.state import Nodal, NodalOf
 from kedfem.dynamics.substructure import Substructure, factored
 from kedfem.links.record import Link
@@ -94,3 +95,44 @@ def solved(
     w = [b @ z for b in RB]
     forces = [part.S @ x - y for part, x, y in zip(parts, w, reactions, strict=True)]
     return [x + (part.Y @ y).reshape(x.shape) for part, x, y in zip(parts, held, w, strict=True)], forces
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """How joints are closed that rounding has opened: of port values w = W u as little is changed as can be, w = B z.
+
+    B, inverse : all segments' B below each other, and its pseudo-inverse
+    weights : per segment W (q, N) on its coordinates, flat, and its pseudo-inverse (N, q)
+    """
+
+    B: Float[np.ndarray, "Q k"]
+    inverse: Float[np.ndarray, "k Q"]
+    weights: tuple[tuple[Float[np.ndarray, "q N"], Float[np.ndarray, "N q"]], ...]
+
+
+def closure(joints: Sequence[Attachment], W: Sequence[Float[np.ndarray, "_ _"]]) -> Closure:
+    """Made ready for the steps of a model.
+
+    Parameters
+    ----------
+    W : per segment its held port components from its coordinates, world axes as well as its own: weights are scalar
+    """
+    B = np.concatenate([joint.B for joint in joints])
+    return Closure(B, np.linalg.pinv(B), tuple((w, np.linalg.pinv(w)) for w in W))
+
+
+def on_nodes(link: Link, joint: Attachment) -> Float[np.ndarray, "q k"]:
+    """W of a link from the rows of the nodes that its ports have, flat."""
+    columns = port_columns(joint, link.n).reshape(link.n, link.d, -1)[joint.nodes]
+    return np.asarray(columns.reshape(-1, columns.shape[2]).T)
+
+
+def closed(of: Closure, x: Sequence[Float[np.ndarray, " _"]]) -> list[Float[np.ndarray, " _"]]:
+    """Displacements (or their rates) of all segments, flat, with the joints closed.
+
+    Sweeps close them up to rounding only, which would grow with the square of the number of steps.
+    """
+    w = np.concatenate([W @ y for (W, _), y in zip(of.weights, x, strict=True)])
+    gap = of.B @ (of.inverse @ w) - w
+    ends = np.cumsum([len(W) for W, _ in of.weights])[:-1]
+    return [y + back @ g for (_, back), y, g in zip(of.weights, x, np.split(gap, ends), strict=True)]
