@@ -1,4 +1,4 @@
-"""The source's four-bar from rest, linear and with frames that follow; run with `python examples/four_bar_following/run.py`."""
+"""Linear frames and frames that follow, from rest; run with `python examples/four_bar_following/run.py`."""
 
 import tomllib
 from pathlib import Path
@@ -19,15 +19,18 @@ def main() -> None:
     following = run(pictures=True)
     y = stress(following)
     peak = np.abs(y).max()
-    off = {name: np.abs(stress(each) - y).max() / peak for name, each in (("linear", linear), ("stiffened", stiffened))}
+    off = {
+        name: np.abs(stress(each) - y).max() / peak
+        for name, each in (("linear", linear), ("stiffened", stiffened))
+    }
     print(f"peak stress {peak / 1e6:.1f} MPa, exact beams {PEAK / 1e6:.1f} MPa")
-    print(*(f"the {name} equation is off by {100 * error:.0f} % of it at worst" for name, error in off.items()), sep="\n")
+    print(
+        *(f"the {name} equation is off by {100 * error:.0f} % of it at worst" for name, error in off.items()),
+        sep="\n",
+    )
     assert abs(peak / PEAK - 1) < 0.01
     assert 0.35 < off["linear"] < 0.45  # 40 % against exact beams
     assert off["stiffened"] < 0.6 * off["linear"]
-    assert following.balance is not None
-    print(f"energy not accounted for: {following.balance.energy:.1e} of the largest exchanged")
-    assert following.balance.energy < 0.01
 
     # at a tenth of the speed links bend a hundredth as far, and the linear equation serves
     slow = [stress(run("60 rpm", turns=1, frames=frames)) for frames in ("nominal", "following")]
