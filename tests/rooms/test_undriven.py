@@ -163,9 +163,11 @@ def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
         "analysis": {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
-    (rate,), (link,) = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
-    m = float(link.one @ link.m1[:, 0])
-    energy = 0.5 * float(np.vdot(rate, mass_times(link.mass, rate)))
+    links, rates = ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model)
+    m = sum(float(link.one @ link.m1[:, 0]) for link in links)
+    energy = sum(
+        0.5 * float(np.vdot(rate, mass_times(link.mass, rate))) for link, rate in zip(links, rates, strict=True)
+    )
     assert energy == pytest.approx(0.5 * m * (4 * 0.6**2 + 0.03**2) / 12 * 3**2, rel=1e-9)
 
 
