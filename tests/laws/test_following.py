@@ -93,7 +93,7 @@ def force(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(seed=seeds)
 def test_force_is_the_gradient_of_the_strain_energy(kind: str, seed: int) -> None:
     """By central differences along random directions, whose error is of order 1e-10."""
@@ -109,7 +109,7 @@ def test_force_is_the_gradient_of_the_strain_energy(kind: str, seed: int) -> Non
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(seed=seeds)
 def test_a_turn_of_the_whole_turns_the_force_and_keeps_the_energy(kind: str, seed: int) -> None:
     rng, link = np.random.default_rng(seed), PARTS[kind]
@@ -121,7 +121,7 @@ def test_a_turn_of_the_whole_turns_the_force_and_keeps_the_energy(kind: str, see
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(seed=seeds)
 def test_force_has_neither_resultant_nor_moment_about_the_deformed_shape(kind: str, seed: int) -> None:
     rng, link = np.random.default_rng(seed), PARTS[kind]
@@ -209,7 +209,7 @@ def test_segments_of_a_beam_in_nominal_frames_are_the_whole_beam(kind: str) -> N
     ],
 )
 def test_cuts_of_meshed_links_make_them_hardly_softer(kind: str, wanted: dict[int, float]) -> None:
-    """Affine-fitted cuts let the two sides warp apart: softer, by what docs/theory.md says, of 12 layers of elements."""
+    """Affine-fitted cuts let the two sides warp apart: softer, as docs/theory.md says; 12 layers of elements."""
     link = segments(kind, 1)[0]
     across = np.array([0.0, 1, 0])
     whole = tip_deflection(link, across)[1]
@@ -248,7 +248,7 @@ def tip(made: Ran) -> np.ndarray:
     return made.displaced("arm", [0.3, 0.2])
 
 
-@pytest.mark.parametrize("kind", ["planar", "plane", "solid"])
+@pytest.mark.parametrize("kind", ["planar", "plane", pytest.param("solid", marks=pytest.mark.long)])
 def test_small_loads_leave_the_linear_answer_and_the_difference_grows_with_their_square(kind: str) -> None:
     changes = {"analysis": {"end_time": 0.012, "step": 4e-4}} if kind == "solid" else {}
     apart, linear = [], 0.0
@@ -272,7 +272,7 @@ def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
         {
             "turns": 0.5,
             "steps_per_turn": 720,
-            "initial": "rest",
+            "initial": "quasi-static",
             **({"frames": "following"} if follow else {}),
         },
         {"mesh": {"elements": 3}},
@@ -327,9 +327,15 @@ def test_the_same_whichever_way_the_whole_scene_is_turned(kind: str) -> None:
 
 
 def pendulum(kind: str, R: np.ndarray) -> dict[str, Any]:
-    points = [R @ x for x in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.1])]
+    points = [list(R @ x) for x in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.1])]
+    hinge = {
+        "kind": "revolute",
+        "links": ["ground", "arm"],
+        "at": points[0],
+        "axis": list(R @ [0.3, 0.4, 1.0]),
+    }
     arm = {"material": "m", "fidelity": "beam", "beam": "spatial", "mesh": {"elements": 2},
-           "shape": {"kind": "polyline", "points": [list(x) for x in points], "width": 0.01, "thickness": 0.01}}  # fmt: skip
+           "shape": {"kind": "polyline", "points": points, "width": 0.01, "thickness": 0.01}}  # fmt: skip
     if kind == "rigid":
         del arm["beam"], arm["mesh"]
         arm["fidelity"] = "rigid"
@@ -337,7 +343,7 @@ def pendulum(kind: str, R: np.ndarray) -> dict[str, Any]:
         "gravity": list(R @ [2.0, -9.0, 3.0]),
         "materials": {"m": ALLOY},
         "links": {"arm": arm},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": list(points[0]), "axis": list(R @ [0.3, 0.4, 1.0])}},
+        "joints": {"A": hinge},
         "springs": {"s": {"kind": "torsion", "joint": "A", "stiffness": 0.05, "damping": 0.002}},
         "analysis": {"end_time": 0.05, "step": 1e-3},
     }  # fmt: skip
@@ -386,7 +392,7 @@ def flight(kind: str, h: float) -> dict[str, Any]:
 def test_joints_stay_closed_and_work_is_as_counted(compiled: bool) -> None:
     """One factorisation per segment, at most four sweeps a step, in the source's four-bar at 600 rpm."""
     raw = four_bar(
-        {"turns": 0.1 if not compiled else 1, "steps_per_turn": 1000, "frames": "following", "initial": "rest"},
+        {"turns": 0.1 if not compiled else 0.5, "steps_per_turn": 1000, "frames": "following", "initial": "rest"},
         {"mesh": {"elements": 4}},
         damping={"ratio": 0.02, "frequencies": [20, 200]},
     ).model_dump(mode="json", exclude_unset=True)  # fmt: skip

@@ -225,9 +225,9 @@ def flight_errors(h: float) -> np.ndarray:
 
 @case("A rod thrown through space", EXACT)
 def flying_rod() -> list[Row]:
-    """1 m × 20 mm × 2 mm, thrown by a force on one end for 0.1 s; its middle leaves the chord by 90 mm. Largest differences over 0.5 s, of the
+    """1 m × 20 mm × 2 mm, thrown by a force on one end for 0.1 s; its middle leaves the chord by 90 mm. Largest
 
-    largest values; linear momentum afterwards."""
+    differences over 0.5 s, of the largest values; linear momentum afterwards."""
     h = 2.5e-4
     errors, text = flight_errors(h), f"8 beam5, step {h:g} s"
     names = ("x0", "y0", "x1", "y1", "energy", "spin")
@@ -279,7 +279,7 @@ def _cubic(t: np.ndarray, x: np.ndarray, k: int) -> Any:
 
 @case("Compound pendulum let go from the horizontal", "4 √(I/mgd) K(sin 45°)")
 def pendulum() -> list[Row]:
-    """Steel bar 1 m × 30 mm × 30 mm, rigid and as a beam, which its own frequency of some hundred Hz leaves nearly rigid."""
+    """Steel bar 1 m × 30 mm × 30 mm, rigid and as a beam, which bends hardly at all."""
     mass = 7850 * SIDE**2
     inertia = mass * (1 / 3 + SIDE**2 / 12)
     exact = pendulum_period(mass, 0.5, inertia, np.pi / 2)

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.following import internal_force, position
 from kedfem.dynamics.frames import Followed, deformation, frames_of, rotation
+from kedfem.dynamics.segment import internal_force, position
 from kedfem.links.beam import beam_link
 from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle

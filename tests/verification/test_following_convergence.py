@@ -6,6 +6,7 @@ import pytest
 from .following import double_errors, flight_errors, four_bar_error
 
 
+@pytest.mark.long
 def test_a_thrown_rod_and_its_energy_converge_with_order_two_in_the_step() -> None:
     """Positions of the ends against the reference; what numerical damping takes falls with the third power."""
     coarse, fine = flight_errors(5e-4), flight_errors(2.5e-4)

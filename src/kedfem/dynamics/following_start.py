@@ -5,18 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.following import (
-    HeldPart,
-    Mixing,
-    held_part,
-    interface_factor,
-    internal_force,
-    mean_orientation,
-    position,
-    solved,
-)
 from kedfem.dynamics.frames import frames_of, seen_from
+from kedfem.dynamics.held import HeldPart, held_part, interface_factor, solved
+from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.ports import port_rotation
+from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import Nodal, NodalOf
 from kedfem.errors import SolveError

@@ -17,7 +17,7 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.following import HeldPart, held_part, held_substructure
+from kedfem.dynamics.held import HeldPart, held_part, held_substructure
 from kedfem.dynamics.ports import port_rotation, port_values
 from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf

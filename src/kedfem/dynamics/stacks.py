@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.frames import Followed, frames_of
+from kedfem.dynamics.segment import SegmentState
 from kedfem.links.record import Link
 
 Rows = Float[np.ndarray, "N d"]
@@ -85,6 +86,53 @@ class StackFrame:
     angle: Float[np.ndarray, " s"]
     g: Rows
     K: Float[np.ndarray, "3 N d"]
+
+
+@dataclass(frozen=True, slots=True)
+class StackState:
+    """The segments of a stack at one time; rows (N, d) in world components, but for `frames` and `damped`.
+
+    u, v, a : δ, δ', δ''; Mu, Mv, Ma : times the mass; in a sweep v, a, Mv are those of the beginning
+    f : internal force
+    F : P − M R0''
+    R : (s, d, d) mean orientation, link to world
+    frames : what follows; none of links with nominal frame
+    damped : α M δ and rates in the nominal frame, (3, N, d)
+    strain : (s,) energy [J]
+    """
+
+    u: Rows
+    v: Rows
+    a: Rows
+    Mu: Rows
+    Mv: Rows
+    Ma: Rows
+    f: Rows
+    F: Rows
+    R: Each
+    frames: tuple[StackFrame, ...]
+    damped: Float[np.ndarray, "3 N d"]
+    strain: Float[np.ndarray, " s"]
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """All segments at one time; port_forces : per segment (q,) λ, world components."""
+
+    stacks: tuple[StackState, ...]
+    port_forces: tuple[Float[np.ndarray, " _"], ...]
+
+
+def stacked(stack: Stack, general: Sequence[SegmentState]) -> StackState:
+    """The segments of a stack at the first time point."""
+    rows = {
+        name: np.concatenate([getattr(s, name) for s in general])
+        for name in ("u", "v", "a", "Mu", "Mv", "Ma", "f", "F")
+    }
+    R, strain = np.stack([s.R for s in general]), np.array([s.strain for s in general])
+    damped = np.concatenate([s.damped for s in general], axis=1)
+    frames = first_frames(stack, [s.frames for s in general])
+    return StackState(**rows, R=R, frames=frames, damped=damped, strain=strain)
 
 
 def stacks(links: Sequence[Link]) -> list[Stack]:
