@@ -17,7 +17,6 @@ from kedfem.results.moments import (
     Vectors,
     crossed,
     dot,
-    is_nominal,
     nominal,
     rotated,
     turned,
@@ -41,37 +40,59 @@ class Resistance:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """A link at the time point before a block: t, g, C0 g and nominal motion, each with a first dimension of one."""
+    """A link at the time point before a block: t, nominal motion, (g, C0 g) of each part of the damping; T is 1."""
 
     t: Scalars
-    g: Field
-    Cg: Field
     at: Nominal
+    parts: tuple[tuple[Field, Field], ...]
 
 
 def resistance(
     of: Constants, history: LinkHistory, made: Products, motion: RigidMotion, before: Last | None
 ) -> tuple[Resistance, Last] | None:
-    """Of one link over a block, from the time point before it on; None without damping."""
+    """Of one link over a block, from the time point before it on; None without damping.
+
+    In a frame that follows β acts on its own deformation, α on that of the nominal frame.
+    """
     if made.Cg is None:
         return None
-    now = Last(motion.t, history.g, made.Cg, nominal(motion, of.body))
+    at = nominal(motion, of.body)
+    now = Last(motion.t, at, _apart(of, history, made, at))
     last = _at(now, slice(-1, None))
     since = _at(now, slice(0, 1)) if before is None else before
-    g, Cg = _change(now.g, since.g), _change(now.Cg, since.Cg)
     h = np.diff(now.t, prepend=since.t)
-    dissipated = dot(g, Cg) / np.where(h > 0, h, 1.0)
-    none = np.zeros((len(h), 3))
-    if not is_nominal(of, history, motion):
-        return Resistance(dissipated, none[:, 0], none, none), last
-    R, p, v, omega = (_mean(getattr(now.at, x), getattr(since.at, x)) for x in ("R", "p", "v", "omega"))
+    total = np.zeros((len(h), 8))
+    for k, (end, start) in enumerate(zip(now.parts, since.parts, strict=True)):
+        total[:, 0] += dot(_change(end[0], start[0]), _change(end[1], start[1])) / np.where(h > 0, h, 1.0)
+        if k == 1:
+            total[:, 1:] += _turning(of, end, start, at, since.at)
+    return Resistance(total[:, 0], total[:, 1], total[:, 2:5], total[:, 5:]), last
+
+
+def _apart(
+    of: Constants, history: LinkHistory, made: Products, at: Nominal
+) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
+    """(g, C g) of β K0 in the link's own frame and of α M in the nominal one, where that is not all the same."""
+    if of.link.fit is None and made.Cg is not None:
+        none = np.zeros_like(history.g)
+        return (none, none), (history.g, made.Cg)
+    u = history.u @ at.R[:, : of.link.d, : of.link.d]
+    return (history.g, of.damping.beta * made.Kg), (u, of.damping.alpha * _mass_times(of, u))
+
+
+def _turning(
+    of: Constants, end: tuple[Field, Field], start: tuple[Field, Field], at: Nominal, before: Nominal
+) -> Float[np.ndarray, "T 7"]:
+    """Drag, impulse and angular impulse of damping forces that turn with the nominal motion."""
+    g, Cg = _change(end[0], start[0]), _change(end[1], start[1])
+    R, p, v, omega = (_mean(getattr(at, x), getattr(before, x)) for x in ("R", "p", "v", "omega"))
     y = in_space(of.link, of.fit.T @ Cg)
-    moment = turned(y[:, 1:]) + crossed(of.link, history.g - 0.5 * g, Cg)
+    moment = turned(y[:, 1:]) + crossed(of.link, end[0] - 0.5 * g, Cg)
     if of.link.kind == "beam":
         moment[:, 2] += Cg[:, :, 2] @ of.link.one
     impulse, turn = rotated(R, y[:, 0]), rotated(R, moment)
     drag = dot(impulse, v) + dot(turn, omega)
-    return Resistance(dissipated, drag, impulse, cross(p, impulse) + turn), last
+    return np.column_stack([drag, impulse, cross(p, impulse) + turn])
 
 
 def products(of: Constants, history: LinkHistory) -> Products:
@@ -101,7 +122,7 @@ def _mass_times(of: Constants, u: Field) -> Field:
 
 def _at(now: Last, which: slice) -> Last:
     at = Nominal(*(getattr(now.at, each.name)[which] for each in fields(Nominal)))
-    return Last(now.t[which], now.g[which].copy(), now.Cg[which].copy(), at)
+    return Last(now.t[which], at, tuple((g[which].copy(), Cg[which].copy()) for g, Cg in now.parts))
 
 
 def _change(
