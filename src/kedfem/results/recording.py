@@ -88,7 +88,7 @@ def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
             x = (x[:, None] @ R)[:, 0] @ link.axes[: link.d, : link.d]
         return np.asarray(x[:, : len(columns)])
 
-    description = f"elastic {probe.quantity} {place}"
+    description = f"{'' if scene.driven is None else 'elastic '}{probe.quantity} {place}"
     return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
 
 
