@@ -56,9 +56,7 @@ class Ran:
         return np.concatenate([b.motion.p[:, body] + b.motion.R[:, body] @ point(at) for b in self.blocks])
 
     def channel(self, name: str) -> np.ndarray:
-        rows = {
-            each.channel.name: each.rows for each in recording(self.ready.scene, self.ready.model)
-        }[name]
+        rows = {each.channel.name: each.rows for each in recording(self.ready.scene, self.ready.model)}[name]
         return np.concatenate([rows(block) for block in self.blocks])
 
     @property

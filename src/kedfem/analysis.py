@@ -180,7 +180,8 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
     notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
-    notes |= {f"segments of {name}": len(parts) for name, parts in segments(model).items() if parts[0].fit is not None}
+    following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
+    notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:

@@ -136,7 +136,8 @@ def plan_tables(plan: Plan) -> list[Table]:
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
     mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
-    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "")
+    segments = "" if link.segments is None else f", {link.segments} segments"
+    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "") + segments
 
 
 def reduction_table(reduction: Reduction) -> Table:
@@ -169,7 +170,9 @@ def _links(model: Model) -> Table:
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for name, parts in segments(model).items():
-        elements, unknowns = (str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts]))
+        elements, unknowns = (
+            str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
+        )
         table.add_row(name, _kind(parts), elements, unknowns, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")

@@ -135,7 +135,8 @@ def test_a_ball_leaves_turning_free_and_holds_the_point() -> None:
     assert_allclose(a, b, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
-def test_memory_does_not_grow_with_the_steps() -> None:
+def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kedfem.dynamics.transient.POINTS", 256)
     raw = four_bar("beam", steps_per_turn=2000)
     scene = scene_from(raw)
     joined = linkage(scene)

@@ -122,7 +122,8 @@ class Breaking:
         return links, state
 
 
-def test_what_was_finite_before_a_blow_up_is_handed_on() -> None:
+def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kedfem.dynamics.transient.POINTS", 256)
     ready = meshed(scene_from(four_bar("beam", turns=1, steps_per_turn=300)))
     solver: Any = Breaking(steps_of(ready.scene, ready.model), 270)  # in the second block
     seen = []

@@ -163,9 +163,9 @@ def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
         "analysis": {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
-    (rate,), (link,) = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
-    m = float(link.one @ link.m1[:, 0])
-    energy = 0.5 * float(np.vdot(rate, mass_times(link.mass, rate)))
+    rates, links = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
+    m = sum(float(link.one @ link.m1[:, 0]) for link in links)
+    energy = 0.5 * sum(float(np.vdot(v, mass_times(x.mass, v))) for v, x in zip(rates, links, strict=True))
     assert energy == pytest.approx(0.5 * m * (4 * 0.6**2 + 0.03**2) / 12 * 3**2, rel=1e-9)
 
 

@@ -121,7 +121,7 @@ def curved_error(radius: float, axis: str) -> Callable[[int], float]:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_curved_beams_converge_to_castigliano(axis: str):
     found, last = slopes(curved_error(0.5, axis), [16, 32, 64])
-    assert ((found > 3.4) & (found < 4.3)).all()  # element's and spline's error, in part against each other
+    assert ((found > 3.4) & (found < 4.4)).all()  # element's and spline's error, in part against each other
     assert last < 3e-8
 
 

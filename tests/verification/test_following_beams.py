@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.following import internal_force, position
 from kedfem.dynamics.frames import Followed, deformation, frames_of, rotation
+from kedfem.dynamics.segment import internal_force, position
 from kedfem.links.beam import beam_link
 from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle
@@ -38,7 +38,7 @@ def force(parts: Sequence[Link], u: np.ndarray) -> np.ndarray:
         here = slice(first, first + part.n)
         y, frames = position(part, u[here]), []
         for frame in frames_of(part):
-            Q, angle = rotation(part, frame.fit, y, np.eye(3), float(u[here, 2].mean()))
+            Q, angle = rotation(part, frame.fit, y, float(u[here, 2].mean()))
             none = np.zeros_like(y)
             frames.append(Followed(Q, angle, deformation(part, y, Q, angle), none, none))
         f[here] += internal_force(part, y, np.eye(3), frames, np.zeros((3, *y.shape)), 0.0)[0]

@@ -91,7 +91,7 @@ def slices(link: Link, joint: Attachment) -> Slices:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, looked at block by block; over links with nominal frames, others have no such error.
+    """Largest sums over time of a run, looked at block by block, over links with nominal frames: others do not err so.
 
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]
@@ -113,7 +113,9 @@ class GeometricError:
 
     def add(self, block: Block) -> None:
         """Look at some time points of a block."""
-        looked_at = [history.strain for of, history in zip(self._of, block.links, strict=True) if of is not None]
+        looked_at = [
+            history.strain for of, history in zip(self._of, block.links, strict=True) if of is not None
+        ]
         if not looked_at:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))

@@ -1,7 +1,8 @@
 """The cheapest model of a scene that is near enough: `analysis.accuracy`.
 
 Everything is found by short trial runs of the scene itself, with reduced links: the step by halving it, the mesh by
-making it finer, simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
+making it finer, segments of links with frames that follow by taking more, simpler links by putting them in. What the
+scene states stays; what it leaves open is chosen.
 """
 
 import math
@@ -12,6 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from kedfem.accuracy.cache import kept
+from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
@@ -27,6 +29,7 @@ from kedfem.errors import KedfemError, SceneError
 from kedfem.scene import LinkScene, Scene, time_grid
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
+SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
@@ -99,14 +102,20 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
     scene, step = _with_step(search, _opened(scene, left_open))
     stage("plan: mesh")
-    scene, mesh, finer = _with_mesh(search, scene, MESH * max(asked, step / STEP))
+    cut = SEGMENTS if open_segments(scene) else 0.0  # of the mesh's share
+    scene, mesh, finer = _with_mesh(search, scene, (MESH - cut) * max(asked, step / STEP))
+    segments = 0.0
+    if cut:
+        stage("plan: segments")
+        scene, segments = with_segments(search, scene, SEGMENTS * max(asked, step / STEP))
     stage("plan: simpler links")
-    scene, model = _with_simpler_links(search, scene, left_open, (MESH + MODEL) * asked - mesh)
+    scene, model = _with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
     scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy=None)
     reduced = any(link.reduced for link in scene.links.values())
     shares = (
-        Share("time step", step, STEP * asked), Share("mesh", mesh, MESH * asked),
-        Share("simpler links", model, max(MODEL, MESH + MODEL - mesh / asked) * asked),
+        Share("time step", step, STEP * asked), Share("mesh", mesh, (MESH - cut) * asked),
+        *([Share("segments", segments, SEGMENTS * asked)] if cut else []),
+        Share("simpler links", model, max(MODEL, MESH - cut + MODEL - mesh / asked) * asked),
         Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
     )  # fmt: skip
     plan = Plan(scene, asked, finer, shares, ())

@@ -26,6 +26,7 @@ from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.substructure import Substructure
 from kedfem.dynamics.transient import instants
+from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -109,7 +110,17 @@ def reduced(
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
     counts : number of functions of links that have it given
+
+    Raises
+    ------
+    SceneError
+        If the drive leaves motions free.
     """
+    if full.linkage.mobility:
+        raise SceneError(
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a "
+            f"motion that the drive prescribes), got {full.linkage.mobility} free"
+        )
     stage("functions")
     parts = static_parts(full.model)
     needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
@@ -121,7 +132,9 @@ def reduced(
 
     def first(share: float) -> Functions:
         return [
-            None if basis is None else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
+            None
+            if basis is None
+            else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
             for link, basis in zip(full.model.links, found, strict=True)
         ]
 
@@ -146,12 +159,14 @@ def first_reduced(
 ) -> Prepared:
     """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
 
+    None is where the drive leaves motions free.
+
     Parameters
     ----------
     known : functions of links that need not be found any more, link by link
     """
     links = full.model.links
-    if all(link.unknowns <= SMALL and link.full is None for link in links):
+    if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):
         return full
     model = full.model if known is None else reduced_model(full.model, known)
     left = {link.name for link in model.links if link.unknowns > MINUTE and link.full is None}
@@ -198,7 +213,9 @@ def _settled(
 def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
     """The next functions of segments, of which few count, as long as there are any; else those of the richer run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
-    segments = [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    segments = (
+        [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
+    )
     return [some if ours else more for ours, some, more in zip(segments, next_ones, richer, strict=True)]
 
 

@@ -27,7 +27,8 @@ def with_steps(scene: Scene, steps: int) -> Scene:
 
 def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:
     """The link meshed in another way, with the usual element and mesh of that way."""
-    given = {key: getattr(link, key) for key in link.model_fields_set - CHOSEN}
+    gone = CHOSEN if family in {"plane", "solid"} else CHOSEN | {"segments"}
+    given = {key: getattr(link, key) for key in link.model_fields_set - gone}
     return LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
 
 

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.following import FollowingSteps, NotConverged
+from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import LinkHistory, joined
 from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.segment import NotConverged
 from kedfem.motion.rigid import RigidMotion
 
 HALVINGS = 6  # a step is taken in up to 2⁶ parts

@@ -12,10 +12,12 @@ from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
-from kedfem.dynamics.following import CONVERGED, DEPTH, NotConverged, first_state, rounding, too_far
+from kedfem.dynamics.held import closed, closure
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.mixing import DEPTH
 from kedfem.dynamics.ports import port_vectors
 from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.segment import CONVERGED, NotConverged, first_state, rounding, too_far
 from kedfem.dynamics.state import LinkState, Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
 from kedfem.links.record import BeamPoint, Link
@@ -47,6 +49,7 @@ class FollowingDense:
         ])  # fmt: skip
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
+        self._closure = closure(joints, [part.W for part in self.parts])
         self._counts = np.array([0.0, rounding(links), 0.0, 0.0, too_far(links)])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
@@ -116,6 +119,7 @@ class FollowingDense:
         """
         from kedfem.dynamics.following_kernel import follow_block
 
+        self._close(state)
         D, n, P = self._sizes
         T, L = len(forcing[0].R), len(self.links)
         R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
@@ -150,6 +154,13 @@ class FollowingDense:
             g = rows_of(link, part, gs)
         R = Rs[:, : link.d, : link.d].copy()
         return LinkHistory(u, v, a, g, R, forcing.F[:taken], forces[:, held], energies.copy())
+
+    def _close(self, state: State) -> None:
+        """Close the joints in displacement and rates, in place."""
+        for x in state[:3]:
+            flat = [x[i, : link.d, : link.n].ravel() for i, link in enumerate(self.links)]
+            for i, (link, y) in enumerate(zip(self.links, closed(self._closure, flat), strict=True)):
+                x[i, : link.d, : link.n] = y.reshape(link.d, link.n)
 
     def _acted(self, i: int, forcing: Forcing, F: Float[np.ndarray, "T D n"]) -> Forcing:
         """The loads of a segment with the forces of motors and springs on it."""

@@ -37,7 +37,7 @@ from kedfem.dynamics.mixing_kernel import factored, mixed, solved
 
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
-SWEEPS, PATIENCE, EASIER = 40, 6, 100.0  # as in `dynamics.following`
+SWEEPS, PATIENCE, EASIER = 40, 12, 100.0  # as in `dynamics.following`
 
 
 @compiled

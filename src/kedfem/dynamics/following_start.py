@@ -3,27 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.following import (
-    HeldPart,
-    Mixing,
-    held_part,
-    internal_force,
-    mean_orientation,
-    position,
-    solved,
-)
 from kedfem.dynamics.frames import frames_of, seen_from
+from kedfem.dynamics.held import HeldPart, held_part, interface_factor, solved
+from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.ports import port_rotation
+from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import Nodal, NodalOf
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
 SWEEPS = 60
-SETTLED = 1e-10  # change of a sweep, of the deflection
+SETTLED = 1e-9  # change of a sweep, of the deflection
+ROUNDING = 1e-11  # the same, of the links' size
 
 
 def far_deflected(
@@ -65,7 +59,7 @@ def _balanced(
     instant: Instant,
     u: list[NodalOf],
 ) -> list[NodalOf]:
-    mixing = Mixing()
+    mixing, least = Mixing(), ROUNDING * max(link.size for link in links)
     ends = np.cumsum([x.size for x in u])[:-1]
     for _ in range(SWEEPS):
         R = [mean_orientation(link, x, now.R) for link, x, now in zip(links, u, instant.at, strict=True)]
@@ -74,12 +68,11 @@ def _balanced(
             for link, x, now, S, r in zip(links, u, instant.at, instant.spin, R, strict=True)
         ]
         RB = [port_rotation(joint, r).T @ joint.B for joint, r in zip(joints, R, strict=True)]
-        H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
-        factor = scipy.linalg.cho_factor(H, check_finite=False) if len(H) else None
+        factor = interface_factor(parts, RB)
         change = [x @ r.T for x, r in zip(solved(parts, rhs, RB, factor)[0], R, strict=True)]
         taken = mixing.step(np.concatenate([x.ravel() for x in change]))
         u = [x + y.reshape(x.shape) for x, y in zip(u, np.split(taken, ends), strict=True)]
-        if max(np.abs(x).max() for x in change) <= SETTLED * max(np.abs(x).max() for x in u):
+        if max(np.abs(x).max() for x in change) <= max(SETTLED * max(np.abs(x).max() for x in u), least):
             return u
     raise SolveError(
         'analysis.initial: must be a deflection that can be found, got none that settles: take initial = "rest"'

@@ -14,12 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import Nodal, accelerated
+from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Frame, Link
-
-TURNS = 50  # Newton's steps for a rotation, of which it takes 2 or 3
-SETTLED = 1e-15
 
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
@@ -41,28 +37,26 @@ class Followed:
 
 
 def rotation(
-    link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, before: Float[np.ndarray, "d d"], angle: float
+    link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float
 ) -> tuple[Float[np.ndarray, "d d"], float]:
-    """Q of Σ y_a ⊗ fit_a, near an earlier one; of a planar link with its angle, which counts turns.
+    """Q of Σ y_a ⊗ fit_a; of a planar link with its angle, which counts turns.
 
     Parameters
     ----------
-    before, angle : earlier Q; its angle
+    angle : an earlier one
     """
     if link.planar:
         A = y[:, :2].T @ fit[:, :2]
         turn = np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1])
         turn += 2 * np.pi * np.round((angle - turn) / (2 * np.pi))
         return planar_rotation(float(turn), link.d), float(turn)
-    A, Q = y.T @ fit, before
-    for _ in range(TURNS):
-        U = Q.T @ A
-        axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
-        turn = np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)
-        Q = Q @ turned(turn)
-        if np.abs(turn).max() <= SETTLED:
-            break
-    return Q, 0.0
+    A = y.T @ fit
+    left, _, right = np.linalg.svd(A)
+    Q = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
+    # once more by Newton: a slender segment tells its twist by small numbers
+    U = Q.T @ A
+    axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
+    return Q @ turned(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
 
 
 def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
@@ -97,22 +91,9 @@ def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
     ----------
     y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
     """
-    Q, angle = rotation(link, frame.fit, y, np.eye(link.d), 0.0)
+    Q, angle = rotation(link, frame.fit, y, 0.0)
     g = deformation(link, y, Q, angle)
     return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
-
-
-def followed(link: Link, frame: Frame, y: Nodal, before: Followed, scheme: Scheme) -> Followed:
-    """A frame at the end of a step, rates of g by the scheme's own formulas.
-
-    Parameters
-    ----------
-    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
-    before : at the beginning of the step
-    """
-    Q, angle = rotation(link, frame.fit, y, before.Q, before.angle)
-    g = deformation(link, y, Q, angle)
-    return Followed(Q, angle, g, *accelerated(scheme, g, before.g, before.g1, before.g2))
 
 
 def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:
@@ -140,10 +121,10 @@ def _times(K: np.ndarray, g: Nodal) -> Nodal:
     return np.asarray((K @ g.ravel()).reshape(g.shape))
 
 
-def stress_deformation(link: Link, frames: Sequence[Frame], now: Sequence[Followed]) -> Nodal:
+def stress_deformation(link: Link, frames: Sequence[Frame], seen: Sequence[Nodal]) -> Nodal:
     """The g from which stresses come: that of a single frame, or of a beam one with the strains that its points see."""
     points = [frame.point for frame in frames if frame.point]
     if not points:
-        return now[0].g
-    strains = (point.share @ (point.strains @ x.g.ravel()) for point, x in zip(points, now, strict=True))
+        return seen[0]
+    strains = (point.share @ (point.strains @ g.ravel()) for point, g in zip(points, seen, strict=True))
     return np.asarray(sum(strains)).reshape(link.n, link.d)

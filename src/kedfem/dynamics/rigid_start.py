@@ -17,13 +17,13 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.following import HeldPart, held_part, held_substructure
+from kedfem.dynamics.held import HeldPart, held_part, held_substructure
 from kedfem.dynamics.ports import port_rotation, port_values
 from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf
 from kedfem.links.record import Link, mass_times
 
-STIFFER = 1e8  # κ of a rigid link, of its mass over its stiffness
+STIFFER = 1e6  # κ of a rigid link, of its mass over its stiffness
 STILL = 1e6  # how much heavier an elastic link is made, than a rigid one is stiff, where only rigid ones are to strain
 REST = 1e-8  # mass of a rigid link there, of its stiffness: it has its place where nothing else holds it
 

@@ -2,7 +2,7 @@
 
 A segment bends under the forces of its cuts and joints: a handful of deflections, whose strain energy is small beside
 what each of their components alone would take (a bar bends by s² across and s y along it, and its section changes by y z:
-without any one of these it is stiff). So functions are not sorted by their size. From all of them the one goes first whose
+without any one of these it is stiff). So functions are not sorted by size. From all of them the one goes first whose
 loss costs the deflections least strain energy, the others free to answer. With K the stiffness on the functions and C a
 deflection's coefficients, the loss of qᵀ C costs
 

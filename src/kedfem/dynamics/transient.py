@@ -12,7 +12,7 @@ from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
-from kedfem.dynamics.following import CONVERGED, FREE, FollowingSteps
+from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, Snapshot, history
@@ -21,6 +21,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.segment import CONVERGED, FREE
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening

@@ -24,6 +24,9 @@ from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.mesh import HexMesh, QuadMesh
 from kedfem.scene import Material
 
+HUBS_STIFF = (
+    3.0  # of E A L of an element: stiffer ones resist being turned against their segment, softer ones bend
+)
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
 Interval = tuple[float, float]
 
@@ -228,7 +231,9 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
     if section is None:
         raise TypeError(f"links.{link.name}: has no section")  # a beam has
     own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
-    return replace(following(spatial_beam_link(link.name, own, section, material)), axes=link.axes)
+    return replace(
+        following(spatial_beam_link(link.name, own, section, material, HUBS_STIFF)), axes=link.axes
+    )
 
 
 def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:

@@ -117,7 +117,9 @@ def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndar
     return np.kron(m, np.diag([section.area, section.second_moment, section.second_moment_z]))
 
 
-def spatial_beam_link(name: str, axis: Axis, section: Section, material: Material) -> Link:
+def spatial_beam_link(
+    name: str, axis: Axis, section: Section, material: Material, hubs_stiff: float = HUB_STIFFNESS
+) -> Link:
     """The record of a beam in space.
 
     Ends and corners are hubs: four functions {1, x, y, z}, a full affine field, whose gradient each segment reads along
@@ -126,6 +128,7 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
     Parameters
     ----------
     axis : stations of its axis in the reference position
+    hubs_stiff : of E A L |sym G|²
     """
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
@@ -140,7 +143,7 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
         triples.T @ m @ triples + _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
     )
     K0 = sp.csr_array(
-        vectors.T @ K @ vectors + hub_stiffness(X, hubs, HUB_STIFFNESS * rigidity[0] * length_of(axis))
+        vectors.T @ K @ vectors + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis))
     )
     mass = (m, m, m)
     m1, mX = mass_constants(mass, one, X)

@@ -74,8 +74,8 @@ class LinkScene(Record):
     frames: Frames | None = None
     """frames of this link, if other than those of the analysis"""
     segments: Count | None = None
-    """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given, or
-    as many as its mesh has layers; chosen where `analysis.accuracy` is given; those of a beam are its elements"""
+    """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given,
+    or as many as its mesh has layers; chosen where `analysis.accuracy` is given; those of a beam are its elements"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:

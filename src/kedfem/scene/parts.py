@@ -140,7 +140,9 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
         damping=single("damping", raw.get("damping")),
         analysis=single("analysis", raw.get("analysis")),
-        animation=single("animation", output.get("animation") if isinstance(output, Mapping) else None, "output"),
+        animation=single(
+            "animation", output.get("animation") if isinstance(output, Mapping) else None, "output"
+        ),
         gravity=gravity,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
         folder=folder,
