@@ -1,36 +1,36 @@
 """What damping takes: of energy, and where its forces turn with the nominal motion, of momentum."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
-from kedfem.links.record import in_space
-from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.results.moments import (
     Constants,
     Field,
     Nominal,
-    Scalars,
-    Vectors,
-    crossed,
     dot,
-    is_nominal,
-    nominal,
+    flat_times,
+    in_world,
+    mass_times,
+    paired,
     rotated,
     turned,
 )
 
+Scalars = Float[np.ndarray, " T"]
+Vectors = Float[np.ndarray, "3 T"]
+
 
 @dataclass(frozen=True, slots=True)
 class Resistance:
-    """What damping takes in each of the steps that end at T time points.
+    """What damping takes of all links in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
     drag : (T,) work of the damping forces against the nominal motion, where these turn with it [J]
-    impulse, angular : (T, 3) of the damping forces, about the world's origin [N s, N m s]
+    impulse, angular : (3, T) of the damping forces, about the world's origin [N s, N m s]
     """
 
     dissipated: Scalars
@@ -41,67 +41,91 @@ class Resistance:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """A link at the time point before a block: t, g, C0 g and nominal motion, each with a first dimension of one."""
+    """The time point before a block: t, nominal motion, and each link's g, K0 g and C0 g, a first dimension of one."""
 
     t: Scalars
-    g: Field
-    Cg: Field
     at: Nominal
+    links: Sequence[tuple[Field, Field, Field | None]]
 
 
 def resistance(
-    of: Constants, history: LinkHistory, made: Products, motion: RigidMotion, before: Last | None
-) -> tuple[Resistance, Last] | None:
-    """Of one link over a block, from the time point before it on; None without damping."""
-    if made.Cg is None:
-        return None
-    now = Last(motion.t, history.g, made.Cg, nominal(motion, of.body))
-    last = _at(now, slice(-1, None))
-    since = _at(now, slice(0, 1)) if before is None else before
-    g, Cg = _change(now.g, since.g), _change(now.Cg, since.Cg)
-    h = np.diff(now.t, prepend=since.t)
-    dissipated = dot(g, Cg) / np.where(h > 0, h, 1.0)
-    none = np.zeros((len(h), 3))
-    if not is_nominal(of, history, motion):
-        return Resistance(dissipated, none[:, 0], none, none), last
-    R, p, v, omega = (_mean(getattr(now.at, x), getattr(since.at, x)) for x in ("R", "p", "v", "omega"))
-    y = in_space(of.link, of.fit.T @ Cg)
-    moment = turned(y[:, 1:]) + crossed(of.link, history.g - 0.5 * g, Cg)
-    if of.link.kind == "beam":
-        moment[:, 2] += Cg[:, :, 2] @ of.link.one
-    impulse, turn = rotated(R, y[:, 0]), rotated(R, moment)
-    drag = dot(impulse, v) + dot(turn, omega)
-    return Resistance(dissipated, drag, impulse, cross(p, impulse) + turn), last
+    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
+    now: tuple[Scalars, Nominal], before: Last,
+) -> Resistance:  # fmt: skip
+    """Of damped links over a block, from the time point before it on.
+
+    Parameters
+    ----------
+    turns : whether K, and so the damping forces, turn with the nominal motion
+    now : times, and nominal motion of all bodies
+    """
+    t, at = now
+    h = np.diff(t, prepend=before.t)
+    which = np.flatnonzero(turns)
+    bodies = np.array([x.body for x in of])[which]
+    taken = np.zeros(len(t))
+    k, size = of[0].k, (len(which), len(t))
+    rows, arms = np.empty((len(of[0].fit), *size)), np.empty((k, k, *size))
+    for i, (x, history, product, last) in enumerate(zip(of, histories, made, before.links, strict=True)):
+        g, Cg = _changes(x, history.g, product, *last)
+        taken += dot(g, Cg)
+        if turns[i]:
+            slot = int(np.searchsorted(which, i))
+            np.matmul(x.fit, Cg.reshape(len(t), -1).T, out=rows[:, slot])
+            arms[:, :, slot] = paired(k, history.g - 0.5 * g, Cg)
+    taken /= np.where(h > 0, h, 1.0)
+    if not len(which):
+        none = np.zeros((3, len(t)))
+        return Resistance(taken, none[0], none, none)
+    return Resistance(taken, *_turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
-def products(of: Constants, history: LinkHistory) -> Products:
-    """M δ', K0 g and C0 g, made here if the solver did not hand them on."""
+def _turning(
+    rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: Nominal
+) -> tuple[Scalars, Vectors, Vectors]:
+    """Drag, impulse and angular impulse of damping forces that turn with the nominal motion."""
+    y = rows[:-1].reshape(at.rates.shape[1:])
+    moment = turned(y[1:] + arms)
+    moment[-1] += rows[-1]
+    impulse, turn = np.einsum("ijst,jst->ist", at.place[:, 1:], y[0]), rotated(at, moment)
+    drag = np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
+    angular = turned(at.place[:, :1] * impulse) + turn
+    return np.asarray(drag), in_world(impulse), in_world(angular)
+
+
+def last_of(
+    t: Scalars, at: Nominal, histories: Sequence[LinkHistory], made: Sequence[Products], which: int
+) -> Last:
+    """What the next block needs of one time point of this one."""
+    first = which % len(t)
+    one = slice(first, first + 1)
+    kept = [
+        (x.g[one].copy(), y.Kg[one].copy(), None if y.Cg is None else y.Cg[one].copy())
+        for x, y in zip(histories, made, strict=True)
+    ]
+    return Last(t[one], at.every(one), kept)
+
+
+def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
+    """M δ', and K0 g if K turns with the nominal motion, made here if the solver did not hand them on."""
     if history.products is not None:
         return history.products
-    g, alpha, beta = history.g, of.damping.alpha, of.damping.beta
-    Kg = np.asarray((of.K0 @ g.reshape(len(g), -1).T).T).reshape(g.shape)
-    Cg = None
-    if of.damping.present:
-        Cg = beta * Kg
-        if alpha:
-            Cg += alpha * _mass_times(of, g)
-    return Products(_mass_times(of, history.v), Kg, Cg)
+    Kg = flat_times(of.K0, history.g) if turns else np.zeros((len(history.g), 0, 0))
+    return Products(mass_times(of, history.v), Kg, None)
 
 
-def _mass_times(of: Constants, u: Field) -> Field:
-    """M u over time."""
-    if not any(m is not None for m in of.masses):
-        return u
-    out = u.copy()
-    for k, m in enumerate(of.masses):
-        if m is not None:
-            out[:, :, k] = (m @ u[:, :, k].T).T
-    return out
-
-
-def _at(now: Last, which: slice) -> Last:
-    at = Nominal(*(getattr(now.at, each.name)[which] for each in fields(Nominal)))
-    return Last(now.t[which], now.g[which].copy(), now.Cg[which].copy(), at)
+def _changes(
+    of: Constants, now: Field, made: Products, before: Field, Kg: Field, last: Field | None
+) -> tuple[Field, Field]:
+    """g and C0 g in each step."""
+    g = _change(now, before)
+    if made.Cg is not None and last is not None:
+        return g, _change(made.Cg, last)
+    Cg = _change(made.Kg, Kg) if made.Kg.size else flat_times(of.K0, g)
+    Cg *= of.damping.beta
+    if of.damping.alpha:
+        Cg += of.damping.alpha * mass_times(of, g)
+    return g, Cg
 
 
 def _change(
@@ -114,6 +138,7 @@ def _change(
     return out
 
 
-def _mean(now: Float[np.ndarray, "T ..."], before: Float[np.ndarray, "1 ..."]) -> Float[np.ndarray, "T ..."]:
+def _mean(now: Nominal, before: Nominal) -> Nominal:
     """Of the two ends of each step."""
-    return np.asarray(now - 0.5 * _change(now, before))
+    pairs = ((getattr(now, x), getattr(before, x)) for x in ("place", "rates", "omega", "alpha"))
+    return Nominal(*(0.5 * (x + np.concatenate([y, x[..., :-1]], axis=-1)) for x, y in pairs))
