@@ -29,7 +29,7 @@ from kedfem.results.records import Channel
 from kedfem.results.resistance import Last, last_of, products, resistance
 
 Rows = Float[np.ndarray, "T c"]
-GROUP = 4  # links whose moments are looked at together: of a thousand time points they fit into a cache
+GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
 UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),

@@ -72,7 +72,7 @@ def resistance(
         if turns[i]:
             slot = int(np.searchsorted(which, i))
             np.matmul(x.fit, Cg.reshape(len(t), -1).T, out=rows[:, slot])
-            arms[:, :, slot] = paired(k, history.g - 0.5 * g, Cg)
+            arms[:, :, slot] = paired(k, history.g, Cg) - 0.5 * paired(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
         none = np.zeros((3, len(t)))
