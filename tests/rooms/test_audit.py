@@ -1,7 +1,6 @@
 """The energy and momentum of a run: every kind of link, second order in the step, and what known laws say."""
 
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.ports import port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
@@ -20,13 +20,14 @@ from kedfem.dynamics.substructure import effective_coefficients
 from kedfem.links.record import Link
 
 SMALL = 360  # unknowns of a link: up to here dense matrices beat a sparse factor (docs/performance)
+UNIT = 1e-10  # a mass of mass-orthonormal functions differs from 1 by their rounding
 
 
 @dataclass(frozen=True, slots=True)
 class DensePart:
     """One link with its ports held, in mass-orthonormal coordinates x, component first: row c of δ is T[c] x[c].
 
-    T : per component (n, n)
+    T : per component (n, n); unit: whether it is 1, as of reduced links
     G : (N, N) A⁻¹ with ports held; Y : (N, q) shape of the link as its ports move; S : (q, q) port stiffness of A
     W : (q, N) ports; q counts all components of all ports, those that are not held are zero
     """
@@ -36,6 +37,7 @@ class DensePart:
     Y: Float[np.ndarray, "N q"]
     S: Float[np.ndarray, "q q"]
     W: Float[np.ndarray, "q N"]
+    unit: bool = False
 
 
 class DenseSteps:
@@ -102,11 +104,11 @@ class DenseSteps:
         R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
         for i, (link, part, each) in enumerate(zip(self.links, self.parts, forcing, strict=True)):
             R[:, i, : link.d, : link.d] = each.R
-            for c in range(link.d):
-                F[:, i, c, : link.n] = each.F[:, :, c] @ part.T[c]
+            F[:, i, : link.d, : link.n] = work_over_time(part, each.F)
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
+        Kg = np.empty((T if any(part.unit for part in self.parts) else 0, L, D, n))
         forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
-        history = (u, v, a, g, forces, strain)
+        history = (u, v, a, g, forces, strain, Kg)
         self._loop(forcing, (R, F), state, history)
         return [self._history(i, each, history) for i, each in enumerate(forcing)], state
 
@@ -118,21 +120,23 @@ class DenseSteps:
         history: tuple[np.ndarray, ...],
     ) -> None:
         """Advance the state and fill the history in place."""
-        from kedfem.dynamics.kernel import advance_block
-        from kedfem.dynamics.stiffened_kernel import advance_stiffened
-
         known = (self._matrices, *self._unknowns, padded)
         if self._stress is None:
+            from kedfem.dynamics.kernel import advance_block
+
             advance_block(self.coefficients, *known, state, history)
             return
+        from kedfem.dynamics.stiffened_kernel import advance_stiffened
+
         limits, stressed = (self.scheme.h, SETTLED, SWEEPS), self._stress.over_block(forcing)
         advance_stiffened(self.coefficients, limits, *known, stressed, state, history)
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
         link, joint, part = self.links[i], self.joints[i], self.parts[i]
         u, v, a, g = (rows_of(link, part, x[:, i]) for x in history[:4])
-        held = self._held(joint)
-        return LinkHistory(u, v, a, g, forcing.R, forcing.F, history[4][:, i, held], history[5][:, i].copy())
+        forces, strain = history[4][:, i, self._held(joint)], history[5][:, i].copy()
+        products = Products(v, rows_of(link, part, history[6][:, i]), None) if part.unit else None
+        return LinkHistory(u, v, a, g, forcing.R, forcing.F, forces, strain, products)
 
     def _padded(self) -> tuple[np.ndarray, ...]:
         D, n, P = self._sizes
@@ -176,25 +180,25 @@ def dense_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> DensePa
     """A link in mass-orthonormal coordinates; its ports are held by a null-space basis, so that a long step, where A
     nearly lets a free link go, does no harm."""
     T = tuple(_mass_orthonormal(_dense(m)) for m in link.mass)
-    n, d = link.n, link.d
+    n, d, unit = link.n, link.d, all(np.array_equal(t, np.eye(link.n)) for t in T)
     A = c_K * _symmetric(component_first(T, link.K0))
     A[np.diag_indices(len(A))] += c_M
     W = port_columns(joint, n).T.reshape(-1, n, d).transpose(0, 2, 1)
     W = np.concatenate([W[:, c] @ T[c] for c in range(d)], axis=1)
     if not len(W):
-        return DensePart(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W)
+        return DensePart(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W, unit)
     V, L = scipy.linalg.qr(W.T)
     V1, Z = V[:, : len(W)], V[:, len(W) :]
     factor = scipy.linalg.cho_factor(_symmetric(Z.T @ A @ Z))
     G = Z @ scipy.linalg.cho_solve(factor, Z.T)
     moved = V1 @ np.linalg.inv(L[: len(W)]).T  # W moved = 1
     Y = moved - G @ (A @ moved)
-    return DensePart(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W)
+    return DensePart(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W, unit)
 
 
 def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
     """T with Tᵀ m T = 1."""
-    if np.abs(m - np.eye(len(m))).max() < 1e-12:
+    if np.abs(m - np.eye(len(m))).max() < UNIT:
         return np.eye(len(m))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(m)).T)
 
@@ -218,8 +222,17 @@ def work_on(part: DensePart, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray
     return np.stack([T.T @ rows[:, c] for c, T in enumerate(part.T)])
 
 
+def work_over_time(part: DensePart, rows: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T d n"]:
+    """Nodal forces on x over time."""
+    if part.unit:
+        return rows.transpose(0, 2, 1)
+    return np.stack([rows[:, :, c] @ T for c, T in enumerate(part.T)], axis=1)
+
+
 def rows_of(link: Link, part: DensePart, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
     """States of x over time."""
+    if part.unit:
+        return np.array(x[:, : link.d, : link.n].transpose(0, 2, 1), order="C")
     return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=2)
 
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from kedfem.dynamics.acting import acting_on, over_block
 from kedfem.dynamics.action import Action
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on, work_over_time
 from kedfem.dynamics.held import closed, closure
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.mixing import DEPTH
@@ -125,8 +125,7 @@ class FollowingDense:
         R, F = np.zeros((T, L, D, D)), np.zeros((T, L, D, n))
         for i, (link, part, each) in enumerate(zip(self.links, self.parts, forcing, strict=True)):
             R[:, i, : link.d, : link.d] = each.R
-            for c in range(link.d):
-                F[:, i, c, : link.n] = each.F[:, :, c] @ part.T[c]
+            F[:, i, : link.d, : link.n] = work_over_time(part, each.F)
         u, v, a, g = (np.empty((T, L, D, n)) for _ in range(4))
         strains = np.empty((T, *state[10].shape[1:]))
         history = (u, v, a, g, strains, np.zeros((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))

@@ -34,7 +34,8 @@ class Products:
     """Products with the state that a solver has at hand anyway; all (T, n, d).
 
     Mv : M δ', world components [kg m/s]
-    Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping
+    Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping,
+        or where the mass is 1 and K0 g tells it
     """
 
     Mv: Float[np.ndarray, "T n d"]

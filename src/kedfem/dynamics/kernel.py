@@ -9,7 +9,7 @@ N = D·S coordinates (component first), P ports, Q = D·P port components; k int
     columns, count : (L, k), (L,) which interface unknowns a link knows, and how many
     forcing : R (T, L, D, D), F (T, L, D, S)
     state : u, v, a, F, f (L, D, S), R (L, D, D), port forces (L, Q), C (3, L, D, S)
-    history : u, v, a, g (T, L, D, S), port forces (T, L, Q), strain energy (T, L)
+    history : u, v, a, g (T, L, D, S), port forces (T, L, Q), strain energy (T, L); K0 g (T, L, D, S), or none
 
 Imported when it is first needed: numba takes a while to load. Plain loops, so that nothing is allocated in a step.
 """
@@ -124,7 +124,8 @@ def end_of_step(coefficients, t, i, R, F, g, Kg, force, state, history):  # type
     c_M, c_K, alpha_f = coefficients[:3]
     n0, n1, n2, h1, h0, alpha, beta = coefficients[7:14]
     u, v, a, F0, f, R0, port_forces, C = state
-    us, vs, as_, gs, forces, strain = history
+    us, vs, as_, gs, forces, strain, Kgs = history
+    kept = len(Kgs) > 0
     damped = alpha != 0.0 or beta != 0.0
     D, n = F.shape
     energy = 0.0
@@ -133,6 +134,8 @@ def end_of_step(coefficients, t, i, R, F, g, Kg, force, state, history):  # type
             m = b * n + j
             Kg[m] = (Kg[m] - c_M * g[m]) / c_K
             energy += g[m] * Kg[m]
+            if kept:
+                Kgs[t, i, b, j] = Kg[m]
             inner = Kg[m]
             if damped:
                 x = alpha * g[m] + beta * Kg[m]

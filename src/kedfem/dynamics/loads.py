@@ -14,7 +14,7 @@ from kedfem.dynamics.coupling import on_part
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, as_rows
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import face_seat, surface_weights
+from kedfem.links.seats import face_seat, is_flat, same_face, surface_weights
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import BodyLoad, ForceLoad, Load, Scene, SurfaceLoad, load_factor
 
@@ -88,8 +88,7 @@ def _point_weights(where: str, load: ForceLoad, link: Link) -> Float[np.ndarray,
 def _surface_weights(
     where: str, load: SurfaceLoad, parts: Mapping[str, Link]
 ) -> dict[str, Float[np.ndarray, " n"]]:
-    """A face may run over several segments: all of it that each has, seen from the face's own plane or curve."""
-    found: dict[str, Float[np.ndarray, " n"]] = {}
+    """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
     at = np.asarray(load.at)
     for link in parts.values():
         if not link.meshed:
@@ -97,8 +96,11 @@ def _surface_weights(
                 f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
             )
     key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
-    found[key] = surface_weights(parts[key], seat)
-    return found
+    found = {key: seat}
+    for other in parts.keys() - {key} if is_flat(seat) else ():
+        if (same := same_face(parts[other], seat)) is not None:
+            found[other] = same
+    return {key: surface_weights(parts[key], seat) for key, seat in found.items()}
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:

@@ -106,8 +106,9 @@ def sweep(matrices, columns, count, interface, effect, base, rhs, g, force):  # 
 @compiled
 def unsettled(t, history):  # type: ignore[no-untyped-def]
     """No more history."""
-    us, vs, as_, gs, forces, strain = history
+    us, vs, as_, gs, forces, strain, Kgs = history
     us[t:], vs[t:], as_[t:], gs[t:], forces[t:], strain[t:] = np.nan, np.nan, np.nan, np.nan, np.nan, np.nan
+    Kgs[t:] = np.nan
 
 
 @compiled

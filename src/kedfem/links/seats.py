@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.surface import PLANE_TOLERANCE, cylinder, flat_face, smooth_face, sphere, surface
+from kedfem.links.surface import PLANE_TOLERANCE, boundary, cylinder, flat_face, smooth_face, sphere, surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +106,25 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
     if not len(facets):
         raise MeshError(_not_touching(link, where, point))
     return facet_seat(link, facets)
+
+
+def same_face(link: Link, seat: Seat) -> Seat | None:
+    """What another segment of a link has of a plane face, None if it has none of it.
+
+    Parameters
+    ----------
+    seat : the face on the segment where it was found
+    """
+    if link.full is not None and link.Q is not None:
+        found = same_face(link.full, seat)
+        return None if found is None else replace(found, fit=found.fit @ link.Q)
+    _, corners, normals = boundary(link)
+    height = np.abs((corners - seat.origin) @ face_normal(seat)).max(axis=1)
+    along = np.abs(normals @ face_normal(seat)) > 1 - 1e-6
+    for point in corners.mean(axis=1)[(height <= PLANE_TOLERANCE * link.size) & along]:
+        if len(facets := flat_face(link, point)):
+            return facet_seat(link, facets)
+    return None
 
 
 def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:

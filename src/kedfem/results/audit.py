@@ -11,23 +11,25 @@ integration's: of second order in the step, and what numerical damping takes (ρ
 Work is the trapezoidal sum of powers; damping's is that of the means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
-from kedfem.results.balance import Flow, carried_flow, link_flow
-from kedfem.results.moments import constants
+from kedfem.motion.rigid import RigidMotion
+from kedfem.results.balance import Flow, carried_fields, fields_of, flow
+from kedfem.results.moments import Constants, Nominal, constants, nominal
 from kedfem.results.records import Channel
-from kedfem.results.resistance import Last, products, resistance
+from kedfem.results.resistance import Last, last_of, products, resistance
 
 Rows = Float[np.ndarray, "T c"]
+GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
 UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
@@ -96,6 +98,8 @@ class Account:
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
+        self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
+        self._carried_groups = [group for k in (2, 3) for group in _grouped(self.carried, k)]
         self._block: Block | None = None
         self._begin()
 
@@ -103,7 +107,7 @@ class Account:
         self._next = -1
         self._sums: _Sums | None = None
         self._start: Float[np.ndarray, " 7"] = np.zeros(7)
-        self._last: list[Last | None] = [None] * len(self.of)
+        self._last: list[Last | None] = [None] * len(self._groups)
         self._largest = np.zeros(8)
 
     def rows(self, block: Block) -> dict[str, Rows]:
@@ -125,13 +129,12 @@ class Account:
 
     def _added(self, block: Block) -> dict[str, Rows]:
         """Energies and sums of one more block."""
-        flows, taken = self._flows(block)
-        flow = sum(flows[1:], start=flows[0])
+        flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
-        state = np.column_stack([flow.kinetic + strain, flow.momentum, flow.angular])
-        rates = np.column_stack(
+        state = np.vstack([flow.kinetic + strain, flow.momentum, flow.angular]).T
+        rates = np.vstack(
             [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning]
-        )
+        ).T
         if self._sums is None:
             self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(8))
             self._start = state[0]
@@ -141,29 +144,46 @@ class Account:
         left += np.column_stack(
             [total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]]
         )
-        self._watch(flows, np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]), left, work)
+        self._watch(
+            flow.sizes, np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]), left, work
+        )
         return {
             "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
             "dissipated": total[:, :1], "neglected": (work[:, 2] + total[:, 1])[:, None], "residual": left[:, :1],
         }  # fmt: skip
 
-    def _flows(self, block: Block) -> tuple[list[Flow], Float[np.ndarray, "T 8"]]:
-        """Of every link, and what damping takes in each step, all links together."""
-        motion, flows, taken = block.motion, [], np.zeros((len(block), 8))
-        for k, (of, history) in enumerate(zip(self.of, block.links, strict=True)):
-            made = products(of, history)
-            flows.append(link_flow(of, history, made, motion))
-            found = resistance(of, history, made, motion, self._last[k])
-            if found is not None:
-                lost, self._last[k] = found
-                taken += np.column_stack([lost.dissipated, lost.drag, lost.impulse, lost.angular])
-        for of, x in zip(self.carried, self.model.carried, strict=True):
-            flows.append(carried_flow(of, applied(x.link, x.loads, motion, x.body), motion))
-        return flows, taken
+    def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 8"]]:
+        """Of all links, and what damping takes in each step."""
+        motion, at, flows, taken = block.motion, nominal(block.motion), [], np.zeros((len(block), 8))
+        for k, group in enumerate(self._groups):
+            of, links = [self.of[i] for i in group], [block.links[i] for i in group]
+            found, lost = self._flow_of(k, of, links, motion, at)
+            flows.append(found)
+            taken += lost
+        for group in self._carried_groups:
+            of, loaded = [self.carried[i] for i in group], [self.model.carried[i] for i in group]
+            forces = [applied(x.link, x.loads, motion, x.body) for x in loaded]
+            flows.append(flow(of, carried_fields(of, forces), at.of(_bodies(of), of[0].k)))
+        return sum(flows[1:], start=flows[0]), taken
+
+    def _flow_of(
+        self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: Nominal
+    ) -> tuple[Flow, Float[np.ndarray, "T 8"] | float]:
+        """Of the links of a group, and what damping takes of them."""
+        turns = [x.link.fit is None for x in of]
+        made = [products(*each) for each in zip(of, links, turns, strict=True)]
+        bodies = _bodies(of)
+        found = flow(of, fields_of(of, links, made, turns), at.of(bodies, of[0].k))
+        if not self.model.damping.present:
+            return found, 0.0
+        last = self._last[k] or last_of(motion.t, at, of, links, made, 0)
+        lost = resistance(of, links, made, turns, (motion.t, at), last)
+        self._last[k] = last_of(motion.t, at, of, links, made, -1)
+        return found, np.vstack([lost.dissipated, lost.drag, lost.impulse, lost.angular]).T
 
     def _watch(
         self,
-        flows: list[Flow],
+        sizes: Float[np.ndarray, "2 T"],
         exchanged: Float[np.ndarray, "T 5"],
         left: Float[np.ndarray, "T 7"],
         work: Float[np.ndarray, "T 12"],
@@ -171,12 +191,11 @@ class Account:
         """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
         planar = any(of.link.planar for of in self.of)
         linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
-        sizes = (
-            exchanged, sum(_size(x.momentum) for x in flows), sum(_size(x.angular) for x in flows),
-            left[:, 0], work[:, 2], _size(left[:, 1:4][:, linear]), _size(left[:, 4:7][:, angular]),
+        found = (
+            exchanged, *sizes, left[:, 0], work[:, 2], _size(left[:, 1:4][:, linear]), _size(left[:, 4:7][:, angular]),
             _size(work[:, 9:][:, angular]),
         )  # fmt: skip
-        self._largest = np.maximum(self._largest, [float(np.abs(x).max()) for x in sizes])
+        self._largest = np.maximum(self._largest, [float(np.abs(x).max()) for x in found])
 
 
 def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
@@ -206,6 +225,16 @@ def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
         f"the balance leaves over {said}: the steps are too long for what moves, or numerical damping takes what they "
         "do not resolve; take shorter ones",
     )
+
+
+def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:
+    """Numbers of the links in k dimensions, a few at a time."""
+    which = [i for i, x in enumerate(of) if x.k == k]
+    return [which[i : i + GROUP] for i in range(0, len(which), GROUP)]
+
+
+def _bodies(of: Sequence[Constants]) -> Int[np.ndarray, " S"]:
+    return np.array([x.body for x in of])
 
 
 def _size(x: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:

@@ -1,51 +1,38 @@
-"""Energy, momentum and power of one link, seen from the general equation, [KED, eq. (20)].
+"""Energy, momentum and power of links, seen from the general equation, [KED, eq. (20)].
 
 The absolute motion is R' = R0 + δ, its rate R0' + δ' with R0' = 1 ⊗ p' + X R'ᵀ.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.ports import turned_vectors
-from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
-from kedfem.results.moments import (
-    Constants,
-    Field,
-    Nominal,
-    Scalars,
-    Vectors,
-    crossed,
-    dot,
-    is_nominal,
-    mass_moments,
-    nominal,
-    power,
-    rigid_moments,
-    rotated,
-    swept,
-    work_on,
-    wrench,
-)
+from kedfem.results.moments import Constants, Field, Nominal, dot, in_world, paired, rotated, turned
+
+Scalars = Float[np.ndarray, " T"]
+Vectors = Float[np.ndarray, "3 T"]
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """Of one link, or of several, at T time points; world components, moments about the world's origin.
+    """Of one or several links at T time points; world components, moments about the world's origin.
 
     kinetic : (T,) energy of the absolute motion [J]
-    momentum, angular : (T, 3) [N s, N m s]
+    momentum, angular : (3, T) [N s, N m s]; sizes: (2, T) their lengths, added up over links
     loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum
-    force, moment : (T, 3) of P and the port forces together [N, N m]
-    turning : (T, 3) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the nominal frame [N m]
+    force, moment : (3, T) of P and the port forces together [N, N m]
+    turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the nominal frame [N m]
     neglected : (T,) its power on the nominal rotation [W]
     """
 
     kinetic: Scalars
     momentum: Vectors
     angular: Vectors
+    sizes: Float[np.ndarray, "2 T"]
     loads: Scalars
     supports: Scalars
     force: Vectors
@@ -58,53 +45,96 @@ class Flow:
         return Flow(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))
 
 
-def link_flow(of: Constants, history: LinkHistory, made: Products, motion: RigidMotion) -> Flow:
-    """Of an elastic link."""
-    link, u, v, at = of.link, history.u, history.v, nominal(motion, of.body)
-    Mv, Mu, F = mass_moments(of, v), mass_moments(of, u), of.fit.T @ history.F
-    rigid, inertia = rigid_moments(of, at.v, at.spin, at.omega), rigid_moments(of, at.a, at.R2, at.alpha)
-    ports, on_ports, supports = _ports(of, history, at)
-    kinetic = power(link, 0.5 * rigid + Mv, at) + 0.5 * dot(v, made.Mv)
-    loads = power(link, F + inertia, at) + dot(v, history.F) + work_on(link, Mv, at.a, at.R2, at.alpha)
-    momentum, about = wrench(link, rigid + Mv, at)
-    force, moment = wrench(link, F + inertia, at)
-    bent = crossed(link, u, made.Mv) + swept(link, Mu, at.v, at.spin)
-    arms = crossed(link, u, history.F) + swept(link, Mu, at.a, at.R2)
-    turning, neglected = np.zeros_like(force), np.zeros(len(u))
-    if is_nominal(of, history, motion):
-        turning = rotated(at.R, crossed(link, history.g, made.Kg))
-        neglected = dot(turning, at.omega)
-    force = force + ports
-    return Flow(
-        kinetic, momentum, cross(at.p, momentum) + about + bent, loads, supports,
-        force, cross(at.p, force) + moment + arms + on_ports, turning, neglected,
-    )  # fmt: skip
+@dataclass(frozen=True, slots=True)
+class Fields:
+    """Nodal fields of S links at T time points, as far as they matter, time last, in k dimensions.
 
-
-def carried_flow(of: Constants, F: Field, motion: RigidMotion) -> Flow:
-    """Of a rigid link that the drive carries along; its supports give what its motion asks for, M R0'' − P."""
-    at = nominal(motion, of.body)
-    rigid, inertia = rigid_moments(of, at.v, at.spin, at.omega), rigid_moments(of, at.a, at.R2, at.alpha)
-    load = of.fit.T @ F
-    momentum, about = wrench(of.link, rigid, at)
-    force, moment = wrench(of.link, inertia, at)
-    none = np.zeros_like(force)
-    return Flow(
-        power(of.link, 0.5 * rigid, at), momentum, cross(at.p, momentum) + about, power(of.link, load + inertia, at),
-        -power(of.link, load, at), force, cross(at.p, force) + moment, none, none[:, 0],
-    )  # fmt: skip
-
-
-def _ports(of: Constants, history: LinkHistory, at: Nominal) -> tuple[Vectors, Vectors, Scalars]:
-    """Sum of the port forces, their moment about the body's origin where the bent link has its ports, and their power.
-
-    δ' has no share in the power: its ports move together, and Σ Bᵀ R λ = 0.
+    rows : (4, (1 + k) k + 1, S, T) moments and couple of M δ', P − M R0'', port forces and M δ
+    arms : (2, k, k, S, T) Σ δ ⊗ M δ', and Σ δ ⊗ y of P − M R0'' and the port forces
+    elastic : (k, k, S, T) Σ g ⊗ K0 g, link frame; None if K turns with no link's nominal motion
+    powers : (2, S, T) δ' · M δ' and δ' · (P − M R0'')
     """
-    link, joint = of.link, of.joint
-    force = turned_vectors(joint, history.R, history.port_forces)
-    total, moment = wrench(
-        link, np.concatenate([force.sum(axis=1, keepdims=True), of.stations.T @ force], axis=1), at
-    )
-    power = dot(total, at.v) + dot(moment, at.omega)
-    bent = joint.weights @ (history.u if len(joint.nodes) == link.n else history.u[:, joint.nodes])
-    return total, moment + crossed(link, bent, force), power
+
+    rows: Float[np.ndarray, "4 m S T"]
+    arms: Float[np.ndarray, "2 k k S T"]
+    elastic: Float[np.ndarray, "k k S T"] | None
+    powers: Float[np.ndarray, "2 S T"]
+
+
+def fields_of(
+    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool]
+) -> Fields:
+    """Of elastic links, all planar or all in space.
+
+    Parameters
+    ----------
+    made : K0 g where K turns with the nominal motion, as `turns` says
+    """
+    S, T, k = len(of), len(histories[0].u), of[0].k
+    rows, arms = np.empty((4, len(of[0].fit), S, T)), np.empty((2, k, k, S, T))
+    powers, elastic = np.empty((2, S, T)), np.zeros((k, k, S, T)) if any(turns) else None
+    for i, (x, history, product) in enumerate(zip(of, histories, made, strict=True)):
+        u, v, F = history.u, history.v, history.F
+        f = turned_vectors(x.joint, history.R, history.port_forces)
+        bent = x.joint.weights @ (u if len(x.joint.nodes) == x.link.n else u[:, x.joint.nodes])
+        for slot, (A, y) in enumerate(((x.weighted, v), (x.fit, F), (x.ports, f), (x.weighted, u))):
+            np.matmul(A, y.reshape(T, -1).T, out=rows[slot, :, i])
+        arms[0, :, :, i] = paired(k, u, product.Mv)
+        arms[1, :, :, i] = paired(k, u, F) + paired(k, bent, f)
+        if elastic is not None and turns[i]:
+            elastic[:, :, i] = paired(k, history.g, product.Kg)
+        powers[0, i], powers[1, i] = dot(v, product.Mv), dot(v, F)
+    return Fields(rows, arms, elastic, powers)
+
+
+def carried_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
+    """Of rigid links that the drive carries along; their supports give what their motion asks for, M R0'' − P."""
+    S, T, k = len(of), len(forces[0]), of[0].k
+    rows = np.zeros((4, len(of[0].fit), S, T))
+    for i, (x, F) in enumerate(zip(of, forces, strict=True)):
+        rows[1, :, i] = x.fit @ F.reshape(T, -1).T
+    rows[2] = -rows[1]
+    return Fields(rows, np.zeros((2, k, k, S, T)), None, np.zeros((2, S, T)))
+
+
+def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
+    """All links together, from their fields and their nominal motion."""
+    gram, spin = np.stack([x.gram for x in of], axis=-1), np.array([x.spin for x in of])
+    Mv, F, ports, Mu = found.rows[:, :-1].reshape(4, *at.rates.shape[1:])
+    couples, turns = found.rows[:3, -1], np.stack([at.omega[-1], at.alpha[-1]])
+    # M (R0' + δ') and P = (P − M R0'') + M R0''
+    y = np.einsum("abs,zbjst->zajst", gram, at.rates)
+    y[0] += Mv
+    y[1] += F
+    couple = couples[:2] + spin[:, None] * turns
+    kinetic = 0.5 * (_work(y[0] + Mv, at.rates[0]) + (couple[0] + couples[0]) * turns[0] + found.powers[0])
+    loads = _work(y[1], at.rates[0]) + couple[1] * turns[0] + found.powers[1]
+    loads += _work(Mv, at.rates[1]) + couples[0] * turns[1]
+    supports = _work(ports, at.rates[0]) + couples[2] * turns[0]
+    y[1] += ports
+    # Σ x ⊗ y with x = p + R X + δ
+    N = np.einsum("iast,zajst->zijst", at.place, y)
+    N += np.einsum("aist,zajst->zijst", Mu, at.rates)
+    N += found.arms
+    about = turned(N)
+    about[0, -1] += couple[0]
+    about[1, -1] += couple[1] + couples[2]
+    sizes = np.sqrt(np.stack([np.einsum("ist,ist->st", x, x) for x in (y[0, 0], about[0])])).sum(axis=1)
+    return Flow(
+        kinetic.sum(axis=0), in_world(y[0, 0]), in_world(about[0]), sizes, loads.sum(axis=0), supports.sum(axis=0),
+        in_world(y[1, 0]), in_world(about[1]), *_neglected(found, at),
+    )  # fmt: skip
+
+
+def _neglected(found: Fields, at: Nominal) -> tuple[Vectors, Scalars]:
+    """Moment of the elastic forces on bent links, and its power."""
+    if found.elastic is None:
+        T = found.powers.shape[2]
+        return np.zeros((3, T)), np.zeros(T)
+    turning = rotated(at, turned(found.elastic))
+    return in_world(turning), np.einsum("ist,ist->t", turning, at.omega)
+
+
+def _work(y: Float[np.ndarray, "k1 k S T"], rates: Float[np.ndarray, "k1 k S T"]) -> Float[np.ndarray, "S T"]:
+    """Σ (1 ⊗ a + X Bᵀ) · y of nodal forces with these moments."""
+    return np.asarray(np.einsum("ajst,ajst->st", y, rates))

@@ -1,158 +1,184 @@
-"""What the audit needs of a link's rigid motion and of nodal fields: moments, powers, wrenches.
+"""What the audit needs of links and their rigid motion: moments of nodal fields, rates of the rigid motion.
 
-A field y, forces or a momentum, matters to a rigid motion 1 ⊗ a + X Bᵀ only through Σ y and Σ X ⊗ y, its *moments*; those
-of M y need m·1 and m·X. So a block of time points costs a few passes over its arrays.
+A field y, forces or a momentum, matters to a rigid motion 1 ⊗ a + X Bᵀ only through Σ y and Σ X ⊗ y, its *moments*, and
+of a planar beam through its couple. So one product per field and block does; all further work is on moments of all links
+together, time last: (1 + k, k, S, T) for S links at T time points, whatever their size, in k dimensions.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import LinkHistory
 from kedfem.dynamics.state import Rayleigh
-from kedfem.links.record import Link, Matrix, in_space
-from kedfem.motion.newton import cross_matrix
+from kedfem.links.record import Link, Matrix
 from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
-Scalars = Float[np.ndarray, " T"]
-Vectors = Float[np.ndarray, "T 3"]
+SMALL = 100  # up to here one product with all of M beats one per component
 Field = Float[np.ndarray, "T n d"]
-Moments = Float[np.ndarray, "T 4 d"]
+Flat = Float[np.ndarray, "m u"]
 
 
 @dataclass(frozen=True, slots=True)
 class Constants:
     """What the audit needs of a link, constant.
 
-    fit, weighted : (n, 4) [1, X] and m [1, X]: moments of a field y, and of M y
-    gram : (4, 4) [1, X]ᵀ m [1, X]: mass, its first and second moment; spin: of a planar beam its sections' inertia
-    stations : (p, 3) where the ports are drawn
-    K0, masses : dense if small; None for a mass that is 1
+    k : 2 of planar links, which move in a plane, else 3
+    fit, weighted, ports : (m, ·) m = (1 + k) k + 1 moments and couple of nodal forces y, of M u, and of port forces
+    gram : (1 + k, 1 + k) [1, X]ᵀ m [1, X]: mass, its first and second moment
+    spin : of a planar beam its sections' inertia
+    K0 : dense if small
+    masses : a matrix per component, or one for all of them; None for a mass that is 1
     """
 
     link: Link
     joint: Attachment
     body: int
     damping: Rayleigh
-    fit: Float[np.ndarray, "n 4"]
-    weighted: Float[np.ndarray, "n 4"]
-    gram: Float[np.ndarray, "4 4"]
+    k: int
+    fit: Flat
+    weighted: Flat
+    ports: Flat
+    gram: Float[np.ndarray, "k1 k1"]
     spin: float
-    stations: Float[np.ndarray, "p 3"]
     K0: Matrix
-    masses: tuple[Matrix | None, ...]
+    masses: tuple[Matrix, ...] | None
 
 
 def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Constants:
     """Of a link that is body number `body` of the motion."""
-    fit = np.column_stack([link.one, link.X])
-    weighted = np.column_stack([link.m1[:, 0], link.mX])
+    k = 2 if link.planar else 3
+    fit = np.column_stack([link.one, link.X[:, :k]])
+    weighted = np.column_stack([link.m1[:, 0], link.mX[:, :k]])
+    at_ports = joint.weights @ fit[joint.nodes]
     spin = float(link.one @ link.m1[:, 2]) if link.kind == "beam" else 0.0
-    stations = joint.weights @ link.X[joint.nodes]
-    masses = tuple(None if _is_one(m) else _dense(m, link.unknowns) for m in link.mass)
-    K0 = _dense(link.K0, link.unknowns)
-    return Constants(link, joint, body, damping, fit, weighted, fit.T @ weighted, spin, stations, K0, masses)
+    rows = (
+        _rows(link, fit, link.one), _rows(link, weighted, link.m1[:, -1]), _rows(link, at_ports, at_ports[:, 0])
+    )  # fmt: skip
+    return Constants(
+        link,
+        joint,
+        body,
+        damping,
+        k,
+        *rows,
+        fit.T @ weighted,
+        spin,
+        _dense(link.K0, link.unknowns),
+        _masses(link),
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Nominal:
-    """Rigid motion of one body: R, origin p, and (v, spin), (a, R2): p', R' and p'', R''; turning rate and its own."""
+    """Rigid motion of S bodies at T time points, x = p + R X, in k dimensions, time last.
 
-    R: Float[np.ndarray, "T 3 3"]
-    p: Vectors
-    v: Vectors
-    spin: Float[np.ndarray, "T 3 3"]
-    a: Vectors
-    R2: Float[np.ndarray, "T 3 3"]
-    omega: Vectors
-    alpha: Vectors
+    place : (k, 1 + k, S, T) [p R]
+    rates : (2, 1 + k, k, S, T) of x' and x'': [p', R'ᵀ] and [p'', R''ᵀ]
+    omega, alpha : (3, S, T) turning rate and its own; in a plane (1, S, T)
+    """
 
+    place: Float[np.ndarray, "k k1 S T"]
+    rates: Float[np.ndarray, "2 k1 k S T"]
+    omega: Float[np.ndarray, "c S T"]
+    alpha: Float[np.ndarray, "c S T"]
 
-def nominal(motion: RigidMotion, body: int) -> Nominal:
-    """Of a body of the motion."""
-    R, omega = motion.R[:, body], motion.omega[:, body]
-    return Nominal(
-        R, motion.p[:, body], motion.v[:, body], cross_matrix(omega) @ R, motion.p2[:, body], motion.R2[:, body],
-        omega, motion.alpha[:, body],
-    )  # fmt: skip
+    def of(self, bodies: Int[np.ndarray, " S"], k: int = 3) -> "Nominal":
+        """Of some of the bodies, in k dimensions."""
+        turns = (x[2 * (3 - k) :, bodies] for x in (self.omega, self.alpha))
+        return Nominal(self.place[:k, : 1 + k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
 
-
-def is_nominal(of: Constants, history: LinkHistory, motion: RigidMotion) -> bool:
-    """Whether the link's frame is that of the nominal motion, so that K turns with it and not with the bent link."""
-    d = of.link.d
-    return np.array_equal(history.R, motion.R[:, of.body, :d, :d])
+    def every(self, which: slice) -> "Nominal":
+        """At some of the time points."""
+        return Nominal(
+            self.place[..., which], self.rates[..., which], self.omega[..., which], self.alpha[..., which]
+        )
 
 
-def mass_moments(of: Constants, u: Field) -> Moments:
-    """Moments of M u; the third row of a planar beam has a mass of its own."""
-    out = of.weighted.T @ u
-    if of.link.kind == "beam":
-        out[:, 0, 2] = u[:, :, 2] @ of.link.m1[:, 2]
-    return np.asarray(out)
+def nominal(motion: RigidMotion) -> Nominal:
+    """Of all bodies of a motion."""
+    T, B = motion.p.shape[:2]
+    place, rates = np.empty((3, 4, B, T)), np.empty((2, 4, 3, B, T))
+    place[:, 0], place[:, 1:] = motion.p.T, motion.R.transpose(2, 3, 1, 0)
+    rates[0, 0], rates[1, 0] = motion.v.T, motion.p2.T
+    rates[1, 1:] = motion.R2.transpose(3, 2, 1, 0)
+    omega, alpha = (np.ascontiguousarray(x.T) for x in (motion.omega, motion.alpha))
+    for k in range(3):
+        rates[0, 1 + k] = cross(omega.T, place[:, 1 + k].T).T
+    return Nominal(place, rates, omega, alpha)
 
 
-def rigid_moments(of: Constants, a: Vectors, B: Float[np.ndarray, "T 3 3"], turn: Vectors) -> Moments:
-    """Moments of M (1 ⊗ a + X Bᵀ)."""
-    affine = np.concatenate([a[:, None], B.transpose(0, 2, 1)], axis=1)
-    out = np.ascontiguousarray((of.gram @ affine)[:, :, : of.link.d])
-    if of.link.kind == "beam":
-        out[:, 0, 2] = of.spin * turn[:, 2]
+def mass_times(of: Constants, u: Field) -> Field:
+    """M u over time."""
+    if of.masses is None:
+        return u
+    if len(of.masses) == 1:
+        return flat_times(of.masses[0], u)
+    out = np.empty_like(u)
+    for k, m in enumerate(of.masses):
+        out[:, :, k] = (m @ u[:, :, k].T).T
     return out
 
 
-def work_on(link: Link, y: Moments, a: Vectors, B: Float[np.ndarray, "T 3 3"], turn: Vectors) -> Scalars:
-    """Σ (1 ⊗ a + X Bᵀ) · y, of nodal forces with these moments."""
-    affine = np.concatenate([a[:, None], B.transpose(0, 2, 1)], axis=1)
-    work = dot(in_space(link, y), affine)
-    return work + turn[:, 2] * y[:, 0, 2] if link.kind == "beam" else work
+def flat_times(A: Matrix, u: Field) -> Field:
+    """A u over time, of a symmetric matrix on all unknowns."""
+    flat = u.reshape(len(u), -1)
+    return np.asarray(flat @ A if isinstance(A, np.ndarray) else (A @ flat.T).T).reshape(u.shape)
 
 
-def power(link: Link, y: Moments, at: Nominal) -> Scalars:
-    """Of nodal forces with these moments on the nominal motion."""
-    return work_on(link, y, at.v, at.spin, at.omega)
+def paired(k: int, x: Field, y: Field) -> Float[np.ndarray, "k k T"]:
+    """Σ x ⊗ y of translations and forces, in k dimensions."""
+    return np.asarray((x[..., :k].transpose(0, 2, 1) @ y[..., :k]).transpose(1, 2, 0))
 
 
-def wrench(link: Link, y: Moments, at: Nominal) -> tuple[Vectors, Vectors]:
-    """Force, and moment about the body's origin, of nodal forces with these moments on the undeformed link."""
-    rows = in_space(link, y)
-    moment = turned(at.R @ rows[:, 1:])
-    if link.kind == "beam":
-        moment[:, 2] += y[:, 0, 2]
-    return rows[:, 0], moment
+def turned(N: Float[np.ndarray, "*z k k S T"]) -> Float[np.ndarray, "*z c S T"]:
+    """Σ x × y from Σ x ⊗ y, in a plane the one component across it."""
+    pairs = ((1, 2), (2, 0), (0, 1))[-1 if N.shape[-3] == 2 else 0 :]
+    return np.stack([N[..., i, j, :, :] - N[..., j, i, :, :] for i, j in pairs], axis=-3)
 
 
-def crossed(link: Link, x: Field, y: Field) -> Vectors:
-    """Σ x × y of translations and forces."""
-    out = np.zeros((len(x), 3))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        if k == 2 or not link.planar:
-            out[:, k] = np.einsum("tn,tn->t", x[..., i], y[..., j])
-            out[:, k] -= np.einsum("tn,tn->t", x[..., j], y[..., i])
+def rotated(at: Nominal, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "c S T"]:
+    """R x; what is across a plane stays there."""
+    return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.place[:, 1:], x)
+
+
+def in_world(x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "3 T"]:
+    """All links together: vectors in space or in a plane, or of one component, across it."""
+    out = np.zeros((3, x.shape[2]))
+    out[2 if len(x) == 1 else 0 :][: len(x)] = x.sum(axis=1)
     return out
 
 
-def swept(link: Link, Mu: Moments, a: Vectors, B: Float[np.ndarray, "T 3 3"]) -> Vectors:
-    """Σ u × M (1 ⊗ a + X Bᵀ) from the moments of M u."""
-    affine = np.concatenate([a[:, None], B.transpose(0, 2, 1)], axis=1)
-    return turned(in_space(link, Mu).transpose(0, 2, 1) @ affine)
-
-
-def turned(N: Float[np.ndarray, "T 3 3"]) -> Vectors:
-    """Σ x × y from Σ x ⊗ y."""
-    return np.stack([N[:, i, j] - N[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
-
-
-def rotated(R: Float[np.ndarray, "T 3 3"], x: Vectors) -> Vectors:
-    """R x over time."""
-    return np.asarray((R @ x[:, :, None])[:, :, 0])
-
-
-def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Scalars:
+def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Float[np.ndarray, " T"]:
     """Σ x · y at every time point."""
     return np.asarray(np.einsum("tk,tk->t", x.reshape(len(x), -1), y.reshape(len(y), -1)))
+
+
+def _rows(link: Link, fit: Float[np.ndarray, "k 4"], couple: Float[np.ndarray, " k"]) -> Flat:
+    """Moments of vectors with these weights, and the sum of the third components of a planar beam."""
+    k = fit.shape[1] - 1
+    out = np.zeros((1 + k, k, len(fit), link.d))
+    for j in range(k):
+        out[:, j, :, j] = fit.T
+    last = np.zeros((1, len(fit) * link.d))
+    if link.kind == "beam":
+        last[0, 2::3] = couple
+    return np.concatenate([out.reshape(k * (1 + k), -1), last])
+
+
+def _masses(link: Link) -> tuple[Matrix, ...] | None:
+    masses = tuple(_dense(m, link.unknowns) for m in link.mass)
+    if all(_is_one(m) for m in masses):
+        return None
+    if link.unknowns > SMALL:
+        return masses
+    M = np.zeros((link.n, link.d, link.n, link.d))
+    for k, m in enumerate(masses):
+        M[:, k, :, k] = m
+    return (M.reshape(link.unknowns, -1),)
 
 
 def _dense(matrix: Matrix, unknowns: int) -> Matrix:

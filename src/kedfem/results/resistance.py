@@ -1,35 +1,36 @@
 """What damping takes: of energy, and where its forces turn with the nominal motion, of momentum."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
-from kedfem.links.record import in_space
-from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.results.moments import (
     Constants,
     Field,
     Nominal,
-    Scalars,
-    Vectors,
-    crossed,
     dot,
-    nominal,
+    flat_times,
+    in_world,
+    mass_times,
+    paired,
     rotated,
     turned,
 )
 
+Scalars = Float[np.ndarray, " T"]
+Vectors = Float[np.ndarray, "3 T"]
+
 
 @dataclass(frozen=True, slots=True)
 class Resistance:
-    """What damping takes in each of the steps that end at T time points.
+    """What damping takes of all links in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
     drag : (T,) work of the damping forces against the nominal motion, where these turn with it [J]
-    impulse, angular : (T, 3) of the damping forces, about the world's origin [N s, N m s]
+    impulse, angular : (3, T) of the damping forces, about the world's origin [N s, N m s]
     """
 
     dissipated: Scalars
@@ -40,89 +41,112 @@ class Resistance:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """A link at the time point before a block: t, nominal motion, (g, C0 g) of each part of the damping; T is 1."""
+    """The time point before a block: t, nominal motion, each link's g, K0 g, C0 g and `held`; T is one."""
 
     t: Scalars
     at: Nominal
-    parts: tuple[tuple[Field, Field], ...]
+    links: Sequence[tuple[Field, Field, Field | None, Field | None]]
 
 
 def resistance(
-    of: Constants, history: LinkHistory, made: Products, motion: RigidMotion, before: Last | None
-) -> tuple[Resistance, Last] | None:
-    """Of one link over a block, from the time point before it on; None without damping.
+    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
+    now: tuple[Scalars, Nominal], before: Last,
+) -> Resistance:  # fmt: skip
+    """Of damped links over a block, from the time point before it on.
 
-    In a frame that follows β acts on its own deformation, α on that of the nominal frame.
+    Parameters
+    ----------
+    turns : whether K, and so the damping forces, turn with the nominal motion
+    now : times, and nominal motion of all bodies
     """
-    if made.Cg is None:
-        return None
-    at = nominal(motion, of.body)
-    now = Last(motion.t, at, _apart(of, history, made, at))
-    last = _at(now, slice(-1, None))
-    since = _at(now, slice(0, 1)) if before is None else before
-    h = np.diff(now.t, prepend=since.t)
-    total = np.zeros((len(h), 8))
-    for k, (end, start) in enumerate(zip(now.parts, since.parts, strict=True)):
-        total[:, 0] += dot(_change(end[0], start[0]), _change(end[1], start[1])) / np.where(h > 0, h, 1.0)
-        if k == 1:
-            total[:, 1:] += _turning(of, end, start, at, since.at)
-    return Resistance(total[:, 0], total[:, 1], total[:, 2:5], total[:, 5:]), last
-
-
-def _apart(
-    of: Constants, history: LinkHistory, made: Products, at: Nominal
-) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
-    """(g, C g) of β K0 in the link's own frame and of α M in the nominal one, where that is not all the same."""
-    if of.link.fit is None and made.Cg is not None:
-        none = np.zeros_like(history.g)
-        return (none, none), (history.g, made.Cg)
-    u = history.u @ at.R[:, : of.link.d, : of.link.d]
-    return (history.g, of.damping.beta * made.Kg), (u, of.damping.alpha * _mass_times(of, u))
+    t, at = now
+    h = np.diff(t, prepend=before.t)
+    seen = [held(x, history, at) for x, history in zip(of, histories, strict=True)]
+    which = np.flatnonzero([turn or u is not None for turn, u in zip(turns, seen, strict=True)])
+    bodies = np.array([x.body for x in of])[which]
+    taken = np.zeros(len(t))
+    k, size = of[0].k, (len(which), len(t))
+    rows, arms = np.empty((len(of[0].fit), *size)), np.empty((k, k, *size))
+    for i, (x, history, product, last) in enumerate(zip(of, histories, made, before.links, strict=True)):
+        end, (g, Cg) = history.g, _changes(x, history.g, product, *last[:3])
+        taken += dot(g, Cg)
+        u = seen[i]
+        if u is not None and last[3] is not None:
+            end, g = u, _change(u, last[3])
+            Cg = x.damping.alpha * mass_times(x, g)
+            taken += dot(g, Cg)
+        if i in which:
+            slot = int(np.searchsorted(which, i))
+            np.matmul(x.fit, Cg.reshape(len(t), -1).T, out=rows[:, slot])
+            arms[:, :, slot] = paired(k, end, Cg) - 0.5 * paired(k, g, Cg)
+    taken /= np.where(h > 0, h, 1.0)
+    if not len(which):
+        none = np.zeros((3, len(t)))
+        return Resistance(taken, none[0], none, none)
+    return Resistance(taken, *_turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
 def _turning(
-    of: Constants, end: tuple[Field, Field], start: tuple[Field, Field], at: Nominal, before: Nominal
-) -> Float[np.ndarray, "T 7"]:
+    rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: Nominal
+) -> tuple[Scalars, Vectors, Vectors]:
     """Drag, impulse and angular impulse of damping forces that turn with the nominal motion."""
-    g, Cg = _change(end[0], start[0]), _change(end[1], start[1])
-    R, p, v, omega = (_mean(getattr(at, x), getattr(before, x)) for x in ("R", "p", "v", "omega"))
-    y = in_space(of.link, of.fit.T @ Cg)
-    moment = turned(y[:, 1:]) + crossed(of.link, end[0] - 0.5 * g, Cg)
-    if of.link.kind == "beam":
-        moment[:, 2] += Cg[:, :, 2] @ of.link.one
-    impulse, turn = rotated(R, y[:, 0]), rotated(R, moment)
-    drag = dot(impulse, v) + dot(turn, omega)
-    return np.column_stack([drag, impulse, cross(p, impulse) + turn])
+    y = rows[:-1].reshape(at.rates.shape[1:])
+    moment = turned(y[1:] + arms)
+    moment[-1] += rows[-1]
+    impulse, turn = np.einsum("ijst,jst->ist", at.place[:, 1:], y[0]), rotated(at, moment)
+    drag = np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
+    angular = turned(at.place[:, :1] * impulse) + turn
+    return np.asarray(drag), in_world(impulse), in_world(angular)
 
 
-def products(of: Constants, history: LinkHistory) -> Products:
-    """M δ', K0 g and C0 g, made here if the solver did not hand them on."""
+def held(of: Constants, history: LinkHistory, at: Nominal) -> Field | None:
+    """Of a link whose frames follow it, the deflection in the nominal frame, where α acts; None without."""
+    if of.link.fit is None or not of.damping.alpha:
+        return None
+    d = of.link.d
+    return np.asarray(history.u @ at.place[:d, 1 : 1 + d, of.body].transpose(2, 0, 1))
+
+
+def last_of(
+    t: Scalars, at: Nominal, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
+    which: int,
+) -> Last:  # fmt: skip
+    """What the next block needs of one time point of this one."""
+    first = which % len(t)
+    one = slice(first, first + 1)
+    then = at.every(one)
+    kept = [
+        (
+            x.g[one].copy(),
+            y.Kg[one].copy(),
+            None if y.Cg is None else y.Cg[one].copy(),
+            held(link, x.every(one), then),
+        )
+        for link, x, y in zip(of, histories, made, strict=True)
+    ]
+    return Last(t[one], then, kept)
+
+
+def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
+    """M δ', and K0 g if K turns with the nominal motion, made here if the solver did not hand them on."""
     if history.products is not None:
         return history.products
-    g, alpha, beta = history.g, of.damping.alpha, of.damping.beta
-    Kg = np.asarray((of.K0 @ g.reshape(len(g), -1).T).T).reshape(g.shape)
-    Cg = None
-    if of.damping.present:
-        Cg = beta * Kg
-        if alpha:
-            Cg += alpha * _mass_times(of, g)
-    return Products(_mass_times(of, history.v), Kg, Cg)
+    Kg = flat_times(of.K0, history.g) if turns else np.zeros((len(history.g), 0, 0))
+    return Products(mass_times(of, history.v), Kg, None)
 
 
-def _mass_times(of: Constants, u: Field) -> Field:
-    """M u over time."""
-    if not any(m is not None for m in of.masses):
-        return u
-    out = u.copy()
-    for k, m in enumerate(of.masses):
-        if m is not None:
-            out[:, :, k] = (m @ u[:, :, k].T).T
-    return out
-
-
-def _at(now: Last, which: slice) -> Last:
-    at = Nominal(*(getattr(now.at, each.name)[which] for each in fields(Nominal)))
-    return Last(now.t[which], at, tuple((g[which].copy(), Cg[which].copy()) for g, Cg in now.parts))
+def _changes(
+    of: Constants, now: Field, made: Products, before: Field, Kg: Field, last: Field | None
+) -> tuple[Field, Field]:
+    """g and C0 g in each step; of a link whose frames follow it without α, which acts elsewhere, see `held`."""
+    g = _change(now, before)
+    if made.Cg is not None and last is not None:
+        return g, _change(made.Cg, last)
+    Cg = _change(made.Kg, Kg) if made.Kg.size else flat_times(of.K0, g)
+    Cg *= of.damping.beta
+    if of.damping.alpha and of.link.fit is None:
+        Cg += of.damping.alpha * mass_times(of, g)
+    return g, Cg
 
 
 def _change(
@@ -135,6 +159,7 @@ def _change(
     return out
 
 
-def _mean(now: Float[np.ndarray, "T ..."], before: Float[np.ndarray, "1 ..."]) -> Float[np.ndarray, "T ..."]:
+def _mean(now: Nominal, before: Nominal) -> Nominal:
     """Of the two ends of each step."""
-    return np.asarray(now - 0.5 * _change(now, before))
+    pairs = ((getattr(now, x), getattr(before, x)) for x in ("place", "rates", "omega", "alpha"))
+    return Nominal(*(0.5 * (x + np.concatenate([y, x[..., :-1]], axis=-1)) for x, y in pairs))

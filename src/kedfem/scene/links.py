@@ -75,7 +75,8 @@ class LinkScene(Record):
     """frames of this link, if other than those of the analysis"""
     segments: Count | None = None
     """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given,
-    or as many as its mesh has layers; chosen where `analysis.accuracy` is given; those of a beam are its elements"""
+    fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a beam are
+    its elements"""
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
