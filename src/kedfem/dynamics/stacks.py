@@ -62,7 +62,10 @@ class Stack:
         return np.asarray(np.repeat(each, np.diff(self.bounds), axis=0))
 
     def turned(self, x: Rows, R: Each) -> Rows:
-        """x R, segment by segment."""
+        """x R, segment by segment; segments of one size at once."""
+        even = self._even(x)
+        if even is not None:
+            return np.asarray(np.matmul(even, R).reshape(x.shape))
         out = np.empty_like(x)
         for a, b, r in zip(self.bounds, self.bounds[1:], R, strict=False):
             np.matmul(x[a:b], r, out=out[a:b])
@@ -70,8 +73,16 @@ class Stack:
 
     def moments(self, x: Rows, c: Rows) -> Each:
         """Σ x_a ⊗ c_a of each segment, of the components that turn."""
-        k = self.k
+        k, even, other = self.k, self._even(x), self._even(c)
+        if even is not None and other is not None:
+            return np.asarray(even[..., :k].transpose(0, 2, 1) @ other[..., :k])
         return np.stack([p[:, :k].T @ q[:, :k] for p, q in zip(self.parts(x), self.parts(c), strict=True)])
+
+    def _even(self, x: Rows) -> Float[np.ndarray, "s n d"] | None:
+        """All rows, segment by segment; None if segments differ in size."""
+        n = len(x) // len(self.members)
+        same = self.bounds[1] == n and self.bounds[-2] == len(x) - n and (np.diff(self.bounds) == n).all()
+        return x.reshape(len(self.members), n, -1) if same else None
 
     def dots(self, x: Rows, y: Rows) -> Float[np.ndarray, " s"]:
         """Σ x · y of each segment."""
