@@ -31,6 +31,9 @@ def main() -> None:
     assert abs(peak / PEAK - 1) < 0.01
     assert 0.35 < off["linear"] < 0.45  # 40 % against exact beams
     assert off["stiffened"] < 0.6 * off["linear"]
+    assert following.balance is not None
+    print(f"energy not accounted for: {following.balance.energy:.1e} of the largest exchanged")
+    assert following.balance.energy < 1e-3
 
     # at a tenth of the speed links bend a hundredth as far, and the linear equation serves
     slow = [stress(run("60 rpm", turns=1, frames=frames)) for frames in ("nominal", "following")]

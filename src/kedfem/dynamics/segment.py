@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, seen_from
+from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, seen_from, stress_deformation
 from kedfem.dynamics.history import LinkHistory
 from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.state import LinkState, Nodal, Rayleigh
@@ -85,6 +85,17 @@ def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) 
         s.u, s.v, s.a, s.Mu, s.Mv, s.Ma, f, s.F, s.R, tuple(frames), damped,
         port_rotation(joint, s.R) @ s.port_forces, strain,
     )  # fmt: skip
+
+
+def first_history(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> LinkHistory:
+    """The first time point as a history: g and port forces as the frames see them."""
+    now, frames = first_state(link, joint, damping, s), frames_of(link)
+    R = mean_orientation(link, s.u, s.R)
+    g = stress_deformation(link, frames, [x.g for x in now.frames]) if frames else s.g
+    forces = port_rotation(joint, R).T @ now.port_forces
+    return LinkHistory(
+        s.u[None], s.v[None], s.a[None], g[None], R[None], s.F[None], forces[None], np.array([now.strain])
+    )
 
 
 def internal_force(

@@ -15,13 +15,13 @@ from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import far_deflected, static_excess
-from kedfem.dynamics.history import Block, Forcing, Snapshot, history
+from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.segment import CONVERGED, FREE
+from kedfem.dynamics.segment import CONVERGED, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
@@ -84,7 +84,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     stresses = None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
     states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
-    yield Block(0, start, [history([state]) for state in states])
+    yield Block(0, start, _first(model, solver, states))
     state: Any = solver.begin(states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
@@ -101,6 +101,14 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
             else:
                 links, state = solver.advance(state, forcings(model, part))
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def _first(model: Model, solver: Steps, states: list[LinkState]) -> list[LinkHistory]:
+    """The first time point of all links, as their frames see it."""
+    if not isinstance(solver, FollowingSteps | FollowingDense):
+        return [history([state]) for state in states]
+    every = zip(model.links, model.joints, states, strict=True)
+    return [first_history(link, joint, model.damping, state) for link, joint, state in every]
 
 
 def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:

@@ -24,7 +24,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Flow, carried_fields, fields_of, flow
-from kedfem.results.moments import Constants, Nominal, constants, is_nominal, nominal
+from kedfem.results.moments import Constants, Nominal, constants, nominal
 from kedfem.results.records import Channel
 from kedfem.results.resistance import Last, last_of, products, resistance
 
@@ -170,15 +170,15 @@ class Account:
         self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: Nominal
     ) -> tuple[Flow, Float[np.ndarray, "T 8"] | float]:
         """Of the links of a group, and what damping takes of them."""
-        turns = [is_nominal(x, y, motion) for x, y in zip(of, links, strict=True)]
+        turns = [x.link.fit is None for x in of]
         made = [products(*each) for each in zip(of, links, turns, strict=True)]
         bodies = _bodies(of)
         found = flow(of, fields_of(of, links, made, turns), at.of(bodies, of[0].k))
         if not self.model.damping.present:
             return found, 0.0
-        last = self._last[k] or last_of(motion.t, at, links, made, 0)
+        last = self._last[k] or last_of(motion.t, at, of, links, made, 0)
         lost = resistance(of, links, made, turns, (motion.t, at), last)
-        self._last[k] = last_of(motion.t, at, links, made, -1)
+        self._last[k] = last_of(motion.t, at, of, links, made, -1)
         return found, np.vstack([lost.dissipated, lost.drag, lost.impulse, lost.angular]).T
 
     def _watch(

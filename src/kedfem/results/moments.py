@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import LinkHistory
 from kedfem.dynamics.state import Rayleigh
 from kedfem.links.record import Link, Matrix
 from kedfem.motion.rigid import RigidMotion
@@ -110,12 +109,6 @@ def nominal(motion: RigidMotion) -> Nominal:
     for k in range(3):
         rates[0, 1 + k] = cross(omega.T, place[:, 1 + k].T).T
     return Nominal(place, rates, omega, alpha)
-
-
-def is_nominal(of: Constants, history: LinkHistory, motion: RigidMotion) -> bool:
-    """Whether the link's frame is that of the nominal motion, so that K turns with it and not with the bent link."""
-    d = of.link.d
-    return np.array_equal(history.R, motion.R[:, of.body, :d, :d])
 
 
 def mass_times(of: Constants, u: Field) -> Field:

@@ -41,11 +41,11 @@ class Resistance:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """The time point before a block: t, nominal motion, and each link's g, K0 g and C0 g, a first dimension of one."""
+    """The time point before a block: t, nominal motion, each link's g, K0 g, C0 g and `held`; T is one."""
 
     t: Scalars
     at: Nominal
-    links: Sequence[tuple[Field, Field, Field | None]]
+    links: Sequence[tuple[Field, Field, Field | None, Field | None]]
 
 
 def resistance(
@@ -61,18 +61,24 @@ def resistance(
     """
     t, at = now
     h = np.diff(t, prepend=before.t)
-    which = np.flatnonzero(turns)
+    seen = [held(x, history, at) for x, history in zip(of, histories, strict=True)]
+    which = np.flatnonzero([turn or u is not None for turn, u in zip(turns, seen, strict=True)])
     bodies = np.array([x.body for x in of])[which]
     taken = np.zeros(len(t))
     k, size = of[0].k, (len(which), len(t))
     rows, arms = np.empty((len(of[0].fit), *size)), np.empty((k, k, *size))
     for i, (x, history, product, last) in enumerate(zip(of, histories, made, before.links, strict=True)):
-        g, Cg = _changes(x, history.g, product, *last)
+        end, (g, Cg) = history.g, _changes(x, history.g, product, *last[:3])
         taken += dot(g, Cg)
-        if turns[i]:
+        u = seen[i]
+        if u is not None and last[3] is not None:
+            end, g = u, _change(u, last[3])
+            Cg = x.damping.alpha * mass_times(x, g)
+            taken += dot(g, Cg)
+        if i in which:
             slot = int(np.searchsorted(which, i))
             np.matmul(x.fit, Cg.reshape(len(t), -1).T, out=rows[:, slot])
-            arms[:, :, slot] = paired(k, history.g, Cg) - 0.5 * paired(k, g, Cg)
+            arms[:, :, slot] = paired(k, end, Cg) - 0.5 * paired(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
         none = np.zeros((3, len(t)))
@@ -93,17 +99,32 @@ def _turning(
     return np.asarray(drag), in_world(impulse), in_world(angular)
 
 
+def held(of: Constants, history: LinkHistory, at: Nominal) -> Field | None:
+    """Of a link whose frames follow it, the deflection in the nominal frame, where α acts; None without."""
+    if of.link.fit is None or not of.damping.alpha:
+        return None
+    d = of.link.d
+    return np.asarray(history.u @ at.place[:d, 1 : 1 + d, of.body].transpose(2, 0, 1))
+
+
 def last_of(
-    t: Scalars, at: Nominal, histories: Sequence[LinkHistory], made: Sequence[Products], which: int
-) -> Last:
+    t: Scalars, at: Nominal, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
+    which: int,
+) -> Last:  # fmt: skip
     """What the next block needs of one time point of this one."""
     first = which % len(t)
     one = slice(first, first + 1)
+    then = at.every(one)
     kept = [
-        (x.g[one].copy(), y.Kg[one].copy(), None if y.Cg is None else y.Cg[one].copy())
-        for x, y in zip(histories, made, strict=True)
+        (
+            x.g[one].copy(),
+            y.Kg[one].copy(),
+            None if y.Cg is None else y.Cg[one].copy(),
+            held(link, x.every(one), then),
+        )
+        for link, x, y in zip(of, histories, made, strict=True)
     ]
-    return Last(t[one], at.every(one), kept)
+    return Last(t[one], then, kept)
 
 
 def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
@@ -117,13 +138,13 @@ def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
 def _changes(
     of: Constants, now: Field, made: Products, before: Field, Kg: Field, last: Field | None
 ) -> tuple[Field, Field]:
-    """g and C0 g in each step."""
+    """g and C0 g in each step; of a link whose frames follow it without α, which acts elsewhere, see `held`."""
     g = _change(now, before)
     if made.Cg is not None and last is not None:
         return g, _change(made.Cg, last)
     Cg = _change(made.Kg, Kg) if made.Kg.size else flat_times(of.K0, g)
     Cg *= of.damping.beta
-    if of.damping.alpha:
+    if of.damping.alpha and of.link.fit is None:
         Cg += of.damping.alpha * mass_times(of, g)
     return g, Cg
 
