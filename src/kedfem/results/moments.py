@@ -18,7 +18,7 @@ from kedfem.motion.rows import cross
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
 SMALL = 100  # up to here one product with all of M beats one per component
-Field = Float[np.ndarray, "T n d"]
+Field = Float[np.ndarray, "_ _ _"]
 Flat = Float[np.ndarray, "m _"]
 
 
