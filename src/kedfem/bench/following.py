@@ -238,7 +238,7 @@ def _plot(path: Path, study: _Study, exact: Curve) -> None:
     axes.set_xlabel("processor time of the steps [s]")
     axes.set_ylabel("worst error, of the peak stress [%]")
     axes.grid(visible=True, which="both", alpha=0.3)
-    axes.legend()
+    axes.legend(loc="lower left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130)
 
