@@ -31,16 +31,16 @@ class Forcing:
 
 @dataclass(frozen=True, slots=True)
 class Products:
-    """Products with the state that a solver has at hand anyway; all (T, n, d).
+    """Products with the state that a solver has at hand anyway; all (T, n, d), those that are not needed (T, 0, 0).
 
     Mv : M δ', world components [kg m/s]
     Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping,
         or where the mass is 1 and K0 g tells it
     """
 
-    Mv: Float[np.ndarray, "T n d"]
-    Kg: Float[np.ndarray, "T n d"]
-    Cg: Float[np.ndarray, "T n d"] | None
+    Mv: Float[np.ndarray, "T _ _"]
+    Kg: Float[np.ndarray, "T _ _"]
+    Cg: Float[np.ndarray, "T _ _"] | None
 
     def part(self, first: int, end: int) -> "Products":
         """The time points from one number up to another."""

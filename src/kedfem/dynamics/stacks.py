@@ -71,7 +71,7 @@ class Stack:
             np.matmul(x[a:b], r, out=out[a:b])
         return out
 
-    def moments(self, x: Rows, c: Rows) -> Each:
+    def moments(self, x: Float[np.ndarray, "N _"], c: Float[np.ndarray, "N _"]) -> Float[np.ndarray, "s k k"]:
         """Σ x_a ⊗ c_a of each segment, of the components that turn."""
         k, even, other = self.k, self._even(x), self._even(c)
         if even is not None and other is not None:
@@ -222,7 +222,7 @@ def first_frames(stack: Stack, every: Sequence[tuple[Followed, ...]]) -> tuple[S
 
 
 def rotations(
-    stack: Stack, fit: Rows, y: Rows, angle: Float[np.ndarray, " s"]
+    stack: Stack, fit: Float[np.ndarray, "N 3"], y: Rows, angle: Float[np.ndarray, " s"]
 ) -> tuple[Each, Float[np.ndarray, " s"]]:
     """`frames.rotation` of all segments."""
     A = stack.moments(y, fit)
@@ -252,7 +252,7 @@ def deformations(stack: Stack, y: Rows, Q: Each, angle: Float[np.ndarray, " s"])
     return g
 
 
-def frame_forces(stack: Stack, fit: Rows, now: StackFrame, f: Rows, y: Rows) -> Rows:
+def frame_forces(stack: Stack, fit: Float[np.ndarray, "N 3"], now: StackFrame, f: Rows, y: Rows) -> Rows:
     """`frames.frame_force` of all segments from f = K0 (g + β g') in their frames; in the nominal frame."""
     k = stack.k
     U = now.Q[:, :k, :k].transpose(0, 2, 1) @ stack.moments(y, fit)

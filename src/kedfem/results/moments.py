@@ -18,8 +18,8 @@ from kedfem.motion.rows import cross
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
 SMALL = 100  # up to here one product with all of M beats one per component
-Field = Float[np.ndarray, "T n d"]
-Flat = Float[np.ndarray, "m u"]
+Field = Float[np.ndarray, "_ _ _"]
+Flat = Float[np.ndarray, "m _"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +157,7 @@ def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Float[n
     return np.asarray(np.einsum("tk,tk->t", x.reshape(len(x), -1), y.reshape(len(y), -1)))
 
 
-def _rows(link: Link, fit: Float[np.ndarray, "k 4"], couple: Float[np.ndarray, " k"]) -> Flat:
+def _rows(link: Link, fit: Float[np.ndarray, "k _"], couple: Float[np.ndarray, " k"]) -> Flat:
     """Moments of vectors with these weights, and the sum of the third components of a planar beam."""
     k = fit.shape[1] - 1
     out = np.zeros((1 + k, k, len(fit), link.d))
