@@ -19,7 +19,7 @@ from kedfem.scene import Scene, scene_from
 
 END, SAMPLES = 0.3, 600  # s; times at which curves are compared
 STRESS = "probes/stress/stress"
-BLOCKS, POINTS = 3, 20  # of steps whose cost is compared
+BLOCKS, POINTS = 6, 20  # of steps whose cost is compared
 
 Curve = Float[np.ndarray, " T"]
 
