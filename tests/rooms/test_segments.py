@@ -138,6 +138,7 @@ def test_more_segments_than_layers_are_refused_where_they_are_asked_for() -> Non
         ready(bars(4, segments=5))
 
 
+@pytest.mark.long
 def test_an_accuracy_chooses_segments_that_its_share_allows() -> None:
     raw = bars(24)
     raw["analysis"] = {"turns": 0.1, "frames": "following", "accuracy": 0.03}
