@@ -30,7 +30,6 @@ from kedfem.links.reduced import (
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: functions below repeat others
 REPEATED = 1e-9  # of a deflection: what is left of it beside those before is rounding
-ROUNDING = 1e-6  # share of a mode in the static deflection, up to which loads do not excite it
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +88,7 @@ def frozen_frequencies(
     R, static = _static(parts, instant)
     if not any(x.any() for x in static):
         return np.zeros(0)
-    values, Z = np.linalg.eigh(_lanczos(model, parts, R, static, levels)[2])
-    # the first vector is the static deflection: a mode out of the plane is in it by rounding only
-    values = values[np.abs(Z[0]) > ROUNDING][::-1]
+    values = np.linalg.eigvalsh(_lanczos(model, parts, R, static, levels)[2])[::-1]
     return np.asarray(1 / np.sqrt(values[values > REPEATED * values[0]]))
 
 
