@@ -3,19 +3,24 @@
 import numpy as np
 import pytest
 
-from .following import double_errors, flight_errors, four_bar_error
+from .following import double_errors, flight_energy, flight_errors, four_bar_error
 
 
 @pytest.mark.long
 def test_a_thrown_rod_and_its_energy_converge_with_order_two_in_the_step() -> None:
-    """Positions of the ends against the reference; what numerical damping takes falls with the third power."""
+    """Positions of the ends against the reference. The energy swings, since forces balance within a step and energy
+
+    is taken at its end; where the run stops in a swing says nothing, so that its size and the mean lost are held."""
     coarse, fine = flight_errors(5e-4), flight_errors(2.5e-4)
-    order = np.log2(np.abs(coarse / fine))
+    order = np.log2(coarse / fine)
     assert np.all(order[:4] > 1.7)
     assert np.all(order[:4] < 2.2)
     assert np.all(fine[:4] < 1.2e-4)
-    assert 2.5 < order[6] < 3.5
-    assert 0 < fine[6] < 1e-6
+    (swing, lost), (fine_swing, fine_lost) = flight_energy(5e-4), flight_energy(2.5e-4)
+    assert 1.9 < np.log2(swing / fine_swing) < 2.1
+    assert fine_swing < 2.5e-6
+    assert abs(lost) < 1e-6
+    assert abs(fine_lost) < 5e-8
 
 
 def test_a_double_pendulum_converges_with_order_two_in_the_step() -> None:
