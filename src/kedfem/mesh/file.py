@@ -45,7 +45,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
             f"{where}: elements must use nodes 0 to {len(points) - 1}, got node "
             f"{cells.min() if cells.min() < 0 else cells.max()} in {path}"
         )
-    mesh = without_spare_nodes(scale * points, cells)
+    mesh = without_spare_nodes(HexMesh(scale * points, cells))
     if not np.isfinite(mesh.points).all():
         used = np.unique(cells)
         bad = used[~np.isfinite(mesh.points).all(axis=1)][0]

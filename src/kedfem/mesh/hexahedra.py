@@ -1,6 +1,7 @@
 """Hexahedral meshes: the record, the elements' shape functions, extrusion of plane quadrilaterals."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -26,6 +27,37 @@ CELL_TYPES = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}  # meshio
 
 
 @dataclass(frozen=True, slots=True)
+class Face:
+    """A face of a part that has a name: what its geometry is, and the sides of elements on it.
+
+    Attributes
+    ----------
+    name : str
+        From the CAD file, the physical group of a mesh file, or "face 7".
+    kind : str
+        What its geometry is; "other" for a cone, a free form or several faces in one group.
+    centre : (3,) [m]
+        Centroid of its area; of a cylinder a point on the axis, half way along; of a sphere the sphere's centre.
+    direction : (3,) [-]
+        Unit vector: of a plane its outward normal, of a cylinder its axis; else nan.
+    radius : float [m]
+        Of a cylinder or sphere; else nan.
+    inward : bool
+        Whether the material is outside of a cylinder or sphere: a bore or a seat, not a journal or a ball.
+    sides : (f, 4)
+        Corner nodes of the sides of elements on the face, in any order.
+    """
+
+    name: str
+    kind: Literal["plane", "cylinder", "sphere", "other"]
+    centre: Float[np.ndarray, "3"]
+    direction: Float[np.ndarray, "3"]
+    radius: float
+    inward: bool
+    sides: Int[np.ndarray, "f 4"]
+
+
+@dataclass(frozen=True, slots=True)
 class HexMesh:
     """A mesh of hexahedra alone, every node used; the arrays are read-only copies.
 
@@ -35,10 +67,16 @@ class HexMesh:
         Nodes in the global reference position.
     cells : (e, 8), (e, 20) or (e, 27)
         Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27).
+    faces : tuple of Face
+        Faces that have a name, as far as they are known.
+    way : str
+        How the mesh was made and why so, in words; empty where there is no choice.
     """
 
     points: Float[np.ndarray, "n 3"]
     cells: Int[np.ndarray, "e k"]
+    faces: tuple[Face, ...] = ()
+    way: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("points", np.float64), ("cells", np.int64)):
@@ -179,7 +217,7 @@ def quadratic(mesh: HexMesh) -> HexMesh:
     _, first, number = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     places = (shape_functions(HEX27[:k], 1.0 * added) @ mesh.points[mesh.cells]).reshape(-1, 3)
     cells = np.column_stack([mesh.cells, len(mesh.points) + number.reshape(e, -1)])
-    return HexMesh(np.concatenate([mesh.points, places[first]]), cells)
+    return replace(mesh, points=np.concatenate([mesh.points, places[first]]), cells=cells)
 
 
 def serendipity(mesh: HexMesh) -> HexMesh:
@@ -187,23 +225,28 @@ def serendipity(mesh: HexMesh) -> HexMesh:
     if mesh.cells.shape[1] == len(HEX20):
         return mesh
     full = quadratic(mesh)
-    return without_spare_nodes(full.points, full.cells[:, : len(HEX20)])
+    return without_spare_nodes(replace(full, cells=full.cells[:, : len(HEX20)]))
 
 
 def linear(mesh: HexMesh) -> HexMesh:
     """The 8-node hexahedra with the same corners, other nodes dropped."""
-    return without_spare_nodes(mesh.points, mesh.cells[:, : len(HEX8)])
+    return without_spare_nodes(replace(mesh, cells=mesh.cells[:, : len(HEX8)]))
 
 
-def without_spare_nodes(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]) -> HexMesh:
+def without_spare_nodes(mesh: HexMesh) -> HexMesh:
     """The mesh with nodes that no cell uses left out, the others kept in their order."""
-    used, renumbered = np.unique(cells, return_inverse=True)
-    return HexMesh(points[used], renumbered.reshape(cells.shape))
+    used, renumbered = np.unique(mesh.cells, return_inverse=True)
+    faces = tuple(replace(face, sides=np.searchsorted(used, face.sides)) for face in mesh.faces)
+    return replace(mesh, points=mesh.points[used], cells=renumbered.reshape(mesh.cells.shape), faces=faces)
 
 
 def placed(mesh: HexMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> HexMesh:
     """The mesh moved rigidly: its x, y, z run along the rows of `axes` from `origin` [m]."""
-    return HexMesh(origin + mesh.points @ axes, mesh.cells)
+    faces = tuple(
+        replace(face, centre=origin + face.centre @ axes, direction=face.direction @ axes)
+        for face in mesh.faces
+    )
+    return replace(mesh, points=origin + mesh.points @ axes, faces=faces)
 
 
 def frame_along(line: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

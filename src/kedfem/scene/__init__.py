@@ -27,7 +27,7 @@ from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import read_scene, scene_from
 from kedfem.scene.scene import Scene
 from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
-from kedfem.scene.shapes import Bar, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
+from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
 from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
 from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
 
@@ -39,6 +39,7 @@ __all__ = [
     "Bar",
     "Body",
     "BodyLoad",
+    "Cad",
     "ConstantSpeed",
     "ConstantsSection",
     "Cycloidal",

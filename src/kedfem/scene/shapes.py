@@ -172,7 +172,25 @@ class MeshFile(Record):
     """metres per unit of the file: 0.001 for a file in millimetres"""
 
 
-Shape = Annotated[Bar | PlateLink | Extrusion | Part | Polyline | MeshFile, Field(discriminator="kind")]
+class Cad(Record):
+    """A part from CAD (STEP, IGES or BREP), made of hexahedra; solid. `step = "rod.step"` in a link is short for it."""
+
+    kind: Literal["cad"] = "cad"
+    file: FileName
+    """the file, relative to the scene file; its ending says what it is: .step, .stp, .iges, .igs, .brep"""
+    solid: str | None = None
+    """which solid of an assembly; if not given the one with the link's name; of a file with one solid that one"""
+    scale: Annotated[float, Quantity("1", above=0.0)] | None = None
+    """metres per unit of the file; if not given the file's own unit, of BREP files, which have none, 0.001"""
+    origin: Point = (0.0, 0.0, 0.0)
+    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the file is drawn in its place"""
+    towards: Point | None = None
+    """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
+    z: Axis | None = None
+    """`"x"`, `"y"`, `"z"` or a vector: where the file's z axis goes, as near as its x axis allows; z if not given"""
+
+
+Shape = Annotated[Bar | PlateLink | Extrusion | Part | Polyline | MeshFile | Cad, Field(discriminator="kind")]
 
 
 class PartGeometry(Profile):

@@ -1,0 +1,66 @@
+"""What the ways of meshing know of a solid from CAD, and what they are asked for."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import KedfemError
+
+
+class OtherWayError(KedfemError):
+    """A solid cannot be meshed this way; the reason is told to the user if no way is left, or a worse one taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class CadFace:
+    """A face of a solid, as gmsh's model has it: its tag there, the rest as in `Face`; of a cylinder also its length."""
+
+    tag: int
+    name: str
+    kind: Literal["plane", "cylinder", "sphere", "other"]
+    centre: Float[np.ndarray, "3"]
+    direction: Float[np.ndarray, "3"]
+    radius: float
+    inward: bool
+    area: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """The one solid in gmsh's model, in metres: its tag, name, volume [m³], box and faces."""
+
+    tag: int
+    name: str
+    volume: float
+    low: Float[np.ndarray, "3"]
+    high: Float[np.ndarray, "3"]
+    faces: tuple[CadFace, ...]
+
+    @property
+    def extent(self) -> float:
+        """Length of the box's diagonal [m]."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def area(self) -> float:
+        """Area of all faces [m²]."""
+        return sum(face.area for face in self.faces)
+
+
+@dataclass(frozen=True, slots=True)
+class Sizing:
+    """How fine a mesh of a solid is to be.
+
+    size : edge length of the hexahedra [m]; None: from `across`
+    across : hexahedra across the smallest width, where no size is given
+    layers : least number through each thickness of a part made of layers
+    turn : most that an element turns along a curved face [rad]
+    """
+
+    size: float | None = None
+    across: int = 2
+    layers: int = 1
+    turn: float = np.pi / 4
