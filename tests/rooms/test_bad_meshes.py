@@ -241,7 +241,7 @@ class TestPart:
 class TestShape:
     def test_none(self):
         message = refused(None, fidelity="rigid")
-        assert message == "links.arm.shape: must be bar, plate_link, extrusion, part or mesh, got no shape"
+        assert message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
 
     def test_for_beams_only(self):
         line = {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}

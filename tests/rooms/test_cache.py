@@ -1,5 +1,6 @@
 """What is kept between runs: the same results, and new ones when anything changes or an entry is damaged."""
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from kedfem.accuracy import reduction
-from kedfem.accuracy.cache import contents, kept, key
+from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.model import Model
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery
 from kedfem.scene import Scene, scene_from
+from kedfem.store import contents, itself, kept
 
 from .test_dynamics import four_bar
 
@@ -106,6 +108,20 @@ def test_nothing_is_kept_where_the_cache_is_off(folder: Path, monkeypatch: pytes
     assert not folder.exists()
 
 
+def test_an_entry_that_reads_well_but_is_not_what_was_written_is_made_again(folder: Path) -> None:
+    calls: list[int] = []
+
+    def work() -> list[float]:
+        calls.append(1)
+        return [1.0, 2.0]
+
+    kept("numbers", "any", work, itself, itself)
+    (file,) = folder.rglob("output.pkl")
+    file.write_bytes(file.read_bytes().replace(struct.pack(">d", 2.0), struct.pack(">d", 3.0)))
+    assert [kept("numbers", "any", work, itself, itself) for _ in range(2)] == [[1.0, 2.0]] * 2
+    assert len(calls) == 2
+
+
 def test_what_cannot_be_packed_is_made_each_time() -> None:
     calls: list[int] = []
 
@@ -113,7 +129,7 @@ def test_what_cannot_be_packed_is_made_each_time() -> None:
         calls.append(1)
         return 7
 
-    assert [kept("number", scene(), work, lambda _: None, lambda x: x) for _ in range(2)] == [7, 7]
+    assert [kept("number", key(scene()), work, lambda _: None, lambda x: x) for _ in range(2)] == [7, 7]
     assert len(calls) == 2
 
 

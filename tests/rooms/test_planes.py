@@ -91,7 +91,7 @@ def test_a_plane_mesh_cannot_be_written_to() -> None:
 
 def test_shapes_without_a_plate_are_no_plane_links(tmp_path: Path) -> None:
     link = LinkScene(shape={"kind": "mesh", "file": "any.vtu"}, fidelity="plane")
-    message = "links.any.shape: must be bar, plate_link, extrusion, part or mesh, got mesh"
+    message = "links.any.shape: must be bar, plate_link, extrusion, part, mesh or cad, got mesh"
     with pytest.raises(MeshError, match=message.replace(".", r"\.")):
         plane_mesh("any", link, tmp_path)
 

@@ -12,7 +12,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from kedfem.accuracy.cache import kept
+from kedfem.accuracy.cache import key
 from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.trials import Stage, Trials
@@ -27,6 +27,7 @@ from kedfem.accuracy.variants import (
 )
 from kedfem.errors import KedfemError, SceneError
 from kedfem.scene import LinkScene, Scene, time_grid
+from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
@@ -88,11 +89,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     asked = scene.analysis.accuracy
     if asked is None:
         raise ValueError("the scene asks for no accuracy")
-    return kept("plan", scene, partial(_planned, scene, asked, stage), _itself, _itself)
-
-
-def _itself(plan: Plan) -> Plan:
-    """A plan can be kept as it is."""
+    plan: Plan = kept("plan", key(scene), partial(_planned, scene, asked, stage), itself, itself)
     return plan
 
 

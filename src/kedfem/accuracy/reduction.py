@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.cache import kept
+from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.bases import bases
@@ -32,6 +32,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, drive_angle, time_grid, turn_steps
+from kedfem.store import kept
 
 Stage = Callable[[str], None]
 
@@ -74,7 +75,7 @@ def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, 
         return meshed(scene, stage), None
     counts = {name: count for name, count in chosen.items() if count is not None}
     found = kept(
-        "reduction", scene,
+        "reduction", key(scene),
         lambda: reduced(meshed(scene, stage), chosen, scene.analysis.reduction, counts, stage),
         _packed, lambda stored: _unpacked(stored, scene),
     )  # fmt: skip

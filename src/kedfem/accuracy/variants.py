@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from kedfem.scene import Bar, Extrusion, LinkScene, MeshFile, Part, PlateLink, Scene, time_grid
+from kedfem.scene import Bar, Cad, Extrusion, LinkScene, MeshFile, Part, PlateLink, Scene, time_grid
 
 Family = Literal["solid", "plane", "beam", "rigid"]
 CHOSEN = {"element", "mesh", "fidelity", "reduced", "functions"}
@@ -41,7 +41,7 @@ def families(link: LinkScene) -> tuple[Family, ...]:
             return ("rigid", "beam", "plane", "solid")
         case PlateLink() | Extrusion() | Part():
             return ("rigid", "plane", "solid")
-        case MeshFile():
+        case MeshFile() | Cad():
             return ("rigid", "solid")
         case _:
             return ("rigid", "beam")
@@ -60,6 +60,8 @@ def refined(link: LinkScene, factor: float) -> LinkScene:
         changed = {"layers": _more(mesh.layers, factor)} if link.family == "solid" else {}
         if mesh.size is not None:
             changed["size"] = mesh.size / factor
+        elif mesh.unknowns is not None:
+            changed["unknowns"] = _more(mesh.unknowns, factor**3)
         else:
             changed["elements_across"] = _more(mesh.elements_across or 2, factor)
     return link.model_copy(update={"mesh": mesh.model_copy(update=changed)})

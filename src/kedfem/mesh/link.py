@@ -90,7 +90,7 @@ def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
             return part_plate(where, shape, link.mesh, folder)
         case other:
             kind = "no shape" if other is None else other.kind
-            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part or mesh, got {kind}")
+            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part, mesh or cad, got {kind}")
 
 
 def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:

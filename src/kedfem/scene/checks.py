@@ -14,7 +14,7 @@ from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
 
 SHAPES = {
-    "solid": ["bar", "plate_link", "extrusion", "part", "mesh"],
+    "solid": ["bar", "plate_link", "extrusion", "part", "mesh", "cad"],
     "plane": ["bar", "plate_link", "extrusion", "part"],
     "beam": ["bar", "polyline"],
 }
@@ -125,6 +125,8 @@ def meshing_faults(link: Entry) -> Iterator[str]:
     shape, mesh = link.word("shape", "kind"), link.raw.get("mesh")
     if not isinstance(mesh, Mapping):
         return
+    if link.has("mesh", "unknowns") and shape != "cad":
+        yield link.fault("mesh", f"must be given for a part from CAD only, got one for a {shape}", "unknowns")
     counted = "beam" if fidelity(link) == "beam" else "bar" if shape == "bar" else None
     if fidelity(link) == "plane" and link.has("mesh", "layers"):
         wanted = "must be left out for a plane link (it has one element through its thickness)"
@@ -140,8 +142,13 @@ def meshing_faults(link: Entry) -> Iterator[str]:
             got = f"got {shown(mesh['elements'])}"
             wanted = f"must be left out for a {shape} (it has size or elements_across)"
             yield link.fault("mesh", f"{wanted}, {got}", "elements")
-        if link.has("mesh", "size") and link.has("mesh", "elements_across"):
-            yield link.fault("mesh", "must stand without elements_across, got both", "size")
+        for key, other in (
+            ("size", "elements_across"),
+            ("unknowns", "size"),
+            ("unknowns", "elements_across"),
+        ):
+            if link.has("mesh", key) and link.has("mesh", other):
+                yield link.fault("mesh", f"must stand without {other}, got both", key)
 
 
 def count_faults(link: Entry, counted: str) -> Iterator[str]:

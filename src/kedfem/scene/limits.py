@@ -11,7 +11,7 @@ from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Tabl
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import FLAT, off_plane, spring_ends, vector
-from kedfem.scene.shapes import MeshFile, Part
+from kedfem.scene.shapes import Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
 
@@ -134,6 +134,9 @@ def file_faults(parts: Parts) -> Iterator[str]:
             yield link.fault(
                 "shape", f"must be a mesh file, got nothing at {parts.folder / shape.file}", "file"
             )
+        if isinstance(shape, Cad) and not (parts.folder / shape.file).is_file():
+            key, inner = ("step", ()) if link.has("step") else ("shape", ("file",))
+            yield link.fault(key, f"must be a CAD file, got nothing at {parts.folder / shape.file}", *inner)
         if isinstance(shape, Part):
             try:
                 part = part_geometry(parts.folder / shape.file)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
-from kedfem.scene.base import Record
+from kedfem.scene.base import FileName, Record, refuse
 from kedfem.scene.frames import Frames
 from kedfem.scene.points import Axis, Point
-from kedfem.scene.shapes import Bar, Polyline, Shape
+from kedfem.scene.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
 
 GROUND = "ground"
@@ -40,7 +41,16 @@ class Meshing(Record):
     elements_across: Count | None = None
     """other shapes: number across the smallest width; 2 if neither this nor `size` is given"""
     layers: Count = 1
-    """other shapes, solid: number through the thickness"""
+    """other shapes, solid: number through the thickness; of a part from CAD the least through each of its layers"""
+    unknowns: Annotated[StrictInt, Field(ge=100)] | None = None
+    """a part from CAD: about so many unknowns, instead of `size` or `elements_across`"""
+
+
+def spelt_out(link: Any) -> Any:
+    """A raw link that gives a CAD file in short, with the shape that this means."""
+    if not isinstance(link, Mapping) or link.get("step") is None or link.get("shape") is not None:
+        return link
+    return {**link, "shape": {"kind": "cad", "file": link["step"]}}
 
 
 class LinkScene(Record):
@@ -58,6 +68,8 @@ class LinkScene(Record):
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
     """its shape; not for a rigid slider"""
+    step: FileName | None = None
+    """a CAD file (STEP, IGES or BREP): short for `shape = { kind = "cad", file = … }`"""
     mass: Mass = 0.0
     """mass of a rigid slider (a rigid link without a shape)"""
     mesh: Meshing = Meshing()
@@ -78,8 +90,15 @@ class LinkScene(Record):
     fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a beam are
     its elements"""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _step_is_a_shape(cls, raw: Any) -> Any:
+        return spelt_out(raw)
+
     @model_validator(mode="after")
     def _defaults(self) -> Self:
+        if self.step is not None and not (isinstance(self.shape, Cad) and self.shape.file == self.step):
+            refuse([(("step",), "must stand without shape, got both")])
         if self.fidelity == "reduced":
             self.fill(fidelity=self.family, reduced=True)
         element = self.element or (ELEMENTS[self.family] if self.shape is not None else None)
@@ -105,7 +124,8 @@ class LinkScene(Record):
                 usual = (1, 1, 1)
             return {"elements": self.mesh.elements or usual}
         fewest = 1 if self.fidelity == "rigid" else 2
-        across = self.mesh.elements_across or (fewest if self.mesh.size is None else None)
+        given = self.mesh.size is not None or self.mesh.unknowns is not None
+        across = self.mesh.elements_across or (None if given else fewest)
         return {"elements_across": across}
 
 

@@ -26,7 +26,7 @@ from kedfem.scene.files import scene_folder, with_motion_table
 from kedfem.scene.frames import default_frames
 from kedfem.scene.free import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
 from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
-from kedfem.scene.links import Joint, LinkScene
+from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
@@ -119,6 +119,8 @@ class Scene(Record):
             raise SceneError(f"must be a table of keys, got {raw!r}")
         placement = Placement(raw.get("points"), raw.get("joints"))
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
+        if isinstance(links := raw.get("links"), Mapping):
+            raw = {**raw, "links": {name: spelt_out(link) for name, link in links.items()}}
         if isinstance(analysis := raw.get("analysis"), Mapping) and analysis.get("accuracy") is not None:
             raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_table(raw, scene_folder.get())
