@@ -17,7 +17,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model, segments
+from kedfem.dynamics.model import Model, segments, ways
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -179,9 +179,10 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     peak: Peak | None = None
     geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
     channels = [each.channel for each in recorded]
-    notes = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
     notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
+    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:

@@ -204,6 +204,12 @@ def segments(model: Model) -> dict[str, list[Link]]:
     return out
 
 
+def ways(model: Model) -> dict[str, str]:
+    """How the links that are parts from CAD were meshed, in words."""
+    links = [*model.links, *(carried.link for carried in model.carried)]
+    return {link.name: way for link in links if (way := (link.full or link).way)}
+
+
 def on_segment(
     model: Model, name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
 ) -> tuple[int, T]:

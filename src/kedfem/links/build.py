@@ -24,6 +24,7 @@ from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.mesh import link_mesh, plane_mesh
 from kedfem.scene import (
     Bar,
+    Cad,
     LinkScene,
     Material,
     Part,
@@ -53,6 +54,8 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
     """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
     match link.shape:
         case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
+            return line_axes(np.asarray(a), np.asarray(b))
+        case Cad(origin=a, towards=b) if b is not None:
             return line_axes(np.asarray(a), np.asarray(b))
         case Polyline(points=points):
             return line_axes(np.asarray(points[0]), np.asarray(points[-1]))

@@ -73,6 +73,7 @@ class Link:
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
     fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
+    way : how the mesh of a part from CAD was made, in words; else empty
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
     """
 
@@ -99,6 +100,7 @@ class Link:
     rigid: bool = False
     fit: Float[np.ndarray, "n 3"] | None = None
     frames: tuple[Frame, ...] = ()
+    way: str = ""
 
     @property
     def n(self) -> int:

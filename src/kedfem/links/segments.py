@@ -134,7 +134,7 @@ def _slice(
     if link.kind == "plane":
         part = plane_link(link.name, QuadMesh(link.X[used], cells, link.thickness), material, link.axes)
     else:
-        part = solid_link(link.name, HexMesh(link.X[used], cells), material, link.axes)
+        part = solid_link(link.name, HexMesh(link.X[used], cells, way=link.way), material, link.axes)
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
     assert distance.max() <= SAME * link.size  # noqa: S101

@@ -156,5 +156,5 @@ def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndar
         name=name, kind="solid", X=X, one=one, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
         axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
         volume=m1[:, 0] / material.density,
-        E=material.youngs_modulus, lame=material.lame(), basis=basis,
+        E=material.youngs_modulus, lame=material.lame(), basis=basis, way=mesh.way,
     )  # fmt: skip

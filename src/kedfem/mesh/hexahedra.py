@@ -1,5 +1,6 @@
 """Hexahedral meshes: the record, the elements' shape functions, extrusion of plane quadrilaterals."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -231,6 +232,10 @@ def serendipity(mesh: HexMesh) -> HexMesh:
 def linear(mesh: HexMesh) -> HexMesh:
     """The 8-node hexahedra with the same corners, other nodes dropped."""
     return without_spare_nodes(replace(mesh, cells=mesh.cells[:, : len(HEX8)]))
+
+
+#: Which mesh each element wants.
+FORMS: dict[str, Callable[[HexMesh], HexMesh]] = {"hex8": linear, "hex20": serendipity, "hex27": quadratic}
 
 
 def without_spare_nodes(mesh: HexMesh) -> HexMesh:

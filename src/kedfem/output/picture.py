@@ -44,10 +44,10 @@ def write_picture(vtu: Path, png: Path, title: str) -> None:
         except subprocess.TimeoutExpired as error:
             raise OutputError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
         if done.returncode != 0 or not part.is_file():
-            raise OutputError(_fault(vtu, done))
+            raise OutputError(drawing_fault(f"{vtu}: must be a frame", done))
 
 
-def _fault(vtu: Path, done: "subprocess.CompletedProcess[bytes]") -> str:
+def drawing_fault(wanted: str, done: "subprocess.CompletedProcess[bytes]") -> str:
     """Why there is no picture: VTK cannot draw here, or cannot draw this."""
     lines = done.stderr.decode(errors="replace").strip().splitlines()
     if "Traceback (most recent call last):" not in lines:
@@ -55,4 +55,4 @@ def _fault(vtu: Path, done: "subprocess.CompletedProcess[bytes]") -> str:
         return f"{ADVICE}, got no window ({how})"
     if lines[-1].startswith("ImportError"):
         return f"{ADVICE}, got {lines[-1]}"
-    return f"{vtu}: must be a frame that VTK can draw, got {lines[-1]}"
+    return f"{wanted} that VTK can draw, got {lines[-1]}"

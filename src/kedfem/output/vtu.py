@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
+from kedfem.mesh import HexMesh, mesh_quality
 from kedfem.results.files import ready_folder, reason, replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
@@ -91,6 +92,24 @@ class AnimationWriter:
         with replacing(self.folder / f"{self.stem}.pvd") as part:
             part.write_text(_collection(self.stem, self.times), encoding="utf-8")
         return path
+
+
+def write_mesh(mesh: HexMesh, path: Path) -> None:
+    """A mesh as a VTU file, with the scaled Jacobian of its elements.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import meshio
+    from meshio import vtu
+
+    quality = mesh_quality(mesh).scaled_jacobian
+    cells = [(mesh.cell_type, mesh.cells.astype(np.int32))]
+    content = meshio.Mesh(mesh.points, cells, cell_data={"scaled_jacobian": [quality]})
+    with replacing(path) as part:
+        vtu.write(str(part), content, binary=True, compression="zlib")
 
 
 def remove_animation(folder: Path, stem: str) -> None:

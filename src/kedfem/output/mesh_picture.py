@@ -1,0 +1,106 @@
+"""Pictures of meshes: elements coloured by their quality, beside them how many there are of each."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import OutputError
+from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh.hexahedra import HEX27, QUAD9, quadratic, shape_functions
+from kedfem.output.picture import ADVICE, TIMEOUT, drawing_fault
+from kedfem.results import replacing
+
+FINENESS = 4
+"""Straight pieces that a side of an element is drawn in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """The surface of a mesh as VTK takes it.
+
+    points : (n, 3) [m]
+    patches : (p, 4) small quadrilaterals
+    values : (p,) scaled Jacobian of the element that each belongs to
+    lines : (l, FINENESS + 1) edges of elements
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    patches: Int[np.ndarray, "p 4"]
+    values: Float[np.ndarray, " p"]
+    lines: Int[np.ndarray, "l k"]
+
+
+def drawn(mesh: HexMesh) -> Drawn:
+    """Outer sides of the elements in small patches, curved as the elements are."""
+    full = quadratic(mesh)
+    quality = mesh_quality(mesh).scaled_jacobian
+    sides, owners = _outer_sides(full.cells)
+    k = FINENESS + 1
+    r = np.linspace(-1, 1, k)
+    places = np.stack(np.meshgrid(r, r, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = (shape_functions(QUAD9, places) @ full.points[sides]).reshape(-1, 3)
+    at = np.arange(k * k).reshape(k, k)
+    square = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    rim = np.stack([at[0], at[-1], at[:, 0], at[:, -1]])
+    start = k * k * np.arange(len(sides))[:, None, None]
+    return Drawn(
+        points,
+        (start + square).reshape(-1, 4),
+        np.repeat(quality[owners], FINENESS**2),
+        (start + rim).reshape(-1, k),
+    )
+
+
+def _outer_sides(cells: Int[np.ndarray, "e 27"]) -> tuple[Int[np.ndarray, "s 9"], Int[np.ndarray, " s"]]:
+    """quad9 nodes of the sides that one element alone has, and which element."""
+    found = []
+    for axis in range(3):
+        across = [i for i in range(3) if i != axis]
+        for end in (-1, 1):
+            nodes = [
+                int(np.flatnonzero((HEX27[:, axis] == end) & (HEX27[:, across] == at).all(axis=1))[0])
+                for at in QUAD9
+            ]
+            found.append(cells[:, nodes])
+    sides, owners = np.concatenate(found), np.tile(np.arange(len(cells)), 6)
+    _, number, count = np.unique(
+        np.sort(sides[:, :4], axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    outer = count[number.ravel()] == 1
+    return sides[outer], owners[outer]
+
+
+def write_mesh_picture(meshes: Sequence[tuple[str, HexMesh]], png: Path, title: str) -> None:
+    """Draw meshes side by side, one alone with the histogram of its quality.
+
+    Parameters
+    ----------
+    meshes : words and mesh of each
+
+    Raises
+    ------
+    OutputError
+        VTK cannot draw here, or the PNG cannot be written.
+    """
+    arrays: dict[str, np.ndarray] = {"title": np.array(title)}
+    for i, (words, mesh) in enumerate(meshes):
+        each = drawn(mesh)
+        arrays |= {f"words{i}": np.array(words), f"quality{i}": mesh_quality(mesh).scaled_jacobian}
+        arrays |= {f"{key}{i}": getattr(each, key) for key in ("points", "patches", "values", "lines")}
+    with replacing(Path(png)) as part, tempfile.TemporaryDirectory() as folder:
+        given = Path(folder) / "meshes.npz"
+        np.savez(given, allow_pickle=False, **arrays)
+        drawing = Path(__file__).with_name("mesh_rendering.py")
+        command = [sys.executable, "-P", str(drawing), str(given), str(part), str(len(meshes))]
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
+        except subprocess.TimeoutExpired as error:
+            raise OutputError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
+        if done.returncode != 0 or not part.is_file():
+            raise OutputError(drawing_fault("the mesh: must be one", done))

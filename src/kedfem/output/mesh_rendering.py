@@ -1,0 +1,144 @@
+"""The drawing process of :func:`kedfem.output.mesh_picture.write_mesh_picture`.
+
+It is run by its path and imports nothing of kedfem.
+"""
+
+import math
+import sys
+import textwrap
+from typing import Any
+
+import numpy as np
+
+SIZE = 1500
+"""Pixels of the picture of one mesh, each way, before its margin is cut off."""
+
+COLOURS = ("#a50026", "#f46d43", "#fee08b", "#d9ef8b", "#8cc665")
+"""From bad to good; the good ones light enough for black edges."""
+
+LIFT = 2e-3
+"""How far edges are drawn before the surface, as part of the diagonal, so that it does not cover them."""
+
+BINS = 20
+"""Of the histogram, from 0 to 1."""
+
+
+def render(npz: str, png: str, count: str) -> None:
+    """Draw meshes.
+
+    Parameters
+    ----------
+    npz, png
+        What to draw, and where to.
+    count
+        How many meshes there are.
+    """
+    given = np.load(npz)
+    if int(count) == 1:
+        draw_one(given, png)
+    else:
+        draw_several(given, png, int(count))
+
+
+def draw_one(given: Any, png: str) -> None:
+    """A mesh and the histogram of its quality."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[2, 1], layout="constrained")
+    left.imshow(image(given, 0))
+    left.set_axis_off()
+    quality = given["quality0"]
+    counts, edges = np.histogram(quality, bins=BINS, range=(0.0, 1.0))
+    middles = (edges[1:] + edges[:-1]) / 2
+    right.bar(middles, counts, width=0.9 / BINS, color=colours()(middles), edgecolor="black", lw=0.4)
+    right.axvline(float(quality.min()), color="black", ls="--", lw=1)
+    right.set_title(f"worst {quality.min():.2f}, median {np.median(quality):.2f}", fontsize=11)
+    right.set(xlim=(0, 1), xlabel="scaled Jacobian", ylabel="elements")
+    figure.suptitle("\n".join(textwrap.wrap(str(given["title"]), 120)), fontsize=12)
+    figure.savefig(png, dpi=110, format="png")
+
+
+def draw_several(given: Any, png: str, count: int) -> None:
+    """Meshes in rows and columns."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    columns = min(3, count)
+    rows = math.ceil(count / columns)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(5.0 * columns, 4.9 * rows), layout="constrained", squeeze=False
+    )
+    for i, place in enumerate(axes.ravel()):
+        place.set_axis_off()
+        if i < count:
+            place.imshow(image(given, i))
+            words = "\n".join(textwrap.fill(line, 52) for line in str(given[f"words{i}"]).splitlines())
+            place.set_title(words, fontsize=11)
+    bar = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, 1), colours())
+    figure.colorbar(bar, ax=axes, location="bottom", shrink=0.4, aspect=40, label="scaled Jacobian")
+    figure.suptitle(str(given["title"]), fontsize=14)
+    figure.savefig(png, dpi=80, format="png")
+
+
+def image(given: Any, i: int) -> Any:
+    """Pixels of one mesh, seen at a slant from above its flat side."""
+    import pyvista
+
+    points, patches, lines = (given[f"{key}{i}"] for key in ("points", "patches", "lines"))
+    surface = pyvista.PolyData(points, np.insert(patches, 0, 4, axis=1).ravel())
+    surface.cell_data["quality"] = given[f"values{i}"]
+    direction, up = sight(points)
+    lift = LIFT * np.linalg.norm(np.ptp(points, axis=0)) * direction / np.linalg.norm(direction)
+    edges = pyvista.PolyData(points + lift, lines=np.insert(lines, 0, lines.shape[1], axis=1).ravel())
+    plotter: Any = pyvista.Plotter(off_screen=True, window_size=[SIZE, SIZE])
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.add_mesh(
+        surface,
+        scalars="quality",
+        cmap=colours(),
+        clim=(0, 1),
+        show_scalar_bar=False,
+        ambient=0.45,
+        diffuse=0.6,
+    )
+    plotter.add_mesh(edges, color="black", line_width=1.5)
+    plotter.camera_position = [tuple(points.mean(axis=0) + direction), tuple(points.mean(axis=0)), tuple(up)]
+    plotter.camera.parallel_projection = True
+    plotter.reset_camera()
+    return trimmed(plotter.screenshot(return_img=True))
+
+
+def colours() -> Any:
+    """The map of COLOURS."""
+    import matplotlib as mpl
+
+    return mpl.colors.LinearSegmentedColormap.from_list("quality", COLOURS)
+
+
+def sight(points: Any) -> tuple[Any, Any]:
+    """From where a part is seen, and what is up: its longest direction to the right."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    order = np.argsort(high - low)
+    normal, up, right = np.eye(3)[order]
+    if np.linalg.det([right, up, normal]) < 0:
+        normal = -normal
+    return 1.0 * normal + 0.55 * up * -1 + 0.35 * right, up
+
+
+def trimmed(pixels: Any) -> Any:
+    """Pixels without the empty margin."""
+    used = (pixels < 250).any(axis=2)
+    rows, columns = np.flatnonzero(used.any(axis=1)), np.flatnonzero(used.any(axis=0))
+    margin = 15
+    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
+    return pixels[top : rows[-1] + margin, left : columns[-1] + margin]
+
+
+if __name__ == "__main__":
+    render(*sys.argv[1:])

@@ -1,0 +1,137 @@
+"""What a check shows: what would be modelled, how it moves, what it would cost."""
+
+import numpy as np
+from rich.table import Table
+
+from kedfem.accuracy.plan import Plan
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import Reduction
+from kedfem.accuracy.resolution import Resolution, resolution
+from kedfem.analysis import frame_steps
+from kedfem.dynamics.actions import actions
+from kedfem.dynamics.cost import Cost, estimated_cost
+from kedfem.motion.initial import initial_twists
+from kedfem.motion.path import Path
+from kedfem.report.links import link_table, way_tables
+from kedfem.report.plan import plan_tables, reduction_table
+from kedfem.report.words import NOTHING, with_prefix
+from kedfem.scene import LineSpring, Motor, Spring, time_grid
+
+
+def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
+    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
+    first = [] if plan is None else plan_tables(plan)
+    second = [] if reduction is None else [reduction_table(reduction)]
+    cost = _cost(ready, estimated_cost(ready.scene, ready.model))
+    found = resolution(ready)
+    third = [] if found is None else [resolution_table(found)]
+    return [
+        *first,
+        link_table(ready.model),
+        *way_tables(ready.model),
+        *second,
+        _motion(ready),
+        *_actions(ready),
+        *third,
+        cost,
+    ]
+
+
+def resolution_table(found: Resolution) -> Table:
+    """First frequency of the linkage against step and drive."""
+    table = Table(title="First frequency (drive held, of what the loads excite)", show_header=False)
+    low, high = found.first.min(), found.first.max()
+    table.add_row(
+        "over the last turn", f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"
+    )
+    table.add_row("steps in a period", f"{found.steps_per_period:.3g} at least")
+    for each in found.meetings:
+        angle = np.degrees(each.angle) % 360
+        table.add_row(f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {angle:.0f}°")
+    return table
+
+
+def _motion(ready: Prepared) -> Table:
+    along: Path = ready.path
+    table = Table(title="Rigid motion", show_header=False)
+    weakness, angle = along.weakest
+    low, high = np.degrees(along.phi[[0, -1]])
+    over = "repeats every turn" if along.periodic else f"{low:.4g}° to {high:.4g}°"
+    driven = ready.scene.driven is not None
+    table.add_row(
+        "drive", f"joint {ready.scene.driven}, {over}" if driven else "none: the mechanism moves by itself"
+    )
+    if ready.linkage.mobility or not driven:
+        table.add_row("free motions", str(ready.linkage.mobility))
+    if driven:
+        table.add_row(
+            "closest to a dead point",
+            f"at {np.degrees(angle):.4g}° (smallest singular value {weakness:.2g} of the largest)",
+        )
+    if ready.linkage.redundant:
+        table.add_row("redundant joint equations", "at joints " + ", ".join(ready.linkage.redundant))
+    for where, speed in _initial_speeds(ready):
+        table.add_row(where, speed)
+    if not driven:
+        return table
+    for k, name in enumerate(ready.linkage.bodies[1:], start=1):
+        turned = np.degrees(
+            np.arccos(np.clip((np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2, -1, 1))
+        ).max()
+        table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the drawn position")
+    return table
+
+
+def _actions(ready: Prepared) -> list[Table]:
+    """Motors and springs: where they act and by which law."""
+    actions(ready.scene, ready.model)  # refused where they do not fit
+    table = Table(title="Motors and springs", show_header=False)
+    for name, motor in ready.scene.motors.items():
+        table.add_row(name, f"motor on joint {motor.joint}", _motor_law(motor))
+    for name, spring in ready.scene.springs.items():
+        table.add_row(name, *_spring_law(spring))
+    return [table] if table.row_count else []
+
+
+def _motor_law(motor: Motor) -> str:
+    """A motor's curve in words."""
+    unit, value = "N m" if motor.torque else "N", motor.curve.value
+    low, high = (with_prefix(x, unit) for x in (min(value), max(value)))
+    return low if len(value) == 1 else f"{low} to {high} over {motor.curve.over}"
+
+
+def _spring_law(spring: Spring) -> tuple[str, str]:
+    """Where a spring is, and its constants."""
+    if isinstance(spring, LineSpring):
+        on, units = f"spring between {' and '.join(end.link for end in spring.between)}", ("N/m", "N s/m")
+    else:
+        on, units = f"spring about joint {spring.joint}", ("N m/rad", "N m s/rad")
+    constants = zip((spring.stiffness, spring.damping), units, strict=True)
+    return on, ", ".join(with_prefix(value, unit) for value, unit in constants if value)
+
+
+def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
+    """How fast each link starts, in words, where the scene asks for speeds."""
+    analysis = ready.scene.analysis
+    if not (analysis.initial_speeds or analysis.initial_motions):
+        return []
+    v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
+    speeds = [
+        f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s"
+        for s, w in zip(v, omega, strict=True)
+    ]
+    return [(f"link {x} starts with", y) for x, y in zip(ready.linkage.bodies[1:], speeds[1:], strict=True)]
+
+
+def _cost(ready: Prepared, cost: Cost) -> Table:
+    grid = time_grid(ready.scene)
+    table = Table(title="Cost (estimated)", show_header=False)
+    table.add_row("steps", f"{grid.steps} of {grid.step:.4g} s")
+    table.add_row("solver", ready.scene.analysis.solver)
+    table.add_row("time (condensed)", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s")
+    table.add_row("memory", with_prefix(cost.memory, "B"))
+    table.add_row(
+        "animation frames",
+        f"{len(frame_steps(ready.scene))}, about {with_prefix(cost.frame_bytes, 'B')} each",
+    )
+    return table

@@ -1,0 +1,43 @@
+"""What was chosen for an accuracy, and what it is expected to cost."""
+
+from rich.table import Table
+from rich.text import Text
+
+from kedfem.accuracy.plan import Plan
+from kedfem.accuracy.reduction import Reduction
+from kedfem.scene import LinkScene, time_grid
+
+
+def plan_tables(plan: Plan) -> list[Table]:
+    """Where the error of a run with `analysis.accuracy` comes from, what was chosen, and what was not."""
+    budget = Table(title=f"Accuracy asked for: {100 * plan.asked:.3g} %")
+    for column in ("part of the error", "expected", "allowed"):
+        budget.add_column(column, justify="left" if column.startswith("part") else "right")
+    for share in plan.shares:
+        budget.add_row(share.what, f"{100 * share.error:.2g} %", f"{100 * share.allowed:.2g} %")
+    budget.add_row("together", f"{100 * plan.error:.2g} %", f"{100 * plan.asked:.2g} %")
+    chosen = Table(title="Chosen", show_header=False)
+    chosen.add_row("step", f"{time_grid(plan.scene).step:.4g} s, {time_grid(plan.scene).steps} steps")
+    for name, link in plan.scene.links.items():
+        chosen.add_row(name, _chosen(link))
+    for note in plan.notes:
+        chosen.add_row("note", Text(note))
+    return [budget, chosen]
+
+
+def _chosen(link: LinkScene) -> str:
+    """Fidelity and mesh in words."""
+    mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
+    segments = "" if link.segments is None else f", {link.segments} segments"
+    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "") + segments
+
+
+def reduction_table(reduction: Reduction) -> Table:
+    """Estimated error of reduced links, channel by channel."""
+    table = Table(title="Error of the reduction (estimated)")
+    table.add_column("channel", overflow="fold")
+    table.add_column("of its peak", justify="right")
+    for name, error in reduction.estimate.items():
+        table.add_row(name, f"{100 * error:.2g} %")
+    table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links in full"
+    return table

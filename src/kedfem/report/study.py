@@ -1,0 +1,60 @@
+"""Variants of a scene by speed and error."""
+
+from rich.table import Table
+from rich.text import Text
+
+from kedfem.accuracy.study import Measured, Study
+from kedfem.report.words import percent
+
+STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
+
+
+def study_tables(study: Study, machine: str) -> list[Table]:
+    """Variants by time with their errors, and what the reference's own error is made of."""
+    table = Table(title=Text(f"Speed against error: {study.title}"))
+    for column in STUDY_COLUMNS:
+        left = column == "fidelity"
+        table.add_column(
+            column,
+            justify="left" if left else "right",
+            overflow="fold",
+            no_wrap=not left,
+            min_width=11 if left else None,
+        )
+    ran = [row for row in study.rows if row.seconds]
+    for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
+        table.add_row(*_study_row(row, study), style="bold" if row.front else None)
+    shares = ", ".join(f"{name} {percent(share)}" for name, share in study.shares.items())
+    unknown = "" if "mesh" in study.shares else "; its mesh could not be compared with a coarser one"
+    table.caption = Text(
+        f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
+        f"{study.reference.variant.name}, whose own is about {percent(study.floor)} ({shares or 'not known'}{unknown}): "
+        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: "
+        f"seconds, medians; worst channels: see the CSV. {machine}"
+    )
+    return [table, _not_run(study)] if len(ran) < len(study.rows) else [table]
+
+
+def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
+    if row.seconds is None:
+        raise ValueError(f"{row.variant.name} was not run")
+    v, s = row.variant, row.seconds
+    model = (
+        v.fidelity.name,
+        f"{v.fineness:g}",
+        f"{v.steps}",
+        f"{v.tolerance:.0e}".replace("e-0", "e-") if v.tolerance else "-",
+    )
+    times = (f"{s.preparation:.2g}", f"{s.stepping:.2g}", f"{s.whole:.2g}")
+    below = row.error <= study.floor
+    found = f"≤ {percent(study.floor)}" if below else percent(row.error)
+    return (*model, str(row.unknowns), *times, "reference" if v == study.reference.variant else found)
+
+
+def _not_run(study: Study) -> Table:
+    """Variants that were not run, by reason."""
+    table = Table(title="Not run", show_header=False)
+    for row in study.rows:
+        if row.seconds is None:
+            table.add_row(row.variant.name, Text(row.note))
+    return table
