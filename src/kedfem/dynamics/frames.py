@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Frame, Link
+from kedfem.motion.newton import rotation as exponential
 
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
@@ -56,7 +57,7 @@ def rotation(
     # once more by Newton: a slender segment tells its twist by small numbers
     U = Q.T @ A
     axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
-    return Q @ turned(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
+    return Q @ exponential(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
 
 
 def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
@@ -64,14 +65,6 @@ def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
     Q = np.eye(d)
     Q[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return Q
-
-
-def turned(w: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """The rotation by a vector w, Rodrigues."""
-    W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-    size = float(np.linalg.norm(w))
-    a, b = (1.0, 0.5) if size < 1e-8 else (np.sin(size) / size, (1 - np.cos(size)) / size**2)
-    return np.asarray(np.eye(3) + a * W + b * W @ W)
 
 
 def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.frames import Followed, frames_of
 from kedfem.dynamics.segment import SegmentState
 from kedfem.links.record import Link
+from kedfem.motion.newton import cross_matrix, rotation
 
 Rows = Float[np.ndarray, "N d"]
 Each = Float[np.ndarray, "s d d"]
@@ -237,7 +238,7 @@ def rotations(
     left, _, right = np.linalg.svd(A)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     Q = left @ right
-    return Q @ _turned(_axial_solved(Q.transpose(0, 2, 1) @ A, None)), np.zeros(len(Q))
+    return Q @ rotation(_axial_solved(Q.transpose(0, 2, 1) @ A, None)), np.zeros(len(Q))
 
 
 def deformations(stack: Stack, y: Rows, Q: Each, angle: Float[np.ndarray, " s"]) -> Rows:
@@ -264,7 +265,7 @@ def frame_forces(stack: Stack, fit: Float[np.ndarray, "N 3"], now: StackFrame, f
         f[:, 1] -= torque * fit[:, 0]
     else:
         x = _axial_solved(U, -stack.moments(now.g, f))
-        f = f - np.concatenate([c @ w for c, w in zip(stack.parts(fit), _crossed(x), strict=True)])
+        f = f - np.concatenate([c @ w for c, w in zip(stack.parts(fit), -cross_matrix(x), strict=True)])
     return stack.turned(f, now.Q.transpose(0, 2, 1))
 
 
@@ -276,20 +277,3 @@ def _axial_solved(U: Each, N: Each | None) -> Float[np.ndarray, "s 3"]:
     )
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - (U + U.transpose(0, 2, 1)) / 2
     return np.asarray(np.linalg.solve(G, axial[:, :, None])[:, :, 0])
-
-
-def _crossed(w: Float[np.ndarray, "s 3"]) -> Each:
-    """Matrices with c @ matrix = w × c."""
-    W = np.zeros((len(w), 3, 3))
-    W[:, 0, 1], W[:, 0, 2], W[:, 1, 2] = w[:, 2], -w[:, 1], w[:, 0]
-    return W - W.transpose(0, 2, 1)
-
-
-def _turned(w: Float[np.ndarray, "s 3"]) -> Each:
-    """The rotations by vectors w, Rodrigues."""
-    W = _crossed(w).transpose(0, 2, 1)
-    size = np.linalg.norm(w, axis=1)[:, None, None]
-    small = size < 1e-8
-    size = np.where(small, 1.0, size)
-    a, b = np.where(small, 1.0, np.sin(size) / size), np.where(small, 0.5, (1 - np.cos(size)) / size**2)
-    return np.asarray(np.eye(3) + a * W + b * (W @ W))
