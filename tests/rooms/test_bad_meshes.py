@@ -157,7 +157,7 @@ def test_quality_below_the_gate_names_the_element():
     points[8:] += [0, 20, 0]  # the second element is sheared to an angle of atan(0.1)
     mesh = HexMesh(points, np.stack([np.arange(8), [1, 8, 9, 2, 5, 10, 11, 6]]))
     with pytest.raises(MeshError) as caught:
-        checked_mesh("rocker", mesh, 0.1)
+        checked_mesh("links.rocker", mesh, 0.1)
     assert str(caught.value) == (
         "links.rocker: scaled Jacobian must be at least 0.1 everywhere, "
         "got 0.0995 in element 1 at (2, 10, 0); refine the mesh (mesh.size, mesh.elements_across), "
@@ -241,7 +241,9 @@ class TestPart:
 class TestShape:
     def test_none(self):
         message = refused(None, fidelity="rigid")
-        assert message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
+        assert (
+            message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
+        )
 
     def test_for_beams_only(self):
         line = {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}

@@ -437,7 +437,7 @@ class TestQuality:
 
     def test_lets_good_meshes_pass(self):
         mesh = plate(*PLATES[0])
-        assert checked_mesh("arm", mesh, 0.3) is mesh
+        assert checked_mesh("links.arm", mesh, 0.3) is mesh
 
 
 class TestRelaxation:

@@ -12,6 +12,7 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
+from kedfem.mesh.groups import named_faces
 from kedfem.mesh.hexahedra import CELL_TYPES, HexMesh, without_spare_nodes
 
 _ACCEPTED = tuple(CELL_TYPES.values())
@@ -25,7 +26,8 @@ def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
     where : str
         What the file is for, for messages.
     path : Path
-        Any format that meshio reads. Points, lines and faces in it are passed over.
+        Any format that meshio reads. Points and lines in it are passed over; groups of quadrilaterals on the
+        outside (physical groups of gmsh, sets of cells) become the mesh's `faces`.
     scale : float [m]
         Length of the file's unit.
 
@@ -45,13 +47,14 @@ def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
             f"{where}: elements must use nodes 0 to {len(points) - 1}, got node "
             f"{cells.min() if cells.min() < 0 else cells.max()} in {path}"
         )
-    mesh = without_spare_nodes(HexMesh(scale * points, cells))
-    if not np.isfinite(mesh.points).all():
-        used = np.unique(cells)
-        bad = used[~np.isfinite(mesh.points).all(axis=1)][0]
+    used = np.unique(cells)
+    if not np.isfinite(points[used]).all():
+        bad = used[~np.isfinite(points[used]).all(axis=1)][0]
         raise MeshError(
             f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
         )
+    faces = named_faces(raw, scale * points, cells)
+    mesh = without_spare_nodes(HexMesh(scale * points, cells, faces))
     pieces = _pieces(mesh)
     if pieces > 1:
         raise MeshError(

@@ -8,29 +8,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
+from kedfem.mesh.choice import SETTINGS, Setting, best_quads
 from kedfem.mesh.outline import Outline, edge_circles, outline_area, scaled_outline
-from kedfem.mesh.plane import PlaneQuads, Quads, directed_sides, pillowed
-from kedfem.mesh.quality import scaled_jacobian
-from kedfem.mesh.relaxation import relaxed
+from kedfem.mesh.plane import PlaneQuads, Quads, directed_sides
 from kedfem.mesh.session import gmsh_model
 
 _QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
-_GOOD = 0.5  # scaled Jacobian that is good enough: of such meshes the one with the fewest elements is taken
-_FAIR = 0.3  # scaled Jacobian below which subdivision, at four times the elements, is tried too
 _LARGE = 1000  # quadrilaterals from which time matters: the first good mesh is taken, and relaxed less
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """One way to let gmsh make quadrilaterals: its 2-D algorithm, recombination and subdivision."""
-
-    algorithm: int
-    recombination: int
-    subdivision: int
-
-
-#: All tried; the last, which leaves no triangles, if no other is fair. Not algorithm 11: it can hang.
-SETTINGS = (*(Setting(plane, blossom, 0) for blossom in (3, 1) for plane in (6, 5, 8)), Setting(6, 1, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,36 +50,17 @@ def quad_mesh(where: str, outline: Outline, size: float) -> Quads:
         gmsh cannot be used, or no setting gives quadrilaterals alone; with what gmsh said.
     """
     said: list[str] = []
-    found: list[tuple[float, Quads]] = []
     large = outline_area(outline) / size**2 > _LARGE
     extent = float(np.ptp(outline.corners, axis=0).max())  # tolerances are absolute: all see a unit size
     meshes = _gmsh_meshes(scaled_outline(outline, 1 / extent), size / extent, said)
-    for tried, mesh in enumerate(meshes, start=1):
-        if mesh is not None:
-            found += _relaxed_meshes(mesh, 40 if large else 150)
-        best = max((quality for quality, _ in found), default=-1.0)
-        if (large and best >= _GOOD) or (tried == len(SETTINGS) - 1 and best >= _FAIR):
-            break
-    if not found:
+    best = best_quads(meshes, first_good=large, iterations=40 if large else 150)
+    if best is None:
         raise MeshError(
             f"{where}: must be an area that quadrilaterals can fill, got no such mesh from gmsh "
             f"({'; '.join(dict.fromkeys(said)) or 'triangles were left'}); change mesh.size or the outline"
         )
-    enough = min(_GOOD, best - 0.1 * abs(best))
-    good = [mesh for quality, mesh in found if quality >= enough]
-    points, cells = min(good, key=lambda mesh: len(mesh[1]))
+    points, cells = best.quads
     return points * extent, cells
-
-
-def _relaxed_meshes(mesh: PlaneQuads, iterations: int) -> list[tuple[float, Quads]]:
-    """The mesh relaxed and, unless that is good, pillowed and relaxed: worst scaled Jacobians, meshes."""
-    found: list[tuple[float, Quads]] = []
-    for candidate in (mesh, pillowed(mesh)):
-        points, cells = relaxed(candidate, iterations)
-        found.append((float(scaled_jacobian(points, cells).min()), (points, cells)))
-        if found[-1][0] >= _GOOD:
-            break
-    return found
 
 
 def _gmsh_meshes(outline: Outline, size: float, said: list[str]) -> Iterator[PlaneQuads | None]:

@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
+from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, HexMesh, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, Face, HexMesh, shape_gradients
 
 Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
@@ -22,20 +23,37 @@ class Quality:
     ----------
     scaled_jacobian : (e,) [-]
         Least of each element.
-    worst : int
-        The element with the least of all.
-    centre : (3,) [m]
-        Mean of the worst element's nodes.
+    centres : (e, 3) [m]
+        Mean of each element's nodes.
     """
 
     scaled_jacobian: Float[np.ndarray, " e"]
-    worst: int
-    centre: Float[np.ndarray, "3"]
+    centres: Float[np.ndarray, "e 3"]
+
+    @property
+    def worst(self) -> int:
+        """The element with the least of all."""
+        return int(np.argmin(self.scaled_jacobian))
+
+    @property
+    def centre(self) -> Float[np.ndarray, "3"]:
+        """Mean of the worst element's nodes [m]."""
+        return np.asarray(self.centres[self.worst])
 
     @property
     def least(self) -> float:
         """The scaled Jacobian of the worst element."""
         return float(self.scaled_jacobian[self.worst])
+
+    def worst_elements(self, count: int) -> Int[np.ndarray, " c"]:
+        """The worst elements, the worst first; their places are `centres` of them."""
+        return np.argsort(self.scaled_jacobian, kind="stable")[:count]
+
+    def histogram(self, bins: int = 10) -> tuple[Float[np.ndarray, " b"], Int[np.ndarray, " c"]]:
+        """Ends of equal bins from 0 to 1, and how many elements are in each; first one more bin, of those below 0."""
+        edges = np.concatenate([[-1.0], np.linspace(0, 1, bins + 1)])
+        inside = np.clip(self.scaled_jacobian, -1.0, 1.0)  # rounding may pass 1
+        return edges, np.histogram(inside, edges)[0].astype(np.int64)
 
 
 def scaled_jacobian(
@@ -74,14 +92,22 @@ def _scaled_determinants(
 
 
 def mesh_quality(mesh: HexMesh | QuadMesh) -> Quality:
-    """The scaled Jacobians of a mesh and its worst element."""
-    values = scaled_jacobian(mesh.points[:, : 2 if isinstance(mesh, QuadMesh) else 3], mesh.cells)
-    worst = int(np.argmin(values))
-    return Quality(values, worst, mesh.points[mesh.cells[worst]].mean(axis=0))
+    """The scaled Jacobians of a mesh and where its elements are."""
+    values = scaled_jacobian(mesh.points[:, : _dimension(mesh)], mesh.cells)
+    return Quality(values, mesh.points[mesh.cells].mean(axis=1))
 
 
-def checked_mesh(name: str, mesh: Mesh, min_quality: float) -> Mesh:
-    """The mesh itself, if it is good enough.
+def _dimension(mesh: HexMesh | QuadMesh) -> int:
+    """2 for a mesh in a plane, 3 for one in space."""
+    return 2 if isinstance(mesh, QuadMesh) else 3
+
+
+def checked_mesh(where: str, mesh: Mesh, min_quality: float) -> Mesh:
+    """The mesh itself, if it is good enough: scaled Jacobian at the nodes and Gauss points, det J > 0 everywhere.
+
+    Parameters
+    ----------
+    where : the mesh's link, for messages: ``links.rod``
 
     Raises
     ------
@@ -89,19 +115,59 @@ def checked_mesh(name: str, mesh: Mesh, min_quality: float) -> Mesh:
         The worst element, where it is, and what to change.
     """
     quality = mesh_quality(mesh)
-    x, y, z = quality.centre
-    where = f"in element {quality.worst} at ({x:.6g}, {y:.6g}, {z:.6g})"
     if quality.least <= 0:
         mirrored = bool((quality.scaled_jacobian < 0).all())
         cure = "the order of their nodes is mirrored" if mirrored else "refine the mesh or mend the mesh file"
         raise MeshError(
-            f"links.{name}: elements must not be inverted or folded, "
-            f"got scaled Jacobian {quality.least:.3g} {where}; {cure}"
+            f"{where}: elements must not be inverted or folded, "
+            f"got scaled Jacobian {quality.least:.3g} {_place(mesh, quality, quality.worst, 0.0)}; {cure}"
         )
     if quality.least < min_quality:
         raise MeshError(
-            f"links.{name}: scaled Jacobian must be at least {min_quality:g} everywhere, "
-            f"got {quality.least:.3g} {where}; refine the mesh (mesh.size, mesh.elements_across), "
-            "change the shape there, or lower min_quality"
+            f"{where}: scaled Jacobian must be at least {min_quality:g} everywhere, "
+            f"got {quality.least:.3g} {_place(mesh, quality, quality.worst, min_quality)}; "
+            f"refine the mesh (mesh.size, mesh.elements_across), {_change(mesh)}, or lower min_quality"
+        )
+    folded = np.flatnonzero(~valid_everywhere(mesh.points[:, : _dimension(mesh)], mesh.cells))
+    if len(folded):
+        worst = int(folded[np.argmin(quality.scaled_jacobian[folded])])
+        raise MeshError(
+            f"{where}: elements must not be inverted or folded anywhere, got det J that is not positive between "
+            f"the nodes {_place(mesh, quality, worst, 0.0)}; refine the mesh (mesh.size, mesh.elements_across) "
+            "or mend the mesh file"
         )
     return mesh
+
+
+def _place(mesh: HexMesh | QuadMesh, quality: Quality, element: int, limit: float) -> str:
+    """Where an element is, near which face, and how many others are below the limit."""
+    x, y, z = quality.centres[element]
+    words = f"in element {element} at ({x:.6g}, {y:.6g}, {z:.6g})"
+    if isinstance(mesh, HexMesh) and mesh.faces:
+        words += f" near {_described(_nearest_face(mesh, quality.centres[element]))}"
+    others = [other for other in quality.worst_elements(4) if other != element][:3]
+    others = [other for other in others if quality.scaled_jacobian[other] < limit]
+    count = int((quality.scaled_jacobian < limit).sum()) - 1
+    if not others:
+        return words
+    places = ", ".join("({:.6g}, {:.6g}, {:.6g})".format(*quality.centres[other]) for other in others)
+    return f"{words} and {count} more, as at {places}"
+
+
+def _nearest_face(mesh: HexMesh, place: Float[np.ndarray, "3"]) -> Face:
+    """The named face with a node nearest to a place."""
+    squares = [((mesh.points[face.sides] - place) ** 2).sum(axis=2) for face in mesh.faces]
+    return mesh.faces[int(np.argmin([square.min(initial=np.inf) for square in squares]))]
+
+
+def _described(face: Face) -> str:
+    """A face in words."""
+    if not np.isfinite(face.radius):
+        return f"{face.name}, a plane" if face.kind == "plane" else face.name
+    return f"{face.name}, a {face.kind} of radius {1e3 * face.radius:.3g} mm"
+
+
+def _change(mesh: HexMesh | QuadMesh) -> str:
+    """What to do about the shape where elements are bad."""
+    named = isinstance(mesh, HexMesh) and mesh.faces
+    return "suppress a fillet or small feature there" if named else "change the shape there"

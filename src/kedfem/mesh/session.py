@@ -1,8 +1,10 @@
 """gmsh, opened and closed in one place."""
 
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 
 from kedfem.errors import MeshError
@@ -50,6 +52,35 @@ def gmsh_model() -> Iterator[ModuleType]:
             gmsh.model.remove()
             if opened_here:
                 gmsh.finalize()
+
+
+@contextmanager
+def gmsh_copy(gmsh: ModuleType, factor: float) -> Iterator[ModuleType]:
+    """gmsh with a copy of the current model's shapes in a model of its own, all lengths multiplied.
+
+    Planes stay planes and circles circles; OpenCASCADE's tolerances are absolute, so shapes should be of size 1.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "shapes.brep")
+        gmsh.write(file)
+        with gmsh_model() as other:
+            with gmsh_options(other, {"Geometry.OCCScaling": factor}):
+                other.model.occ.importShapes(file)
+            other.model.occ.synchronize()
+            yield other
+
+
+@contextmanager
+def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
+    """Options of gmsh set for a while: they belong to all models of a session."""
+    before = {name: gmsh.option.getNumber(name) for name in options}
+    try:
+        for name, value in options.items():
+            gmsh.option.setNumber(name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            gmsh.option.setNumber(name, value)
 
 
 def _gmsh() -> ModuleType:

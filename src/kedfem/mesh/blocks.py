@@ -1,0 +1,153 @@
+"""Solids with six four-sided faces, such as a tapered or a bent bar: one block, mapped onto its geometry by gmsh."""
+
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.hexahedra import HEX27, HexMesh, without_spare_nodes
+from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.session import gmsh_copy, gmsh_options
+
+_HEX27 = 12  # gmsh's number of the 27-node hexahedron
+_MOST = 2000  # cubes of the size in the volume: a finer default is not taken
+_LEAST = 0.1  # scaled Jacobian below which another way may do better
+_TURN = np.radians(20)  # of a curved edge per element: parabolas lose 5e-5 of a circle's area
+#: As gmsh has them by itself; who meshed before may have left others.
+_OPTIONS: dict[str, float] = {
+    "Mesh.ElementOrder": 1.0,
+    "Mesh.SecondOrderIncomplete": 0.0,
+    "Mesh.SecondOrderLinear": 0.0,
+    "Mesh.SubdivisionAlgorithm": 0.0,
+}
+
+
+def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
+    """Hexahedra of a solid that is a block: six faces with four edges each, of any form.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid in its current model, which is left as it is.
+    solid : Solid
+        The only solid in that model.
+    sizing : Sizing
+        How fine: its size, or so many elements across the mean length of the shortest of the three sets of
+        opposite edges, but not more than some thousands.
+
+    Returns
+    -------
+    HexMesh
+        27-node elements, the nodes of the surface on the solid's own faces.
+
+    Raises
+    ------
+    OtherWayError
+        The solid is no block, or gives elements of poor quality.
+    """
+    with gmsh_copy(gmsh, 1 / solid.extent) as copy:
+        groups = _edge_groups(copy, solid)
+        counts = _counts(copy, solid, groups, sizing)
+        try:
+            mesh = _transfinite(copy, groups, counts)
+        except Exception as error:  # gmsh raises nothing more special
+            raise OtherWayError(f"{solid.name}: one block must be mapped, got from gmsh: {error}") from error
+    mesh = HexMesh(
+        solid.extent * mesh.points,
+        mesh.cells,
+        way="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
+    )
+    quality = mesh_quality(mesh)
+    if quality.least < _LEAST:
+        raise OtherWayError(
+            f"{solid.name}: one block must give a scaled Jacobian of at least {_LEAST:g}, "
+            f"got {quality.least:.3g} at " + "({:.6g}, {:.6g}, {:.6g})".format(*quality.centre)
+        )
+    return mesh
+
+
+def _edge_groups(gmsh: ModuleType, solid: Solid) -> list[set[int]]:
+    """The three sets of four edges that are opposite to each other in the faces."""
+    faces = [_boundary(gmsh, 2, tag) for _, tag in gmsh.model.getEntities(2)]
+    edges = {edge for face in faces for edge in face}
+    ends = {edge: set(_boundary(gmsh, 1, edge)) for edge in edges}
+    groups = [{edge} for edge in sorted(edges)]
+    for face in faces:
+        for edge in face:
+            opposite = [other for other in face if not ends[other] & ends[edge]]
+            ours = [group for group in groups if group & {edge, *opposite}]
+            groups = [group for group in groups if group not in ours] + [set().union(*ours)]
+    vertices = set().union(*ends.values()) if ends else set()
+    if (len(faces), len(vertices), [len(group) for group in groups]) != (6, 8, [4, 4, 4]):
+        raise OtherWayError(
+            f"{solid.name}: one block must have six faces with four edges each, got {len(faces)} faces"
+        )
+    return groups
+
+
+def _boundary(gmsh: ModuleType, dim: int, tag: int) -> list[int]:
+    """Tags of what bounds an entity."""
+    return [int(bound) for _, bound in gmsh.model.getBoundary([(dim, tag)], oriented=False)]
+
+
+def _counts(gmsh: ModuleType, solid: Solid, groups: list[set[int]], sizing: Sizing) -> list[int]:
+    """Elements along each set of edges."""
+    lengths = [[float(gmsh.model.occ.getMass(1, edge)) for edge in group] for group in groups]
+    turns = [max(_turn(gmsh, edge) for edge in group) for group in groups]
+    if sizing.size is not None:
+        size = sizing.size / solid.extent
+    else:
+        least = (solid.volume / solid.extent**3 / _MOST) ** (1 / 3)
+        size = max(min(float(np.mean(group)) for group in lengths) / sizing.across, least)
+    turn = min(_TURN, sizing.turn)
+    return [
+        max(sizing.layers, int(np.rint(max(group) / size)), int(np.ceil(angle / turn - 1e-9)), 1)
+        for group, angle in zip(lengths, turns, strict=True)
+    ]
+
+
+def _turn(gmsh: ModuleType, edge: int) -> float:
+    """Angle by which an edge turns from end to end."""
+    low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, edge))
+    slopes = np.reshape(gmsh.model.getDerivative(1, edge, np.linspace(low, high, 33)), (-1, 3))
+    along = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+    return float(np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1)).sum())
+
+
+def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) -> HexMesh:
+    """gmsh's mapped mesh of second order, in VTK's order of nodes."""
+    model = gmsh.model.mesh
+    for group, count in zip(groups, counts, strict=True):
+        for edge in group:
+            model.setTransfiniteCurve(edge, count + 1)
+    for _, face in gmsh.model.getEntities(2):
+        model.setTransfiniteSurface(face)
+        model.setRecombine(2, face)
+    for _, volume in gmsh.model.getEntities(3):
+        model.setTransfiniteVolume(volume)
+    with gmsh_options(gmsh, _OPTIONS):
+        model.generate(3)
+        model.setOrder(2)
+    kinds, _, nodes = model.getElements(3)
+    if list(kinds) != [_HEX27]:
+        raise OtherWayError("other elements than hexahedra")
+    tags, coordinates, _ = model.getNodes()
+    order = np.argsort(tags)
+    cells = order[np.searchsorted(tags[order], nodes[0])].reshape(-1, len(HEX27))
+    return _right_handed(coordinates.reshape(-1, 3), cells[:, _from_gmsh(gmsh)])
+
+
+def _from_gmsh(gmsh: ModuleType) -> list[int]:
+    """Of each node in VTK's order its place in gmsh's."""
+    theirs = np.reshape(gmsh.model.mesh.getElementProperties(_HEX27)[4], (-1, 3)).round()
+    return [int(np.flatnonzero((theirs == node).all(axis=1))[0]) for node in HEX27]
+
+
+def _right_handed(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> HexMesh:
+    """The mesh, mirrored in its elements if gmsh has numbered them the other way round."""
+    mesh = without_spare_nodes(HexMesh(points, cells))
+    if (mesh_quality(mesh).scaled_jacobian < 0).all():
+        mirrored = [int(np.flatnonzero((node * [-1, 1, 1] == HEX27).all(axis=1))[0]) for node in HEX27]
+        mesh = HexMesh(mesh.points, mesh.cells[:, mirrored])
+    return mesh

@@ -1,0 +1,165 @@
+"""Bounds of det J over whole elements, between the nodes and Gauss points too.
+
+det J of a hex27 is a polynomial of degree 5 in each reference coordinate (hex8: 2; quad9: 3). Its Bernstein
+coefficients bound it from both sides, and halving the element brings them as near to it as need be: A. Johnen,
+J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013) 359-372.
+"""
+
+from functools import cache, reduce
+from math import comb
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, shape_gradients
+
+_CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache
+_DEPTH = (
+    6  # halvings after which an element is not proven valid: least det J within about 1e-3 of 0, or below
+)
+
+
+def determinant_bounds(
+    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"], depth: int = _DEPTH
+) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " e"]]:
+    """Lower and upper bound of the least det J in each element, over the mean of its absolute value.
+
+    Elements are halved, `depth` times at most, only where the bounds have different signs: where both are positive the
+    element is valid all over, where the upper is not, it is inverted or folded somewhere.
+
+    Parameters
+    ----------
+    points : (n, d) [m]
+        Nodes, in the plane (d = 2) or in space.
+    cells : (e, 9), (e, 8), (e, 20) or (e, 27)
+        quad9, hex8, hex20 or hex27 in VTK order.
+    depth : int
+        Most halvings.
+
+    Returns
+    -------
+    (e,) and (e,) [-]
+        1 and 1 for a parallelepiped.
+    """
+    chunks = np.array_split(cells, max(1, len(cells) // _CHUNK))
+    lower, upper = zip(*(_chunk_bounds(points[chunk], depth) for chunk in chunks), strict=True)
+    return np.concatenate(lower), np.concatenate(upper)
+
+
+def valid_everywhere(
+    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]
+) -> Bool[np.ndarray, " e"]:
+    """Which elements are proven to have det J > 0 all over: by a cheap test if it can tell, else by the bounds.
+
+    Shapes are those of :func:`determinant_bounds`.
+    """
+    sure = np.zeros(len(cells), dtype=bool)
+    if cells.shape[1] >= len(HEX20):  # for the others the bounds are as cheap
+        chunks = np.array_split(cells, max(1, len(cells) // _CHUNK))
+        sure = np.concatenate([_nearly_affine(points[chunk]) for chunk in chunks])
+    unsure = np.flatnonzero(~sure)
+    if len(unsure):
+        sure[unsure] = determinant_bounds(points, cells[unsure])[0] > 0
+    return sure
+
+
+def _nearly_affine(corners: Float[np.ndarray, "e k d"]) -> Bool[np.ndarray, " e"]:
+    """Elements whose J differs so little from its mean Jm that det J > 0: det Jm > 0 and |Jm⁻¹ J − 1| < 1 all over.
+
+    Each column of J is a polynomial too: it is within the hull of its Bernstein coefficients.
+    """
+    columns = [
+        np.tensordot(corners, matrix, axes=(1, 1)) for matrix in _column_coefficients(corners.shape[1])
+    ]
+    mean = np.stack([column.mean(axis=2) for column in columns], axis=2)
+    upright = np.linalg.det(mean) > 0
+    inverse = np.linalg.inv(np.where(upright[:, None, None], mean, np.eye(mean.shape[1])))
+    square = np.zeros(len(corners))
+    for j, column in enumerate(columns):
+        offset = inverse @ column
+        offset[:, j] -= 1
+        square += (offset**2).sum(axis=1).max(axis=1)
+    return np.asarray(upright & (square < 0.999))
+
+
+def _chunk_bounds(
+    corners: Float[np.ndarray, "e k d"], depth: int
+) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " e"]]:
+    """The bounds of :func:`determinant_bounds` for a few elements."""
+    e, k, d = corners.shape
+    gradients, transform, halves = _tables(k)
+    J = np.swapaxes(np.tensordot(corners, gradients, axes=(1, 1)), 1, 2)
+    determinants = _determinant(J)
+    scale = abs(determinants).mean(axis=1)
+    pieces = determinants @ transform.T / np.where(scale > 0, scale, 1.0)[:, None]
+    owner, lower, upper = np.arange(e), np.full(e, np.inf), np.full(e, np.inf)
+    for left in range(depth, -1, -1):
+        least, least_value = pieces.min(axis=1), pieces[:, _ends(k)].min(axis=1)
+        np.minimum.at(upper, owner, least_value)
+        open_ = (least <= 0) & (upper[owner] > 0) & (left > 0)
+        np.minimum.at(lower, owner[~open_], least[~open_])
+        owner, pieces = np.repeat(owner[open_], 2**d), (pieces[open_] @ halves).reshape(-1, pieces.shape[1])
+        if not len(owner):
+            break
+    return lower, upper
+
+
+def _determinant(J: Float[np.ndarray, "e q d d"]) -> Float[np.ndarray, "e q"]:
+    """det J, written out: faster than a factorisation of each."""
+    if J.shape[-1] == 2:
+        return np.asarray(J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0])
+    a, b, c = (J[..., 0], J[..., 1], J[..., 2])
+    return np.asarray(
+        a[..., 0] * (b[..., 1] * c[..., 2] - b[..., 2] * c[..., 1])
+        + a[..., 1] * (b[..., 2] * c[..., 0] - b[..., 0] * c[..., 2])
+        + a[..., 2] * (b[..., 0] * c[..., 1] - b[..., 1] * c[..., 0])
+    )
+
+
+def _degree(k: int) -> int:
+    """Degree of det J in each coordinate, of an element with k nodes."""
+    return {len(HEX8): 2, len(QUAD9): 3}.get(k, 5)
+
+
+def _nodes(k: int) -> Int[np.ndarray, "k d"]:
+    """Reference coordinates of the nodes of an element that has k."""
+    return {len(nodes): nodes for nodes in (QUAD9, HEX8, HEX20, HEX27)}[k]
+
+
+@cache
+def _tables(
+    k: int,
+) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
+    """Gradients at the places where det J is sampled; from its values its coefficients; from those the halves'."""
+    nodes, p = _nodes(k), _degree(k)
+    d, ends = nodes.shape[1], -np.cos(np.pi * np.arange(p + 1) / p)
+    places = np.stack(np.meshgrid(*[ends] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, ends))] * d)
+    left, right = (np.linalg.inv(_bernstein(p, ends)) @ _bernstein(p, (ends + s) / 2) for s in (-1, 1))
+    pieces = [reduce(np.kron, [left if (i >> j) & 1 else right for j in range(d)]) for i in range(2**d)]
+    return shape_gradients(nodes, places), transform, np.concatenate(pieces).T
+
+
+@cache
+def _ends(k: int) -> Int[np.ndarray, " v"]:
+    """The coefficients that are values: those at the corners."""
+    p, d = _degree(k), _nodes(k).shape[1]
+    grid = np.stack(np.meshgrid(*[np.arange(p + 1)] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    return np.flatnonzero(((grid == 0) | (grid == p)).all(axis=1))
+
+
+@cache
+def _column_coefficients(k: int) -> list[Float[np.ndarray, "c k"]]:
+    """From the nodes the Bernstein coefficients, of degree 2 in each coordinate, of each column of J."""
+    nodes, p = _nodes(k), 2
+    d, line = nodes.shape[1], np.linspace(-1, 1, p + 1)
+    places = np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)
+    return [transform @ gradient for gradient in np.moveaxis(shape_gradients(nodes, places), 2, 0)]
+
+
+def _bernstein(p: int, x: Float[np.ndarray, " q"]) -> Float[np.ndarray, "q b"]:
+    """The Bernstein polynomials of degree p on [-1, 1]."""
+    t = (x[:, None] + 1) / 2
+    i = np.arange(p + 1)
+    return np.asarray(np.array([comb(p, j) for j in i]) * t**i * (1 - t) ** (p - i))

@@ -1,0 +1,1 @@
+"""Parts from CAD: files, the one solid in them, what its faces are."""

@@ -1,0 +1,190 @@
+"""Which face of a solid each side of an element lies on."""
+
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from kedfem.mesh.cad.sides import boundary_sides, side_normals
+from kedfem.mesh.cad.solids import CadFace, Solid
+from kedfem.mesh.hexahedra import Face, HexMesh
+
+_FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
+_ALIKE = 1e-5  # of the radius: cylinders and spheres that are one
+_NEARLY = (
+    0.1  # of a side's size: faces this much farther away than the nearest may be the one, if it ends before
+)
+
+
+def with_faces(gmsh: ModuleType, solid: Solid, mesh: HexMesh) -> HexMesh:
+    """The mesh with the faces of its solid: each side on the outside belongs to exactly one.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid in its model.
+    solid : Solid
+        Its faces, in metres.
+    mesh : HexMesh
+        In the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size.
+
+    Returns
+    -------
+    HexMesh
+        With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on,
+        since it is narrower than an element, is left out.
+    """
+    sides = boundary_sides(mesh.cells)
+    of_face = _nearest_faces(gmsh, solid, mesh.points, sides)
+    groups = _one_surface(gmsh, solid)
+    found = [_face(solid, group, sides[np.isin(of_face, group), :4]) for group in groups]
+    return replace(mesh, faces=tuple(face for face in found if len(face.sides)))
+
+
+def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f 4"]) -> Face:
+    """The face that some of a solid's faces, of one surface, are together."""
+    parts = [solid.faces[i] for i in group]
+    first = parts[0]
+    centre = first.centre
+    if first.kind == "cylinder":
+        along = [(face.centre - centre) @ first.direction for face in parts]
+        ends = [(a - face.length / 2, a + face.length / 2) for a, face in zip(along, parts, strict=True)]
+        middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
+        centre = centre + middle * first.direction
+    return Face(first.name, first.kind, centre, first.direction, first.radius, first.inward, sides)
+
+
+def _one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
+    """Faces in groups: those of one cylinder or sphere that share an edge, without names or with the same one."""
+    edges = [
+        {tag for _, tag in gmsh.model.getBoundary([(2, face.tag)], combined=False, oriented=False)}
+        for face in solid.faces
+    ]
+    groups: list[list[int]] = []
+    for i, face in enumerate(solid.faces):
+        joined = [
+            group
+            for group in groups
+            if any(edges[i] & edges[j] and _same_surface(face, solid.faces[j]) for j in group)
+        ]
+        groups = [group for group in groups if group not in joined]
+        groups.append(sorted([i, *(j for group in joined for j in group)]))
+    return sorted(groups)
+
+
+def _same_surface(a: CadFace, b: CadFace) -> bool:
+    """Whether two faces are parts of one cylinder or sphere."""
+    unnamed = all(face.name == f"face {face.tag}" for face in (a, b))
+    if not (unnamed or a.name == b.name) or a.kind != b.kind or a.kind not in ("cylinder", "sphere"):
+        return False
+    slack = _ALIKE * a.radius
+    if a.inward != b.inward or abs(a.radius - b.radius) > slack:
+        return False
+    apart = b.centre - a.centre
+    if a.kind == "cylinder":
+        if np.linalg.norm(np.cross(a.direction, b.direction)) > _ALIKE * 10:
+            return False
+        apart = np.cross(apart, a.direction)
+    return bool(np.linalg.norm(apart) <= 10 * slack)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sides:
+    """Sides of elements: nodes (f, m, 3) [m], middles (f, 3), outward normals (f, 3), sizes (f,) [m]."""
+
+    nodes: Float[np.ndarray, "f m 3"]
+    middles: Float[np.ndarray, "f 3"]
+    normals: Float[np.ndarray, "f 3"]
+    sizes: Float[np.ndarray, "f"]
+
+    def chosen(self, which: Bool[np.ndarray, "f"] | Int[np.ndarray, "g"]) -> "_Sides":
+        """Some of them."""
+        return _Sides(self.nodes[which], self.middles[which], self.normals[which], self.sizes[which])
+
+
+def _nearest_faces(
+    gmsh: ModuleType, solid: Solid, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarray, "f m"]
+) -> Int[np.ndarray, "f"]:
+    """For each side the index of the face that its nodes are nearest to; of equally near ones that it is within."""
+    middles, normals, areas = side_normals(points, sides)
+    all_sides = _Sides(points[sides], middles, normals, np.sqrt(areas))
+    far = np.full((len(sides), len(solid.faces)), np.inf)
+    for i, face in enumerate(solid.faces):
+        near = _in_box(gmsh, face, all_sides)
+        far[near, i] = _distances(gmsh, face, all_sides.chosen(near))
+    nearest = far.argmin(axis=1)
+    slack = np.maximum(
+        _FLAT * solid.extent, _NEARLY * all_sides.sizes * (far.min(axis=1) > _FLAT * solid.extent)
+    )
+    rivals = far <= (far.min(axis=1) + slack)[:, None]
+    lost = ~np.isfinite(far).any(axis=1)
+    rivals[lost] = True
+    for side in np.flatnonzero(rivals.sum(axis=1) > 1):
+        nearest[side] = _closest(gmsh, solid, np.flatnonzero(rivals[side]), middles[side], normals[side])
+    return np.asarray(nearest)
+
+
+def _in_box(gmsh: ModuleType, face: CadFace, sides: _Sides) -> Bool[np.ndarray, "f"]:
+    """Whether all nodes of a side are in the box of a face, made larger by a part of the side's size."""
+    box = np.array(gmsh.model.getBoundingBox(2, face.tag))
+    room = 0.2 * sides.sizes[:, None]
+    low, high = sides.nodes.min(axis=1), sides.nodes.max(axis=1)
+    return np.asarray(((low >= box[:3] - room) & (high <= box[3:] + room)).all(axis=1))
+
+
+def _distances(gmsh: ModuleType, face: CadFace, sides: _Sides) -> Float[np.ndarray, "f"]:
+    """How far the farthest of a side's nodes is from a face's surface [m]; a side that looks away is far."""
+    X = sides.nodes
+    match face.kind:
+        case "plane":
+            far = np.abs((X - face.centre) @ face.direction)
+            facing = sides.normals @ face.direction
+        case "cylinder" | "sphere":
+            radial, outside = X - face.centre, sides.middles - face.centre
+            if face.kind == "cylinder":
+                radial = radial - (radial @ face.direction)[..., None] * face.direction
+                outside = outside - (outside @ face.direction)[:, None] * face.direction
+            far = np.abs(np.linalg.norm(radial, axis=-1) - face.radius)
+            facing = np.einsum("fc,fc->f", sides.normals, outside) * (-1 if face.inward else 1)
+        case _:
+            far, facing = _projected(gmsh, face.tag, X), np.ones(len(X))
+    return np.asarray(far.max(axis=1) + np.where(facing > 0, 0.0, sides.sizes))
+
+
+def _projected(gmsh: ModuleType, tag: int, X: Float[np.ndarray, "f m 3"]) -> Float[np.ndarray, "f m"]:
+    """Distances of points from a free surface [m]; those that sides share are projected once."""
+    if not len(X):
+        return np.zeros(X.shape[:2])
+    places, back = np.unique(X.reshape(-1, 3), axis=0, return_inverse=True)
+    on = np.array(gmsh.model.getClosestPoint(2, tag, places.ravel())[0]).reshape(-1, 3)
+    return np.asarray(np.linalg.norm(on - places, axis=1)[back].reshape(X.shape[:2]))
+
+
+def _closest(
+    gmsh: ModuleType,
+    solid: Solid,
+    rivals: Int[np.ndarray, "r"],
+    middle: Float[np.ndarray, "3"],
+    normal: Float[np.ndarray, "3"],
+) -> int:
+    """Of faces that are about equally near to a side the one that its middle, projected, is within and looks as."""
+    best, least = int(rivals[0]), np.inf
+    for i in rivals:
+        tag = solid.faces[i].tag
+        on, at = gmsh.model.getClosestPoint(2, tag, middle)
+        within = gmsh.model.isInside(2, tag, at, parametric=True) > 0
+        away = float(np.linalg.norm(np.array(on) - middle))
+        if not within:
+            away += _beyond(gmsh, tag, middle)
+        away += (1 - abs(np.array(gmsh.model.getNormal(tag, at)) @ normal)) * 1e-3 * solid.extent
+        if away < least:
+            best, least = int(i), away
+    return best
+
+
+def _beyond(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
+    """How far a place is from the edges of a face [m]."""
+    edges = gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False)
+    on = [gmsh.model.getClosestPoint(1, edge, place)[0] for _, edge in edges]
+    return min((float(np.linalg.norm(np.array(X) - place)) for X in on), default=0.0)

@@ -1,0 +1,240 @@
+"""CAD files, read into gmsh's model as solids in metres; nothing is printed, whatever fails becomes a MeshError."""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Literal
+
+import numpy as np
+
+from kedfem.errors import MeshError
+from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
+
+Format = Literal["STEP", "IGES", "BREP"]
+ENDINGS: dict[str, Format] = {
+    ".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP", ".brp": "BREP",
+}  # fmt: skip
+
+#: OpenCASCADE turns STEP and IGES into millimetres, and there its tolerances of 1e-7 are small against any part.
+#: Only then is the model made smaller, tolerances with it: exactly, a cylinder stays one. Read at once in metres
+#: (Geometry.OCCTargetUnit), all tolerances were 0.1 µm, and the unit cannot be set for IGES in a new session.
+_MILLIMETRE = 1e-3
+_BREP_UNIT = 1e-3
+SMALLEST, LARGEST = 1e-5, 1e3  # [m], of a part's box: beyond them the unit must be wrong
+_ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
+_SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
+
+
+@dataclass(frozen=True, slots=True)
+class CadFile:
+    """A file to be read: for messages `where`; `scale` [m] is the length of its unit, None for what it says."""
+
+    where: str
+    path: Path
+    format: Format
+    scale: float | None
+
+
+def cad_file(where: str, path: Path, scale: float | None) -> CadFile:
+    """A file that can be opened and looks like what its ending says.
+
+    Raises
+    ------
+    MeshError
+        No such file, a folder, an unknown ending, empty, not readable, of another format, or broken off.
+    """
+    wanted = "must be a CAD file (" + ", ".join(ENDINGS) + ")"
+    if not path.is_file():
+        raise MeshError(f"{where}: {wanted}, got {'a folder' if path.is_dir() else 'nothing'} at {path}")
+    if path.suffix.lower() not in ENDINGS:
+        raise MeshError(f"{where}: {wanted}, got {path}")
+    form = ENDINGS[path.suffix.lower()]
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise MeshError(
+            f"{where}: must be a file that can be read, got {path}: {error.strerror or error}"
+        ) from error
+    if not text.strip():
+        raise MeshError(f"{where}: {wanted}, got an empty file at {path}")
+    _check_form(where, path, form, text)
+    return CadFile(where, path, form, scale)
+
+
+def _check_form(where: str, path: Path, form: Format, text: bytes) -> None:
+    """Refuse a text that is not of a form, or breaks off: OpenCASCADE takes what is there and is silent."""
+    begins, whole = {
+        "STEP": (b"ISO-10303-21" in text[:2000], b"END-ISO-10303-21" in text[-2000:]),
+        "IGES": (text[72:73] in (b"S", b"F", b"C"), text.rstrip().splitlines()[-1][72:73] == b"T"),
+        "BREP": (b"CASCADE Topology" in text[:2000], _whole_brep(text)),
+    }[form]
+    if not begins:
+        raise MeshError(f"{where}: must hold {form}, as its ending says, got another text in {path}")
+    if not whole:
+        raise MeshError(f"{where}: must be a whole file of {form}, got one that breaks off: {path}")
+
+
+def _whole_brep(text: bytes) -> bool:
+    """Whether a BREP file has all shapes that it announces: OpenCASCADE would wait for the missing ones for ever."""
+    count = re.search(rb"^TShapes (\d+)", text, re.MULTILINE)
+    shapes = re.findall(rb"^(?:Ve|Ed|Wi|Fa|Sh|So|CS|Co)\s*$", text, re.MULTILINE)
+    return count is not None and int(count[1]) == len(shapes) and text.split()[-1] == b"0"
+
+
+def read_solids(gmsh: ModuleType, file: CadFile) -> list[int]:
+    """The tags of a file's solids, now in gmsh's model in metres; closed faces without a solid are made one.
+
+    Raises
+    ------
+    MeshError
+        OpenCASCADE cannot read the file, or there is no solid in it.
+    """
+    scaling = _scaling(file)
+    imported(gmsh, file, scaling, sewing=None)
+    solids = [tag for _, tag in gmsh.model.getEntities(3)]
+    if solids or not gmsh.model.getEntities(2):
+        _check_any(gmsh, file, solids)
+        return solids
+    boxes = np.array([gmsh.model.getBoundingBox(2, tag) for tag in _faces(gmsh)])
+    if np.abs(boxes).max() < _ENDLESS:
+        extent = np.linalg.norm(boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0))
+        check_size(file, "its faces", float(extent))
+    for gap in _SEWING:
+        _clear(gmsh)
+        imported(gmsh, file, scaling, sewing=gap)
+        if not _free_edges(gmsh, _faces(gmsh)):
+            break
+    solids = _closed_solids(gmsh)
+    _check_any(gmsh, file, solids)
+    return solids
+
+
+def check_size(file: CadFile, what: str, extent: float) -> None:
+    """Refuse a size [m] that no part has."""
+    if not SMALLEST <= extent <= LARGEST:
+        raise MeshError(
+            f"{file.where}: must hold a part between {SMALLEST:g} and {LARGEST:g} [m] across, got {extent:.3g} "
+            f"for {what} in {file.path}; set `scale`, the metres per unit of the file"
+        )
+
+
+def _scaling(file: CadFile) -> float:
+    """By what OpenCASCADE's numbers are multiplied."""
+    if file.format == "BREP":
+        return _BREP_UNIT if file.scale is None else file.scale
+    if file.scale is None:
+        return _MILLIMETRE
+    unit = iges_unit(file.path) if file.format == "IGES" else step_unit(step_text(file.path))
+    if unit is None:
+        raise MeshError(
+            f"{file.where}: must say its unit of length once for `scale` to replace it, got none or several "
+            f"in {file.path}"
+        )
+    return _MILLIMETRE * file.scale / unit
+
+
+def imported(gmsh: ModuleType, file: CadFile, scaling: float, sewing: float | None) -> None:
+    """The file's shapes, added to the model, all numbers times `scaling`; faces sewn if they are `sewing` apart."""
+    try:
+        with _options(gmsh, scaling, sewing), _silent():
+            gmsh.model.occ.importShapes(str(file.path), highestDimOnly=False)
+            gmsh.model.occ.synchronize()
+    except Exception as error:
+        reason = " ".join(str(error).split()) or "it gave up without a word"
+        raise MeshError(
+            f"{file.where}: must be a file that OpenCASCADE can read as {file.format}, got {file.path}: {reason}"
+        ) from error
+
+
+@contextmanager
+def _options(gmsh: ModuleType, scaling: float, sewing: float | None) -> Iterator[None]:
+    """gmsh's settings for one import, afterwards as they were."""
+    wanted = {"OCCScaling": scaling, "OCCSewFaces": sewing is not None}
+    if sewing is not None:
+        wanted["Tolerance"] = sewing
+    before = {key: gmsh.option.getNumber(f"Geometry.{key}") for key in wanted}
+    unit = gmsh.option.getString("Geometry.OCCTargetUnit")
+    for key, value in wanted.items():
+        gmsh.option.setNumber(f"Geometry.{key}", value)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "")
+    try:
+        yield
+    finally:
+        gmsh.option.setString("Geometry.OCCTargetUnit", unit)
+        for key, value in before.items():
+            gmsh.option.setNumber(f"Geometry.{key}", value)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """What OpenCASCADE itself writes to the terminal is dropped: gmsh's settings do not reach it."""
+    kept = [os.dup(stream) for stream in (1, 2)]
+    try:
+        with Path(os.devnull).open("w") as nowhere:
+            for stream in (1, 2):
+                os.dup2(nowhere.fileno(), stream)
+            yield
+    finally:
+        for stream, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, stream)
+            os.close(copy)
+
+
+def _clear(gmsh: ModuleType) -> None:
+    """Everything out of the model; tags begin anew."""
+    gmsh.model.remove()
+    gmsh.model.add("kedfem")
+
+
+def _faces(gmsh: ModuleType) -> list[int]:
+    """The tags of all faces."""
+    return [tag for _, tag in gmsh.model.getEntities(2)]
+
+
+def _free_edges(gmsh: ModuleType, faces: list[int]) -> list[int]:
+    """The edges that only one of the faces has."""
+    return [tag for _, tag in gmsh.model.getBoundary([(2, face) for face in faces], oriented=False)]
+
+
+def _closed_solids(gmsh: ModuleType) -> list[int]:
+    """Solids made of the groups of faces that hang together and are closed."""
+    occ, solids = gmsh.model.occ, []
+    for group in _shells(gmsh):
+        if not _free_edges(gmsh, group):
+            solids.append(occ.addVolume([occ.addSurfaceLoop(group, sewing=False)]))
+    occ.synchronize()
+    return solids
+
+
+def _shells(gmsh: ModuleType) -> list[list[int]]:
+    """Faces in groups that share edges."""
+    groups: list[tuple[list[int], set[int]]] = []
+    for face in _faces(gmsh):
+        edges = {tag for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, oriented=False)}
+        touching = [group for group in groups if group[1] & edges]
+        groups = [group for group in groups if not group[1] & edges]
+        together = sorted([face, *(tag for tags, _ in touching for tag in tags)])
+        groups.append((together, edges.union(*(found for _, found in touching))))
+    return sorted(tags for tags, _ in groups)
+
+
+def _check_any(gmsh: ModuleType, file: CadFile, solids: list[int]) -> None:
+    """Refuse a file without a solid, and say what is in it instead."""
+    if solids:
+        return
+    faces = _faces(gmsh)
+    if not faces:
+        curves = len(gmsh.model.getEntities(1))
+        got = f"{curves} curves" if curves else "nothing"
+        raise MeshError(f"{file.where}: must hold a solid, got {got} and no faces in {file.path}")
+    free = _free_edges(gmsh, faces)
+    X = gmsh.model.occ.getCenterOfMass(1, free[0]) if free else (0.0, 0.0, 0.0)
+    raise MeshError(
+        f"{file.where}: must hold a solid, got faces that do not close ({len(faces)} of them, "
+        f"{len(free)} free edges, one at ({X[0]:.6g}, {X[1]:.6g}, {X[2]:.6g}) [m]) in {file.path}; "
+        "close them, or export the part as a solid"
+    )

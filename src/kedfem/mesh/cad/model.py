@@ -1,0 +1,207 @@
+"""Parts from CAD: one solid of a STEP, IGES or BREP file, alone in gmsh's model, in metres."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MeshError
+from kedfem.mesh.cad.file import CadFile, cad_file, check_size, imported, read_solids
+from kedfem.mesh.cad.solid_faces import SAME_VOLUME, cad_faces, enclosed_volume, solid_box
+from kedfem.mesh.cad.solids import Solid
+from kedfem.mesh.cad.text import Body, own_name, step_bodies, step_products, step_text
+from kedfem.mesh.session import gmsh_model
+from kedfem.scene.shapes import Cad
+from kedfem.scene.wording import nearest
+
+_SAME = 1e-5  # of the solid's size: how far corners may be off where the file's text says
+
+
+@dataclass(frozen=True, slots=True)
+class CadKeys:
+    """What a user calls the file and the choice of a solid in it: keys of the scene, or options of a command."""
+
+    file: str
+    solid: str
+
+
+@contextmanager
+def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tuple[ModuleType, Solid]]:
+    """gmsh with one solid of a CAD file in its model, in metres and the file's own frame.
+
+    Parameters
+    ----------
+    keys : CadKeys
+        Of the scene, for messages.
+    path : Path
+        The file.
+    name : str
+        The link's name: of an assembly the solid of that name is taken, if `shape.solid` says no other.
+    shape : Cad
+        Its `solid` and `scale`; where it is placed is for the caller.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, has no solid or none of the name asked for, or the solid is not one to mesh.
+    """
+    file = cad_file(keys.file, path, shape.scale)
+    with gmsh_model() as gmsh:
+        yield gmsh, chosen_solid(gmsh, file, keys.solid, name, shape.solid)
+
+
+def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: str | None) -> Solid:
+    """One solid of a file, which is read into gmsh's empty model and left alone there."""
+    tags = read_solids(gmsh, file)
+    bodies = _bodies(gmsh, file, tags)
+    names = _solid_names(gmsh, file, tags, bodies)
+    tag = tags[_choice(key, file, names, link, wanted)]
+    _leave_only(gmsh, tag)
+    return _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
+
+
+def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | None) -> Solid:
+    """The record of the solid in the model, if it can be one."""
+    box = np.array(gmsh.model.getBoundingBox(3, tag))
+    extent = float(np.linalg.norm(box[3:] - box[:3]))
+    volume = float(gmsh.model.occ.getMass(3, tag))
+    _check_solid(file, name, extent, volume)
+    faces = _boundary(gmsh, tag)
+    named = {face: text for face, text in zip(faces, body.faces, strict=True) if text} if body else {}
+    known = cad_faces(gmsh, file.where, tag, extent, named)
+    enclosed = enclosed_volume(gmsh, known)
+    if abs(enclosed - volume) > SAME_VOLUME * volume:
+        raise MeshError(
+            f"{file.where}: must be a solid whose faces enclose its volume, got {enclosed:.6g} [m³] within the "
+            f"faces and {volume:.6g} for the solid {name!r} in {file.path}; export it again, as STEP if you can"
+        )
+    low, high = solid_box(gmsh, known)
+    return Solid(tag, name, volume, low, high, known)
+
+
+def _check_solid(file: CadFile, name: str, extent: float, volume: float) -> None:
+    """Refuse a size that no part has, and a solid without volume or turned inside out."""
+    check_size(file, repr(name), extent)
+    if volume <= 1e-9 * extent**3:
+        raise MeshError(
+            f"{file.where}: must hold a solid of positive volume [m³], got {volume:.3g} for {name!r} in "
+            f"{file.path}; its faces may be turned inwards or lie on each other: mend the part in CAD"
+        )
+
+
+def _choice(key: str, file: CadFile, names: list[str], link: str, wanted: str | None) -> int:
+    """Which of the solids is meant: the one of the name given, the only one, or that of the link's name."""
+    if wanted is None and len(names) == 1:
+        return 0
+    asked = link if wanted is None else wanted
+    if asked in names:
+        return names.index(asked)
+    close = nearest(asked, names)
+    known = f"{', '.join(names)}" + (f"; did you mean {close!r}?" if close else "")
+    if wanted is not None:
+        raise MeshError(f"{key}: must name a solid of {file.path}, got {wanted!r}, there are: {known}")
+    raise MeshError(
+        f"{key}: is required, or a solid called {link!r} like the link, for a file with {len(names)} "
+        f"solids, got {file.path} with: {known}"
+    )
+
+
+def _boundary(gmsh: ModuleType, solid: int) -> list[int]:
+    """The faces of a solid, in order of their tags."""
+    return sorted({abs(tag) for _, tag in gmsh.model.getBoundary([(3, solid)], combined=False)})
+
+
+def _leave_only(gmsh: ModuleType, solid: int) -> None:
+    """Everything else out of the model."""
+    kept = {(3, solid), *((2, tag) for tag in _boundary(gmsh, solid))}
+    for dimension in (1, 0):
+        kept |= {
+            (at, abs(tag))
+            for at, tag in gmsh.model.getBoundary(
+                [entity for entity in kept if entity[0] == dimension + 1], combined=False
+            )
+        }
+    for dimension in (3, 2, 1, 0):
+        others = [entity for entity in gmsh.model.getEntities(dimension) if tuple(entity) not in kept]
+        gmsh.model.occ.remove(others)
+    gmsh.model.occ.synchronize()
+
+
+def _solid_names(
+    gmsh: ModuleType, file: CadFile, tags: list[int], bodies: dict[int, Body | None]
+) -> list[str]:
+    """A name of its own for each solid: of its product, else of its body; those of one name are numbered."""
+    names = _product_names(gmsh, file, len(tags))
+    often = Counter(names)
+    own = [(body.name if body else "") for body in bodies.values()]
+    names = [
+        mine if mine and (not name or often[name] > 1) else name
+        for name, mine in zip(names, own, strict=True)
+    ]
+    names = [name or "solid" for name in names]
+    often, seen = Counter(names), Counter[str]()
+    for i, name in enumerate(names):
+        seen[name] += 1
+        if often[name] > 1 or (name == "solid" and len(names) > 1):
+            names[i] = f"{name} {seen[name]}"
+    return names
+
+
+def _product_names(gmsh: ModuleType, file: CadFile, count: int) -> list[str]:
+    """The names of the products that the solids are, from the labels gmsh gives, which it loses where it scales."""
+    if file.format != "STEP":
+        return [file.path.stem] if count == 1 else [""] * count
+    if count == 1:
+        products = step_products(step_text(file.path))
+        return [products[0] if len(products) == 1 else file.path.stem]
+    gmsh.model.add("names")
+    try:
+        imported(gmsh, file, 1.0, sewing=None)
+        labels = [gmsh.model.getEntityName(3, tag) for _, tag in gmsh.model.getEntities(3)]
+    finally:
+        gmsh.model.remove()
+    names = [own_name(label.rpartition("/")[2]) for label in labels]
+    return names if len(names) == count else [""] * count
+
+
+def _bodies(gmsh: ModuleType, file: CadFile, tags: list[int]) -> dict[int, Body | None]:
+    """For each solid the body in a STEP file's text that it is, as far as that is sure."""
+    texts = list(step_bodies(step_text(file.path))) if file.format == "STEP" else []
+    return {tag: _body(gmsh, tag, texts) for tag in tags}
+
+
+def _body(gmsh: ModuleType, tag: int, texts: list[Body]) -> Body | None:
+    """The body whose faces have their corners where the solid's faces, in order, have theirs.
+
+    Compared by distances of the faces' corners from each other, which a place in an assembly does not change.
+    """
+    faces = _boundary(gmsh, tag)
+    likely = [body for body in texts if len(body.faces) == len(faces)]
+    if not likely:
+        return None
+    corners = np.array([_corner_mean(gmsh, face) for face in faces])
+    found = [body for body in likely if _alike(corners, body.corners)]
+    sure = found and all(body.faces == found[0].faces and body.name == found[0].name for body in found)
+    return found[0] if sure else None
+
+
+def _corner_mean(gmsh: ModuleType, face: int) -> Float[np.ndarray, "3"]:
+    """The mean of a face's vertices; nan without any."""
+    vertices = {tag for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, recursive=True)}
+    points = [gmsh.model.getValue(0, tag, []) for tag in sorted(vertices)]
+    return np.mean(points, axis=0) if points else np.full(3, np.nan)
+
+
+def _alike(corners: Float[np.ndarray, "f 3"], text: Float[np.ndarray, "f 3"]) -> bool:
+    """Whether two sets of points are the same but for place and unit; at most one may have no corners."""
+    known = np.isfinite(corners).all(axis=1) & np.isfinite(text).all(axis=1)
+    if known.sum() < max(len(known) - 1, 1):
+        return False
+    mine, theirs = (np.linalg.norm(X[known, None] - X[None, known], axis=2) for X in (corners, text))
+    ratio = float(np.linalg.norm(mine)) / max(float(np.linalg.norm(theirs)), 1e-300)
+    return bool(np.abs(mine - ratio * theirs).max() <= _SAME * max(mine.max(), 1e-300))

@@ -1,0 +1,1 @@
+"""Any solid: tetrahedra cut into four hexahedra each, relaxed on the surface from CAD."""

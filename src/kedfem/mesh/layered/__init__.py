@@ -1,0 +1,1 @@
+"""Solids made of layers: one plan of all sections, meshed and swept."""

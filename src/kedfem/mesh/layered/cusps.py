@@ -1,0 +1,197 @@
+"""Cusps of a plan, where curves meet without an angle: no element fits in, so their tips go to the neighbours."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, corner_angles
+
+CUSP = np.radians(6)  # an angle in which no element of quality can be
+_WIDE = 0.15  # of the size: how wide a cusp is where its tip ends
+_LOST = 2e-4  # of the volume: what all tips together may be
+_SLANT = np.tan(
+    np.radians(30)
+)  # the tip's end is turned so much, that the neighbour's corners are less sharp
+_STEPS = np.linspace(0.0, 0.4, 401)[1:]  # shares of the shorter curve where a tip may end
+
+
+@dataclass(frozen=True, slots=True)
+class Cusp:
+    """A corner of a region without an angle: the region, the loop and the place in it of the curve that starts there."""
+
+    region: int
+    loop: int
+    place: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Tip:
+    """What is taken off: where the curves before and after the cusp are cut, how far from it, and the area."""
+
+    before: float
+    after: float
+    area: float
+
+
+def cusps(plan: Plan) -> list[Cusp]:
+    """All corners of regions without an angle."""
+    return [
+        Cusp(number, k, int(place))
+        for number, region in enumerate(plan.regions)
+        for k, loop in enumerate(region.loops)
+        for place in np.flatnonzero(corner_angles(plan.curves, loop) < CUSP)
+    ]
+
+
+def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
+    """The plan with the tips of cusps given to the neighbours where that changes the solid least.
+
+    A boss whose circle touches the sides of the web gains a sliver beside each point of contact.
+
+    Parameters
+    ----------
+    plan : Plan
+        Within its context.
+    size : float [-]
+        Length of the elements, by the solid's extent.
+
+    Returns
+    -------
+    Plan
+        Some cusps may be left: those with tips too large for the volume.
+    float
+        Volume of all tips by that of the solid.
+    """
+    lost, left = 0.0, len(cusps(plan))
+    share = _LOST / max(left, 1)
+    for _ in range(left):
+        done = None
+        for cusp in cusps(plan):
+            done = _filled(plan, cusp, _WIDE * size, share)
+            if done is not None:
+                break
+        if done is None:
+            break
+        plan, lost = done[0], lost + done[1]
+    return _without_spare_curves(plan), lost
+
+
+def _without_spare_curves(plan: Plan) -> Plan:
+    """The plan with curves left out that no region has."""
+    used = sorted({i for region in plan.regions for loop in region.loops for i, _ in loop})
+    regions = tuple(
+        replace(region, loops=tuple(tuple((used.index(i), way) for i, way in loop) for loop in region.loops))
+        for region in plan.regions
+    )
+    return replace(plan, curves=tuple(plan.curves[i] for i in used), regions=regions)
+
+
+def _filled(plan: Plan, cusp: Cusp, width: float, share: float) -> tuple[Plan, float] | None:
+    """The plan without the tip of one cusp, and the share of the volume that this changes; None: too much."""
+    thicknesses = np.diff(plan.heights)
+    loop = plan.regions[cusp.region].loops[cusp.loop]
+    (before, _), (after, _) = loop[cusp.place - 1], loop[cusp.place]
+    if before == after:
+        return None
+    own = plan.regions[cusp.region].material
+    costs = []
+    for curve in (before, after):
+        other = _neighbour(plan, cusp.region, curve)
+        beyond = np.zeros_like(own) if other is None else plan.regions[other].material
+        costs.append(float(thicknesses @ (own ^ beyond)) * (1.01 if other is None else 1.0))
+    to_before = costs[0] <= costs[1]
+    most = share * plan.volume / max(min(costs), 1e-12)
+    tip = _tip(plan, loop, cusp.place, width, most, to_before)
+    if tip is None:
+        return None
+    return _without_tip(plan, cusp, tip, to_before), tip.area * min(costs) / plan.volume
+
+
+def _neighbour(plan: Plan, region: int, curve: int) -> int | None:
+    """The region on the other side of a curve."""
+    others = (
+        number
+        for number, other in enumerate(plan.regions)
+        if number != region and any(i == curve for loop in other.loops for i, _ in loop)
+    )
+    return next(others, None)
+
+
+def _tip(plan: Plan, loop: Loop, place: int, width: float, most: float, to_before: bool) -> _Tip | None:
+    """Where the tip ends: as wide as wanted, or less, so that its area is not more than `most`."""
+    (i, came), (j, goes) = loop[place - 1], loop[place]
+    before, after = plan.curves[i], plan.curves[j]
+    along = _STEPS * min(before.length, after.length)
+    p = before.places(before.length - along if came else along)
+    q = after.places(along if goes else after.length - along)
+    widths = np.linalg.norm(p - q, axis=1)
+    areas = np.cumsum(widths) * along[0]
+    fit = np.flatnonzero((widths <= width) & (areas <= most))
+    if len(fit) == 0 or widths[fit[-1]] < 1e-6:
+        return None
+    end = int(fit[-1])
+    ahead = along[end] + _SLANT * widths[end]  # on the curve that the tip is kept on
+    return _Tip(along[end] if to_before else ahead, ahead if to_before else along[end], float(areas[end]))
+
+
+def _without_tip(plan: Plan, cusp: Cusp, tip: _Tip, to_before: bool) -> Plan:
+    """The plan with two curves cut, their ends joined by a line, and the tip in the region beyond one of them."""
+    loop = plan.regions[cusp.region].loops[cusp.loop]
+    (i, came), (j, goes) = loop[cusp.place - 1], loop[cusp.place]
+    vertex = 1 + max(end for curve in plan.curves for end in curve.ends)
+    far_i, tip_i = _cut(plan.curves[i], tip.before, came, vertex)
+    far_j, tip_j = _cut(plan.curves[j], tip.after, not goes, vertex + 1)
+    count = len(plan.curves)
+    line = _line(
+        far_i.places(far_i.lengths[[-1 if came else 0]])[0],
+        far_j.places(far_j.lengths[[0 if goes else -1]])[0],
+        vertex,
+    )
+    curves = list(plan.curves)
+    curves[i], curves[j] = far_i, far_j
+    curves += [tip_i, tip_j, line]  # count, count + 1, count + 2
+    joint = (count + 2, False)
+    if to_before:
+        beyond_i: Loop = ((count + 1, goes), joint, (i, not came))
+        beyond_j: Loop = ((j, not goes), (count + 1, not goes))
+    else:
+        beyond_i = ((count, not came), (i, not came))
+        beyond_j = ((j, not goes), joint, (count, came))
+    new = {(i, came): ((i, came), (count + 2, True)), (i, not came): beyond_i, (j, not goes): beyond_j}
+    gains = _neighbour(plan, cusp.region, i if to_before else j)
+    regions = []
+    for number, region in enumerate(plan.regions):
+        change = tip.area * ((number == gains) - (number == cusp.region))
+        loops = tuple(tuple(step for part in one for step in new.get(part, (part,))) for one in region.loops)
+        regions.append(Region(loops, region.material, region.area + change))
+    return replace(plan, curves=tuple(curves), regions=tuple(regions))
+
+
+def _cut(curve: Curve, distance: float, at_end: bool, vertex: int) -> tuple[Curve, Curve]:
+    """The parts of a curve beyond and within a distance from its end, or from its start."""
+    at = curve.length - distance if at_end else distance
+    lower = _part(curve, 0.0, at, (curve.ends[0], vertex))
+    upper = _part(curve, at, curve.length, (vertex, curve.ends[1]))
+    return (lower, upper) if at_end else (upper, lower)
+
+
+def _part(curve: Curve, low: float, high: float, ends: tuple[int, int]) -> Curve:
+    """The part of a curve between two lengths of arc."""
+    lengths = np.linspace(0.0, high - low, len(curve.lengths))
+    bends = np.interp(low + lengths, curve.lengths, curve.bends)
+
+    def places(wanted: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
+        return curve.places(low + wanted)
+
+    return Curve(ends, False, lengths, places(lengths), bends, places)
+
+
+def _line(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], vertex: int) -> Curve:
+    """The straight curve between the vertices where two curves are cut."""
+    lengths = np.linspace(0.0, float(np.linalg.norm(end - start)), 9)
+
+    def places(wanted: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
+        return np.asarray(start + wanted[:, None] / lengths[-1] * (end - start))
+
+    return Curve((vertex, vertex + 1), False, lengths, places(lengths), 0 * lengths, places)

@@ -1,0 +1,219 @@
+"""How the curves of a plan are divided: sizes along them, numbers that fit opposite sides, nodes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial.distance import cdist
+
+from kedfem.mesh.cad.solids import Sizing
+from kedfem.mesh.layered.mapping import Mapping, mappings
+from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region
+
+_MOST = 1500  # squares of the size in the plan: a finer default is not taken
+_GROWTH = 0.4  # of an element's length by the distance
+_SLENDER = 1.5  # an element's length along a rib by the rib's width
+_FINEST = 0.2  # of the size: no arc asks for less to be exact
+_THINNEST = 0.05  # of the size: no rib asks for less
+_LOST = 1e-5  # of the volume: what parabolas may lose of a whole circle
+_LOST_AT_45 = 2.44e-3  # of R²: area of a circle less that inside eight parabolas, θ = 45° each:
+# 8 ((θ − sin θ) / 2 − 4/3 sin(θ/2) (1 − cos(θ/2))); it goes with θ⁴
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """Nodes on the curves of a plan.
+
+    Attributes
+    ----------
+    points : (n, 2) [-]
+        The nodes, those at vertices once.
+    nodes : tuple of (c + 1,)
+        Of each curve the numbers of its nodes from start to end; a closed one ends where it starts.
+    middles : tuple of (c, 2) [-]
+        The points of the curve half way along between them.
+    """
+
+    points: Float[np.ndarray, "n 2"]
+    nodes: tuple[Int[np.ndarray, " _"], ...]
+    middles: tuple[Float[np.ndarray, "_ 2"], ...]
+
+
+def plan_size(plan: Plan, sizing: Sizing) -> float:
+    """Edge length of the elements, by the solid's extent.
+
+    The size that is asked for; else the plan's mean width, 2 · area / perimeter of all sections over each
+    other, by `sizing.across`, but not smaller than gives some 1500 squares. Ribs and walls thinner than that do
+    not make it smaller: elements are merely shorter there, once and a half as long as the rib is thick.
+    """
+    if sizing.size is not None:
+        return sizing.size / plan.extent
+    area = sum(region.area for region in plan.regions)
+    met = np.bincount([i for region in plan.regions for loop in region.loops for i, _ in loop])
+    perimeter = sum(curve.length for curve, regions in zip(plan.curves, met, strict=True) if regions == 1)
+    return max(2 * area / perimeter / sizing.across, float(np.sqrt(area / _MOST)))
+
+
+def divided(plan: Plan, size: float, turn: float) -> tuple[Division, tuple[Mapping | None, ...]]:
+    """Nodes on all curves, and of each region how it can be mapped with them.
+
+    Elements are `size` long, shorter along thin ribs and where a curve turns by `turn` or by so much that a
+    parabola misses it; from there they grow with the distance. Their numbers are even on each curve, so that
+    quadrilaterals can fill any region, and those of opposite sides are made equal where that costs little.
+
+    Parameters
+    ----------
+    plan : Plan
+        Within its context.
+    size : float [-]
+        By the solid's extent.
+    turn : float [rad]
+        Most that an element turns along a curve.
+    """
+    sizes = _sizes(plan, size, turn)
+    measures = [_measure(curve, local) for curve, local in zip(plan.curves, sizes, strict=True)]
+    counts = [2 * max(1, int(np.ceil(measure[-1] / 2 - 0.25))) for measure in measures]
+    fitting = mappings(plan, counts)
+    return _nodes(plan, counts, measures, fitting), fitting
+
+
+def _sizes(plan: Plan, size: float, turn: float) -> list[Float[np.ndarray, " m"]]:
+    """Wanted length of the elements at the samples of each curve."""
+    wanted = []
+    for curve, gap, height in zip(plan.curves, _gaps(plan), plan.wall_heights, strict=True):
+        radii = 1 / np.maximum(curve.bends, 1e-9)
+        share = _LOST * plan.volume / (_LOST_AT_45 * radii**2 * max(height, 1e-9))
+        exact = np.maximum(radii * np.pi / 4 * share**0.25, _FINEST * size)
+        by_gap = np.maximum(_SLENDER * gap, _THINNEST * size)
+        fair = np.full(len(gap), min(size, curve.length / 2))
+        wanted.append(np.minimum.reduce([exact, radii * turn, by_gap, fair]))
+    points, flat = np.concatenate([curve.samples for curve in plan.curves]), np.concatenate(wanted)
+    graded = (flat + _GROWTH * cdist(points, points)).min(axis=1)
+    return np.split(graded, np.cumsum([len(one) for one in wanted])[:-1])
+
+
+def _gaps(plan: Plan) -> list[Float[np.ndarray, " m"]]:
+    """From each sample the least distance through a region to a side of it that faces the sample."""
+    gaps = [np.full(len(curve.samples), np.inf) for curve in plan.curves]
+    for region in plan.regions:
+        sides = [(i, *_points_and_normals(plan.curves[i], way)) for loop in region.loops for i, way in loop]
+        points, normals = (np.concatenate([side[k] for side in sides]) for k in (1, 2))
+        arms = points - points[:, None]
+        distances = np.linalg.norm(arms, axis=2)
+        ahead = np.einsum("pqi,pi->pq", arms, normals) > 0.85 * distances
+        opposed = normals @ normals.T < -0.7
+        least = np.where(ahead & opposed & (distances > 0), distances, np.inf).min(axis=1)
+        for (i, own, _), gap in zip(
+            sides, np.split(least, np.cumsum([len(s[1]) for s in sides])[:-1]), strict=True
+        ):
+            forward = gap if np.array_equal(own, plan.curves[i].samples) else gap[::-1]
+            gaps[i] = np.minimum(gaps[i], forward)
+    return gaps
+
+
+def _points_and_normals(
+    curve: Curve, forward: bool
+) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
+    """Samples in the direction of a loop and unit normals to its left."""
+    points = curve.samples if forward else curve.samples[::-1]
+    along = np.gradient(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return points, np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
+def _measure(curve: Curve, local: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+    """Number of elements from the start to each sample, ∫ ds / size."""
+    density = 1 / local
+    steps = np.diff(curve.lengths) * (density[1:] + density[:-1]) / 2
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _nodes(
+    plan: Plan,
+    counts: list[int],
+    measures: list[Float[np.ndarray, " m"]],
+    fitting: tuple[Mapping | None, ...],
+) -> Division:
+    """The nodes; those of free closed curves inside a ring opposite the nodes of its outer loop."""
+    ends = sorted({end for curve in plan.curves for end in curve.ends})
+    places = {i: _lengths(curve, counts[i], measures[i]) for i, curve in enumerate(plan.curves)}
+    for region, mapping in _from_outside(plan, fitting):
+        inner = region.loops[1][0][0]
+        if mapping.kind == "ring" and len(region.loops[1]) == 1 and plan.curves[inner].free:
+            places[inner] = _opposite(plan, places, region)
+    points = [np.full((len(ends), 2), np.nan)]
+    nodes, middles, used = [], [], len(ends)
+    for i, curve in enumerate(plan.curves):
+        at, (start, end) = places[i], np.searchsorted(ends, curve.ends)
+        points[0][[start, end]] = curve.places(at[[0, -1]] % curve.length if curve.free else at[[0, -1]])
+        points.append(_wrapped(curve, at[1:-1]))
+        nodes.append(np.array([start, *range(used, used + len(at) - 2), end]))
+        middles.append(_wrapped(curve, (at[1:] + at[:-1]) / 2))
+        used += len(at) - 2
+    return Division(np.concatenate(points), tuple(nodes), tuple(middles))
+
+
+def _wrapped(curve: Curve, lengths: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
+    """Points of a curve, which may be run through beyond its end if it is closed."""
+    return curve.places(lengths % curve.length if curve.free else lengths)
+
+
+def _lengths(curve: Curve, count: int, measure: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
+    """Lengths of arc of the nodes: the same share of the measure between each two."""
+    return np.asarray(np.interp(np.linspace(0, measure[-1], count + 1), measure, curve.lengths))
+
+
+def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple[Region, Mapping]]:
+    """The mapped rings, those around others first."""
+    rings = [(region, mapping) for region, mapping in zip(plan.regions, fitting, strict=True) if mapping]
+    rings = [(region, mapping) for region, mapping in rings if len(region.loops) == 2]
+    return sorted(rings, key=lambda ring: -float(np.ptp(_outer_points(plan, ring[0]), axis=0).max()))
+
+
+def _outer_points(plan: Plan, region: Region) -> Float[np.ndarray, "_ 2"]:
+    """Samples of the outer loop of a region."""
+    return np.concatenate([plan.curves[i].samples for i, _ in region.loops[0]])
+
+
+def _opposite(
+    plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Region
+) -> Float[np.ndarray, " n"]:
+    """Lengths of arc along the inner curve of a ring, evenly, turned to face the nodes of the outer loop."""
+    (number, _), *_ = region.loops[1]
+    curve, outer = plan.curves[number], _loop_nodes(plan, places, region.loops[0])
+    count = len(outer)
+    centre = curve.samples[:-1].mean(axis=0)
+    finer = np.linspace(0, curve.length, 32 * count, endpoint=False)
+    around = np.unwrap(np.angle((curve.places(finer) - centre) @ [1, 1j]))
+    towards = np.unwrap(np.angle((outer - centre) @ [1, 1j]))
+    turned = np.sign(around[-1] - around[0])
+    if turned != np.sign(towards[-1] - towards[0]):
+        towards = towards[::-1]
+    # a mean between facing each node and an even division keeps both the angles and the lengths fair
+    facing = np.interp(
+        _monotone(turned * (towards - around[0])), turned * (around - around[0]), finer, period=2 * np.pi
+    )
+    facing = np.unwrap(facing * 2 * np.pi / curve.length) * curve.length / (2 * np.pi)
+    even = np.arange(count) * curve.length / count
+    shift = float((facing - even).mean())
+    lengths = (facing + even + shift) / 2
+    steps = np.diff(np.append(lengths, lengths[0] + curve.length))
+    if steps.min() < even[1] / 3:  # the outer loop goes back somewhere, seen from the centre
+        lengths = even + shift
+    return np.append(lengths, lengths[0] + curve.length)
+
+
+def _monotone(angles: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Angles that never go back."""
+    return np.asarray(np.maximum.accumulate(angles))
+
+
+def _loop_nodes(
+    plan: Plan, places: dict[int, Float[np.ndarray, " n"]], loop: Loop
+) -> Float[np.ndarray, "_ 2"]:
+    """Nodes along a loop, each once."""
+    parts = []
+    for i, forward in loop:
+        points = _wrapped(plan.curves[i], places[i])
+        parts.append((points if forward else points[::-1])[:-1])
+    return np.concatenate(parts)

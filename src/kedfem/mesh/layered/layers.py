@@ -1,0 +1,188 @@
+"""Solids that consist of layers along one direction: the direction found, the section meshed, the mesh swept."""
+
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import KedfemError
+from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.hexahedra import HexMesh
+from kedfem.mesh.layered.cusps import without_cusps
+from kedfem.mesh.layered.division import plan_size
+from kedfem.mesh.layered.partition import Plan
+from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
+from kedfem.mesh.layered.sections import plan_of_slabs
+from kedfem.mesh.layered.sweep import swept
+from kedfem.mesh.quality import mesh_quality
+
+_GOOD = 0.3  # scaled Jacobian from which no smaller size and no other direction is tried
+_SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
+_GAIN = 0.03  # of scaled Jacobian that more elements must bring
+_LEAST = 0.1  # scaled Jacobian below which another way may do better
+_ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
+_SAMPLES = np.linspace(0.0, 1.0, 7)
+_AXES = ("x", "y", "z")
+
+
+def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
+    """Hexahedra of a solid whose faces lie along one direction or across it: its section swept through its slabs.
+
+    The plane faces across the direction cut the solid into slabs of constant section. All sections together
+    divide the plane into regions; these are meshed as mapped blocks where they can be, else with the best of
+    gmsh's quadrilaterals, and each is swept through the slabs in which it has material.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid in its current model, which is left as it is.
+    solid : Solid
+        The only solid in that model.
+    sizing : Sizing
+        How fine; the rule is that of :func:`~kedfem.mesh.division.plan_size`.
+
+    Returns
+    -------
+    HexMesh
+        27-node elements, corners and middles of sides on the solid's own faces; without faces that have names.
+
+    Raises
+    ------
+    OtherWayError
+        No such direction, with the face that is in the way; or the section gives no mesh of quality, with the
+        place.
+    """
+    best: tuple[float, HexMesh] | None = None
+    refusals: list[str] = []
+    tries = [(direction, share) for direction in layer_directions(gmsh, solid) for share in _SHARES]
+    for direction, share in tries:
+        try:
+            mesh = _mesh_along(gmsh, solid, direction, sizing, share)
+        except KedfemError as error:
+            refusals.append(str(error))
+            continue
+        least = mesh_quality(mesh).least
+        if best is None or least > best[0] + _GAIN:
+            best = least, mesh
+        if least >= _GOOD:
+            break
+    if best is None:
+        raise OtherWayError(refusals[0])
+    return _not_too_bad(solid, best[1])
+
+
+def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "3"], ...]:
+    """The directions along which a solid consists of layers, that with the largest area across it first.
+
+    Raises
+    ------
+    OtherWayError
+        There is none; the largest face that is in the way of the best direction.
+    """
+    found: list[Float[np.ndarray, "3"]] = []
+    obstacles: list[tuple[float, str]] = []
+    normals = {face.tag: _face_normals(gmsh, face) for face in solid.faces}
+    flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
+    for direction in _directions([normals[face.tag][0] for face in flat], [face.area for face in flat]):
+        slanted = [face for face in solid.faces if not _fits(normals[face.tag], direction)]
+        if not slanted:
+            found.append(direction)
+        else:
+            largest = max(slanted, key=lambda face: face.area)
+            words = f"{_face_in_words(largest)}, is neither along nor across {direction_in_words(direction)}"
+            obstacles.append((sum(face.area for face in slanted), words))
+    if not found:
+        obstacle = min(obstacles)[1] if obstacles else "no plane face"
+        raise OtherWayError(
+            f"{solid.name}: must consist of layers along one direction, got one where {obstacle}"
+        )
+    return tuple(found)
+
+
+def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
+    """x, y or z, or the direction's components."""
+    for axis, name in zip(np.eye(3), _AXES, strict=True):
+        if abs(direction @ axis) > 1 - 1e-9:
+            return name
+    return "({:.3g}, {:.3g}, {:.3g})".format(*direction)
+
+
+def _directions(normals: list[Float[np.ndarray, "3"]], areas: list[float]) -> list[Float[np.ndarray, "3"]]:
+    """The directions of normals, those with the same line taken together, the largest area first."""
+    groups: list[tuple[Float[np.ndarray, "3"], float]] = []
+    for normal, area in zip(normals, areas, strict=True):
+        direction = normal * np.sign(normal[np.argmax(abs(normal) > 0.999 * abs(normal).max())])
+        near = (abs(direction) > 1e-9) * direction
+        for i, (known, sum_of_areas) in enumerate(groups):
+            if np.linalg.norm(np.cross(known, near)) < _ALONG:
+                groups[i] = known, sum_of_areas + area
+                break
+        else:
+            groups.append((near / np.linalg.norm(near), area))
+    return [direction for direction, _ in sorted(groups, key=lambda group: -group[1])]
+
+
+def _face_normals(gmsh: ModuleType, face: CadFace) -> Float[np.ndarray, "_ 3"]:
+    """Unit normals on a grid over the face's parameters."""
+    (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face.tag)
+    u, v = np.meshgrid(u0 + _SAMPLES * (u1 - u0), v0 + _SAMPLES * (v1 - v0))
+    flat = np.stack([u.ravel(), v.ravel()], axis=1).ravel()
+    return np.asarray(gmsh.model.getNormal(face.tag, flat)).reshape(-1, 3)
+
+
+def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) -> bool:
+    """Whether a face is across the direction everywhere, a cap, or along it everywhere, a wall."""
+    across = np.linalg.norm(np.cross(normals, direction), axis=1).max() < _ALONG
+    return bool(across or abs(normals @ direction).max() < _ALONG)
+
+
+def _face_in_words(face: CadFace) -> str:
+    """A face for the user: its name and what its geometry is."""
+    about = "({:.3g}, {:.3g}, {:.3g})".format(*(face.direction + 0.0))
+    forms = {
+        "plane": f"a plane with normal {about}",
+        "cylinder": f"a cylinder of radius {1000 * face.radius:.4g} mm about {about}",
+        "sphere": f"a sphere of radius {1000 * face.radius:.4g} mm",
+        "other": "a free form, cone or torus",
+    }
+    return f"{face.name}, {forms[face.kind]}"
+
+
+def _mesh_along(
+    gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"], sizing: Sizing, share: float
+) -> HexMesh:
+    """The mesh swept along one direction, in the solid's place."""
+    with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
+        size = share * plan_size(plan_with_cusps, sizing)
+        plan, filled = without_cusps(plan_with_cusps, size)
+        flat = plan_mesh(solid.name, plan, size, sizing.turn)
+    thicknesses = np.diff(plan.heights)
+    layers = np.maximum(np.rint(thicknesses / size).astype(int), max(1, sizing.layers))
+    mesh = swept(flat, plan, layers)
+    words = _way_in_words(direction, flat, plan, int(layers.sum()))
+    if filled > 0:
+        words += f"; cusps between touching edges filled, {100 * filled:.2g} % of the volume"
+    return HexMesh(mesh.points, mesh.cells, way=words)
+
+
+def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan, layers: int) -> str:
+    """How the mesh was made."""
+    slabs = len(plan.heights) - 1
+    through = f"{layers} layer{'s' * (layers > 1)}"
+    if slabs > 1:
+        through = f"{slabs} slabs, {through}"
+    kind = "quadrilaterals" if flat.settings else "mapped blocks"
+    comma = "," if not flat.settings else ""
+    by = f"; gmsh algorithm {', '.join(str(one) for one in flat.settings)}" if flat.settings else ""
+    return f"{kind}{comma} swept along {direction_in_words(direction)} through {through}{by}"
+
+
+def _not_too_bad(solid: Solid, mesh: HexMesh) -> HexMesh:
+    """The mesh itself, unless another way may do better."""
+    quality = mesh_quality(mesh)
+    if quality.least < _LEAST:
+        raise OtherWayError(
+            f"{solid.name}: layers must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
+            "at ({:.6g}, {:.6g}, {:.6g})".format(*quality.centre)
+        )
+    return mesh

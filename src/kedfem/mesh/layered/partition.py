@@ -1,0 +1,137 @@
+"""The plan of a solid made of layers: a partition of the plane, each region with the slabs that it has material in."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A curve between two regions, or between one and the outside.
+
+    Attributes
+    ----------
+    ends : (int, int)
+        Numbers of the vertices where it starts and ends; the same one if it is closed.
+    free : bool
+        Whether it is closed and its vertex may be anywhere on it: no other curve meets it.
+    lengths : (m,) [-]
+        Length of arc from the start to each sample.
+    samples : (m, 2) [-]
+        Points along the curve, from end to end.
+    bends : (m,) [-]
+        Curvature there, positive or 0.
+    places : function
+        The points at lengths of arc, exactly on the curve.
+    """
+
+    ends: tuple[int, int]
+    free: bool
+    lengths: Float[np.ndarray, " m"]
+    samples: Float[np.ndarray, "m 2"]
+    bends: Float[np.ndarray, " m"]
+    places: Callable[[Float[np.ndarray, " s"]], Float[np.ndarray, "s 2"]]
+
+    @property
+    def length(self) -> float:
+        """Length of arc."""
+        return float(self.lengths[-1])
+
+    @property
+    def tangents(self) -> Float[np.ndarray, "2 2"]:
+        """Unit vectors along the curve at its start and end."""
+        near = 1e-4 * self.length
+        points = self.places(np.array([0.0, near, self.length - near, self.length]))
+        along = points[1::2] - points[::2]
+        return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
+#: Curves one after the other: the number of each, and whether it is run through from its start to its end.
+Loop = tuple[tuple[int, bool], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A part of the plane inside which no section has an edge.
+
+    Attributes
+    ----------
+    loops : tuple of Loop
+        Its boundary with the region on the left: the outer loop first, then those around holes.
+    material : (slabs,)
+        In which slabs there is material.
+    area : float [-]
+        Area.
+    """
+
+    loops: tuple[Loop, ...]
+    material: Bool[np.ndarray, " slabs"]
+    area: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The sections of all slabs in one plane; lengths are divided by the solid's extent.
+
+    Attributes
+    ----------
+    axes : (3, 3) [-]
+        Rows: the plan's x and y and the direction of the layers, in the solid's components.
+    extent : float [m]
+        The unit of all lengths here.
+    heights : (slabs + 1,) [-]
+        Where the slabs begin and end along the direction.
+    curves : tuple of Curve
+    regions : tuple of Region
+    """
+
+    axes: Float[np.ndarray, "3 3"]
+    extent: float
+    heights: Float[np.ndarray, " h"]
+    curves: tuple[Curve, ...]
+    regions: tuple[Region, ...]
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid."""
+        thicknesses = np.diff(self.heights)
+        return float(sum(region.area * (thicknesses @ region.material) for region in self.regions))
+
+    @property
+    def wall_heights(self) -> Float[np.ndarray, " c"]:
+        """Of each curve the height over which it is a wall: with material on one side alone."""
+        odd = np.zeros((len(self.curves), len(self.heights) - 1), dtype=bool)
+        for region in self.regions:
+            for loop in region.loops:
+                for curve, _ in loop:
+                    odd[curve] ^= region.material
+        return np.asarray(odd @ np.diff(self.heights))
+
+    def in_space(self, point: Float[np.ndarray, "2"], height: float) -> Float[np.ndarray, "3"]:
+        """A point of the plan at a height, where it is in the solid [m]."""
+        return np.asarray(self.extent * (np.array([*point, height]) @ self.axes))
+
+
+def loop_samples(curves: tuple[Curve, ...], loop: Loop) -> Float[np.ndarray, "_ 2"]:
+    """Points along a loop, in its order."""
+    parts = [curves[i].samples if forward else curves[i].samples[::-1] for i, forward in loop]
+    return np.concatenate([part[:-1] for part in parts])
+
+
+def signed_area(polygon: Float[np.ndarray, "_ 2"]) -> float:
+    """Area of a polygon, positive if it runs anticlockwise."""
+    x, y = (polygon - polygon[0]).T
+    return float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+
+
+def corner_angles(curves: tuple[Curve, ...], loop: Loop) -> Float[np.ndarray, " c"]:
+    """Angle inside the region at the start of each curve of a loop [rad], between 0 and 2π."""
+    angles = []
+    for (before, ahead), (after, forward) in zip((loop[-1], *loop[:-1]), loop, strict=True):
+        came = curves[before].tangents[1] if ahead else -curves[before].tangents[0]
+        goes = curves[after].tangents[0] if forward else -curves[after].tangents[1]
+        turn = np.arctan2(came[0] * goes[1] - came[1] * goes[0], came @ goes)
+        angles.append(np.pi - turn)
+    return np.array(angles)
