@@ -45,9 +45,15 @@ def test_joint_that_does_not_touch_its_link(fidelity: str) -> None:
     nearest = (
         "(0, 0, -0.01), 0.1 m" if fidelity == "solid" else "(0, 0, 0), 0.1 m"
     )  # hex20: none within the end
-    assert fault(raw) == (
+    first, *offered = fault(raw).split("; it has ")
+    assert first == (
         f"joints.A: must sit on {what} link 'arm' at (-0.1, 0, 0), got none there (nearest node {nearest} away)"
     )
+    if fidelity == "solid":  # no bore, so its faces, nearest first
+        assert offered[0].startswith("plane face facing (-1, 0, 0) at (0, 0, 0) 0.1 m away, plane face")
+        assert offered[0].count("plane face") == 6
+    else:
+        assert offered == []
 
 
 def test_joint_beside_the_bore_of_a_plate() -> None:

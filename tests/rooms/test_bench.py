@@ -59,3 +59,12 @@ def test_a_benchmark_writes_its_page(name: str, pictures: list[str], tmp_path: P
     for picture in pictures:
         assert f"({picture})" in text
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_study_of_ports_shows_stiffer_and_less_stressed_plates(tmp_path: Path) -> None:
+    text = BENCHMARKS["ports"](tmp_path, True, lambda *_: None)
+    assert (tmp_path / "ports.md").read_text("utf-8") == text
+    (row,) = [line for line in text.splitlines() if line.startswith("| 2×1 |")]
+    changes = [float(cell.split(": ")[1].split()[0]) for cell in row.split("|")[3:-1]]
+    pull, bend, frequency, *stress = changes
+    assert max(pull, bend, *stress) < 0 < frequency  # stiffer in every way

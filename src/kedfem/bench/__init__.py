@@ -10,6 +10,7 @@ from kedfem.bench.following import bench_following
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.machine import Watch
 from kedfem.bench.plane import bench_plane
+from kedfem.bench.ports import bench_ports
 from kedfem.bench.reduction import bench_reduction
 from kedfem.bench.solvers import bench_solvers
 from kedfem.bench.start import bench_start
@@ -21,6 +22,7 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "growth": bench_growth,
     "solvers": bench_solvers,
     "plane": bench_plane,
+    "ports": bench_ports,
     "start": bench_start,
     "elements": bench_elements,
     "following": bench_following,

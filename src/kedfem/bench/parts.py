@@ -76,14 +76,24 @@ class Answer:
 
 def answer(part: BenchPart, element: str, size: Size, repeats: int) -> Answer:
     """Mesh, solve and time a part."""
+    link = part_link(part, element, size)
+    deflection, u = loaded(part, link)
+    stress = von_mises((point_rows(link, "stress", np.asarray(part.stressed)).stress @ u.ravel())[None])
+    values = {
+        "deflection": np.array([deflection]),
+        "frequencies": frequencies(link, part.near),
+        "stress": stress,
+    }
+    return Answer(values, 3 * link.n, *_work(link, repeats))
+
+
+def part_link(part: BenchPart, element: str, size: Size) -> Link:
+    """The record of a part, meshed."""
     scene = LinkScene(material="steel", shape=part.shape, mesh=_meshing(size), element="hex27")
     mesh = link_mesh(part.name, scene, Path())
     if part.moved:
         mesh = _moved(linear(mesh), part.moved, size)
-    link = solid_link(part.name, FORMS[element](mesh), STEEL, link_axes(scene))
-    deflection, stress = _loaded(part, link)
-    values = {"deflection": deflection, "frequencies": _frequencies(link, part.near), "stress": stress}
-    return Answer(values, 3 * link.n, *_work(link, repeats))
+    return solid_link(part.name, FORMS[element](mesh), STEEL, link_axes(scene))
 
 
 def _meshing(size: Size) -> Meshing:
@@ -101,15 +111,14 @@ def _moved(mesh: HexMesh, part: float, counts: Size) -> HexMesh:
     return HexMesh(mesh.points + inside * moves, mesh.cells)
 
 
-def _loaded(part: BenchPart, link: Link) -> tuple[Float[np.ndarray, "1"], Float[np.ndarray, "1"]]:
-    """Mean deflection of the loaded seat as seen from the other, along a unit force, and the equivalent stress."""
-    fixed, loaded = (joint_seat(link, "seat", np.asarray(end), None) for end in part.shape.between)
-    force = np.outer(loaded.fit[0], np.asarray(part.force) / np.linalg.norm(part.force))
+def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]]:
+    """Mean deflection of the loaded seat under a unit force, along it, as seen from the other; and the link's state."""
+    fixed, moved = (joint_seat(link, "seat", np.asarray(end), None) for end in part.shape.between)
+    force = np.outer(moved.fit[0], np.asarray(part.force) / np.linalg.norm(part.force))
     modes = _rigid_modes(link, fixed.origin)
     u = _free_solution(link, modes, force + _reaction(fixed, modes, force))
     seen = np.linalg.lstsq(_fits(fixed, modes), (fixed.fit @ u).ravel(), rcond=None)[0]
-    stress = point_rows(link, "stress", np.asarray(part.stressed)).stress @ u.ravel()
-    return np.array([(force * (u - modes @ seen)).sum()]), von_mises(stress[None])
+    return float((force * (u - modes @ seen)).sum()), u
 
 
 def _rigid_modes(link: Link, origin: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 3 6"]:
@@ -143,7 +152,7 @@ def _free_solution(
     return u.reshape(-1, 3)
 
 
-def _frequencies(link: Link, near: float) -> Float[np.ndarray, " k"]:
+def frequencies(link: Link, near: float) -> Float[np.ndarray, " k"]:
     """The first elastic frequencies of the free part [Hz], by Lanczos' method on what is free of rigid motion."""
     shift = (0.3 * 2 * np.pi * near) ** 2  # below zero: a free body needs no supports
     factor = Cholesky(effective_matrix(link, shift, 1.0), link.name)

@@ -259,7 +259,7 @@ def seat_of(scene: Scene, name: str, link: Link) -> Seat:
     """The seat of a joint on a link."""
     joint = scene.joints[name]
     axis = None if joint.axis is None or joint.kind == "prismatic" else unit(joint.axis)
-    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis)
+    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.faces.get(link.name, ()))
 
 
 def on_part(

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from kedfem.dynamics.coupling import Attachment, SharedCut, attachments, on_part, part_seat, slider_axis
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
 from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stiff_ports import with_stiff_ports
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
@@ -121,6 +122,7 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
         for name, link in cut.items()
         for key, part in zip(keys(name, link), link.parts, strict=True)
     }
+    links = with_stiff_ports(scene, links)
     for key, body in scene.bodies.items():
         if body.link in cut:
             on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
@@ -262,13 +264,14 @@ def _with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, L
     """The link or segment that carries a body, and it with the body."""
     at = np.asarray(body.at)
     near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)
-    here = (
+    here = [
         j
         for j in scene.joints.values()
         if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
-    )
+    ]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
-    key, seat = on_part(links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis))
+    faces = next((j.faces[body.link] for j in here if body.link in j.faces), ())
+    key, seat = on_part(links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis, faces))
     return key, _carrying(links[key], seat, where, body, axis)
 
 

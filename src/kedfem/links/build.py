@@ -137,14 +137,14 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     """What of a link the elements around its joints and bodies take up along a direction."""
     out = []
     places = [
-        (joint.at, joint.axis if joint.kind != "prismatic" else None)
+        (joint.at, joint.axis if joint.kind != "prismatic" else None, joint.faces.get(name, ()))
         for joint in scene.joints.values()
         if name in joint.links
     ]
-    for at, axis in places:
+    for at, axis, faces in places:
         about = None if axis is None else np.asarray(axis) / np.linalg.norm(axis)
         try:
-            seat = joint_seat(link, f"links.{name}", np.asarray(at), about)
+            seat = joint_seat(link, f"links.{name}", np.asarray(at), about, faces)
         except MeshError:
             continue  # is said where the joint is made
         if seat.facets is not None:

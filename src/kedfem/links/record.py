@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.links.section import Section
+from kedfem.mesh.hexahedra import Face
 
 Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
 Mass = tuple[Matrix, ...]
@@ -49,6 +50,18 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class LinkFace:
+    """A face of a solid link that has a name.
+
+    face : its geometry; the sides are of the mesh that the link was made from
+    facets : of the link's basis; of a segment those that it has
+    """
+
+    face: Face
+    facets: Int[np.ndarray, " f"]
+
+
+@dataclass(frozen=True, slots=True)
 class Link:
     """A link as the dynamics sees it; all arrays are for the drawn (reference) position, R = I.
 
@@ -73,8 +86,9 @@ class Link:
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
     fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
-    way : how the mesh of a part from CAD was made, in words; else empty
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
+    faces : those with names, of a solid from CAD or from a mesh file with groups
+    way : how the mesh of a part from CAD was made, in words; else empty
     """
 
     name: str
@@ -100,6 +114,7 @@ class Link:
     rigid: bool = False
     fit: Float[np.ndarray, "n 3"] | None = None
     frames: tuple[Frame, ...] = ()
+    faces: tuple[LinkFace, ...] = ()
     way: str = ""
 
     @property

@@ -1,13 +1,16 @@
 """Where joints sit: the affine field that best fits a bore or a face, with scalar, rotation-invariant weights."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
+from kedfem.links.missing import in_its_plane, not_touching
+from kedfem.links.picks import named_facets, picked
 from kedfem.links.record import Link
-from kedfem.links.surface import PLANE_TOLERANCE, boundary, cylinder, flat_face, smooth_face, sphere, surface
+from kedfem.links.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,32 +63,34 @@ def face_normal(seat: Seat) -> Float[np.ndarray, "3"]:
 
 
 def joint_seat(
-    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
+    link: Link,
+    where: str,
+    point: Float[np.ndarray, "3"],
+    axis: Float[np.ndarray, "3"] | None,
+    faces: Sequence[str] = (),
 ) -> Seat:
-    """The seat that a link offers to a joint: a beam's node; else a bore about the axis, else the face there.
+    """The seat that a link offers to a joint: a beam's node; else a bore or journal about the axis, else the face there.
 
     Parameters
     ----------
     where : how messages name the joint, e.g. ``joints.B``
     point : reference position of the joint [m]
     axis : unit vector of a bore to look for, or None
+    faces : names of the faces that make the seat, if they are given
 
     Raises
     ------
     MeshError
-        If the link has no node, bore or face there.
+        If the link has no node, bore or face there, or several between which nothing tells.
     """
     if link.full is not None and link.Q is not None:
-        seat = joint_seat(link.full, where, point, axis)
+        seat = joint_seat(link.full, where, point, axis, faces)
         return replace(seat, fit=seat.fit @ link.Q)
     if link.kind == "beam":
         return _node_seat(link, where, point)
     if link.kind == "spatial_beam":
         return _section_seat(link, where, point)
-    facets = _surface_at(link, point, axis)
-    if not len(facets):
-        raise MeshError(_not_touching(link, where, point))
-    return facet_seat(link, facets)
+    return facet_seat(link, named_facets(link, where, faces) if faces else picked(link, where, point, axis))
 
 
 def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
@@ -99,12 +104,12 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:
     if link.full is not None and link.Q is not None:
         seat = face_seat(link.full, where, point)
         return replace(seat, fit=seat.fit @ link.Q)
-    seen = _in_its_plane(link, point)
+    seen = in_its_plane(link, point)
     facets = flat_face(link, seen)
     if not len(facets):
         facets = smooth_face(link, seen)
     if not len(facets):
-        raise MeshError(_not_touching(link, where, point))
+        raise MeshError(not_touching(link, where, point))
     return facet_seat(link, facets)
 
 
@@ -148,7 +153,7 @@ def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
     distance = np.where(link.one != 0, np.linalg.norm(link.X - point, axis=1), np.inf)
     node = int(distance.argmin())
     if distance[node] > PLANE_TOLERANCE * link.size:
-        raise MeshError(_not_touching(link, where, point))
+        raise MeshError(not_touching(link, where, point))
     return node
 
 
@@ -205,36 +210,3 @@ def _principal(
     spread[:d], directions[:d, :d] = np.sqrt(np.abs(variance[::-1])), vectors[:, ::-1].T
     spread[spread < PLANE_TOLERANCE * spread[0]] = 0.0
     return spread, directions
-
-
-def _in_its_plane(link: Link, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """The point as a plane link sees it, which knows no z."""
-    return np.array([*point[:2], link.X[0, 2]]) if link.kind == "plane" else point
-
-
-def _surface_at(
-    link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
-) -> Int[np.ndarray, " f"]:
-    """A ball seat if no axis is given, else a bore about the axis (or one of the link's), else a flat face."""
-    if axis is None and link.d == 3 and len(ball := sphere(link, point)):
-        return ball
-    seen, candidates = _in_its_plane(link, point), link.axes.T if axis is None else (axis,)
-    for candidate in np.eye(3)[2:] if link.kind == "plane" else candidates:
-        if len(bore := cylinder(link, seen, candidate)):
-            return bore
-    return flat_face(link, seen)
-
-
-def _not_touching(link: Link, where: str, point: Float[np.ndarray, "3"]) -> str:
-    point = _in_its_plane(link, point)
-    nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
-    gap = np.linalg.norm(nearest - point)
-    what = "a node of" if link.kind in {"beam", "spatial_beam"} else "a bore or a flat face of"
-    return (
-        f"{where}: must sit on {what} link '{link.name}' at {_shown(point)}, "
-        f"got none there (nearest node {_shown(nearest)}, {gap:.3g} m away)"
-    )
-
-
-def _shown(x: Float[np.ndarray, "3"]) -> str:
-    return "(" + ", ".join(f"{v:.6g}" for v in x) + ")"

@@ -22,6 +22,7 @@ from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.mesh import HexMesh, QuadMesh
+from kedfem.mesh.hexahedra import Face
 from kedfem.scene import Material
 
 HUBS_STIFF = (
@@ -134,11 +135,23 @@ def _slice(
     if link.kind == "plane":
         part = plane_link(link.name, QuadMesh(link.X[used], cells, link.thickness), material, link.axes)
     else:
-        part = solid_link(link.name, HexMesh(link.X[used], cells, way=link.way), material, link.axes)
+        faces = _slice_faces(link, elements, used)
+        part = solid_link(link.name, HexMesh(link.X[used], cells, faces, link.way), material, link.axes)
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
     assert distance.max() <= SAME * link.size  # noqa: S101
     return part, same
+
+
+def _slice_faces(
+    link: Link, elements: Int[np.ndarray, " e"], used: Int[np.ndarray, " n"]
+) -> tuple[Face, ...]:
+    """Faces of a link that have names, with the sides that are of some of its elements, if any."""
+    mesh, faces = link.basis.mesh, []
+    for each in link.faces:
+        here = each.facets[np.isin(mesh.f2t[0, each.facets], elements)]
+        faces.append(replace(each.face, sides=np.searchsorted(used, mesh.facets[:, here].T)))
+    return tuple(faces)
 
 
 def _cut(a: Link, b: Link, number: int) -> Cut | None:

@@ -12,7 +12,7 @@ import skfem
 from jaxtyping import Float, Int
 from skfem.io.meshio import HEX_MAPPING
 
-from kedfem.links.record import Link, Mass, mass_constants, read_only
+from kedfem.links.record import Link, LinkFace, Mass, mass_constants, read_only
 from kedfem.mesh import HexMesh
 from kedfem.mesh.hexahedra import CELL_TYPES
 from kedfem.scene import Material
@@ -134,6 +134,22 @@ def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:
     return np.asarray(turned.data)
 
 
+def link_faces(basis: skfem.Basis, mesh: HexMesh) -> tuple[LinkFace, ...]:
+    """Faces of a mesh that have names, as facets of its function space, whose first functions are those of corners."""
+    if not mesh.faces:
+        return ()
+    corners = np.unique(mesh.cells[:, :8])
+    facets = basis.mesh.boundary_facets()
+    keys = np.sort(basis.mesh.facets[:, facets].T, axis=1)
+    number = {tuple(key): int(facet) for key, facet in zip(keys.tolist(), facets, strict=True)}
+    out = []
+    for face in mesh.faces:
+        sides = np.sort(np.searchsorted(corners, face.sides), axis=1).tolist()
+        found = np.array([number[tuple(side)] for side in sides if tuple(side) in number], dtype=np.int64)
+        out.append(LinkFace(face, found))
+    return tuple(out)
+
+
 def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
     """The record of a hexahedral link.
 
@@ -156,5 +172,5 @@ def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndar
         name=name, kind="solid", X=X, one=one, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
         axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
         volume=m1[:, 0] / material.density,
-        E=material.youngs_modulus, lame=material.lame(), basis=basis, way=mesh.way,
+        E=material.youngs_modulus, lame=material.lame(), basis=basis, faces=link_faces(basis, mesh), way=mesh.way,
     )  # fmt: skip

@@ -15,8 +15,6 @@ from kedfem.links.record import Link
 
 CYLINDER_TOLERANCE = 1e-3  # of the radius, between the corner nodes of one bore
 PLANE_TOLERANCE = 1e-6  # of the link's size
-FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
-AROUND = 0.1  # of a bore's radius: how near the middle of one of its facets may be to the axis
 SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved face
 
 
@@ -96,48 +94,6 @@ def boundary(
     return facets, corners, normal * outward[:, None]
 
 
-def cylinder(
-    link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]
-) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest closed bore about the axis."""
-    facets, corners, normals = boundary(link)
-    r = corners - point
-    r = r - (r @ axis)[..., None] * axis
-    radius = np.linalg.norm(r, axis=2)
-    mean = radius.mean(axis=1)
-    middle = r.mean(axis=1)
-    inward = np.einsum("fk,fk->f", normals, middle) < -0.5 * np.linalg.norm(middle, axis=1)
-    # a facet around the axis, whose corners are as far from it too, is no part of a bore
-    inward &= np.linalg.norm(middle, axis=1) > AROUND * mean
-    size = np.ptp(link.X, axis=0).max()
-    round_ = (np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean) & (mean > PLANE_TOLERANCE * size) & inward
-    if not round_.any():
-        return facets[:0]
-    same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
-    centre = r[same].mean(axis=(0, 1))
-    closed = np.linalg.norm(centre) < 0.3 * mean[same].min()  # facets all round, not on one side only
-    along = (corners[same] - point) @ axis
-    away = max(0.0, float(along.min()), -float(along.max()))
-    near = away <= FAR * (np.ptp(along) + mean[same].min())
-    return facets[same] if closed and near else facets[:0]
-
-
-def sphere(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest ball or ball seat about the point."""
-    facets, corners, normals = boundary(link)
-    radius = np.linalg.norm(corners - point, axis=2)
-    mean = radius.mean(axis=1)
-    round_ = np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean
-    if not round_.any():
-        return facets[:0]
-    same = round_ & (np.abs(mean - mean[round_].min()) <= CYLINDER_TOLERANCE * mean)
-    if same.sum() < 12:  # a few facets may be equidistant by chance
-        return facets[:0]
-    # a cylinder's facets at one height are equidistant too, but their normals lie in a plane
-    spread = np.linalg.eigvalsh(normals[same].T @ normals[same] / same.sum())
-    return facets[same] if spread[0] > 0.05 else facets[:0]
-
-
 def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
     """Facets of the plane face that the point lies in: within its plane and inside its extent."""
     facets, corners, normals = boundary(link)
@@ -193,7 +149,14 @@ def connected(
     size: int,
 ) -> Bool[np.ndarray, " f"]:
     """Which facets can be reached from one of them over the pairs that are joined."""
+    label = components(first, second, joined, size)
+    return np.asarray(label == label[seed])
+
+
+def components(
+    first: Int[np.ndarray, " k"], second: Int[np.ndarray, " k"], joined: Bool[np.ndarray, " k"], size: int
+) -> Int[np.ndarray, " f"]:
+    """Of each facet the number of the piece that it belongs to, of those that hang together over the pairs joined."""
     ones = np.ones(np.count_nonzero(joined))
     graph = sp.csr_array((ones, (first[joined], second[joined])), shape=(size, size))
-    component = connected_components(graph, directed=False)[1]
-    return np.asarray(component == component[seed])
+    return np.asarray(connected_components(graph, directed=False)[1])

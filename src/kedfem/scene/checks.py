@@ -174,6 +174,7 @@ def joint_faults(parts: Parts) -> Iterator[str]:
             yield joint.fault("links", "must hold a link, got the ground twice")
         elif len(names) == 2 and names[0] == names[1]:
             yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
+        yield from seat_faults(joint, parts)
         if joint.word("kind") == "prismatic":
             if len(names) == 2 and GROUND not in names:
                 got = f"got {names[0]!r} and {names[1]!r}"
@@ -191,6 +192,21 @@ def joint_faults(parts: Parts) -> Iterator[str]:
             yield line(link.where, "must be held by a joint, got none")
         elif link.name not in reached:
             yield line(link.where, "must be connected with the ground through joints, got no way there")
+
+
+def seat_faults(joint: Entry, parts: Parts) -> Iterator[str]:
+    """Ports and faces of links that the joint does not join, and faces of links that have none."""
+    names = link_names(joint)
+    for key in ("port", "faces"):
+        given = joint.raw.get(key)
+        for name in given if isinstance(given, Mapping) else ():
+            link = parts.links.get(name)
+            if name not in names or name == GROUND:
+                own = [each for each in names if each != GROUND]
+                yield joint.fault(key, unknown_name("a link of the joint", str(name), own))
+            elif key == "faces" and link is not None and fidelity(link) not in {"solid", "rigid"}:
+                noun = NOUNS.get(fidelity(link), fidelity(link))
+                yield joint.fault(key, f"must name faces of a solid, got {name!r}, which is a {noun}", name)
 
 
 def connected(start: str, pairs: list[list[str]]) -> set[str]:

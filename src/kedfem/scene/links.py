@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
 from kedfem.scene.base import FileName, Record, refuse
+from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
 from kedfem.scene.points import Axis, Point
 from kedfem.scene.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
+from kedfem.scene.wording import shown
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
 Element = Literal["hex27", "hex20", "hex8", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
 Count = Annotated[StrictInt, Field(ge=1)]
+PORTS = ("averaged", "stiff")
+Port = Literal["averaged", "stiff"]
 
 
 def counts(value: object) -> object:
@@ -75,8 +79,8 @@ class LinkScene(Record):
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Element | None = None
-    """hex20 (or hex27, hex8) for a solid, quad9 for a plane link, beam3 (or beam2, 4, 5, 7, 9: nodes per element) for a
-    beam"""
+    """hex20 (or hex27, hex8) for a solid, hex27 (or these) for one from CAD, quad9 for a plane link, beam3 (or beam2,
+    4, 5, 7, 9: nodes per element) for a beam"""
     min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
     """least scaled Jacobian of the elements of a solid or plane link"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
@@ -101,8 +105,14 @@ class LinkScene(Record):
             refuse([(("step",), "must stand without shape, got both")])
         if self.fidelity == "reduced":
             self.fill(fidelity=self.family, reduced=True)
-        element = self.element or (ELEMENTS[self.family] if self.shape is not None else None)
+        element = self.element or self._usual_element()
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
+
+    def _usual_element(self) -> str | None:
+        """Of a part from CAD, which may be curved all over, the one whose geometry is as rich as can be."""
+        if isinstance(self.shape, Cad) and self.family == "solid":
+            return "hex27"
+        return ELEMENTS[self.family] if self.shape is not None else None
 
     @property
     def family(self) -> Literal["solid", "plane", "beam"]:
@@ -129,6 +139,36 @@ class LinkScene(Record):
         return {"elements_across": across}
 
 
+def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
+    """Something for each of several links, by their names."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise fault(f"must be a table by names of links, got {shown(value)}")
+    return {name: what(each) for name, each in value.items()}
+
+
+def ports(value: object) -> object:
+    """How a joint holds its seats: one word, or one for each link."""
+    if isinstance(value, Mapping):
+        return of_links(value, ports)
+    if value not in PORTS:
+        raise fault(one_of(list(PORTS), value))
+    return value
+
+
+def face_names(value: object) -> object:
+    """One or several names of faces for each link."""
+
+    def names(one: object) -> tuple[str, ...]:
+        several = [one] if isinstance(one, str) else one
+        if not isinstance(several, (list, tuple)) or not several:
+            raise fault(f"must be the name of a face or a list of names, got {shown(one)}")
+        if not all(isinstance(name, str) and name for name in several):
+            raise fault(f"must be the name of a face or a list of names, got {shown(one)}")
+        return tuple(several)
+
+    return of_links(value, names)
+
+
 class Joint(Record):
     """A joint between two links, or a link and the ground."""
 
@@ -141,6 +181,16 @@ class Joint(Record):
     axis: Axis | None = None
     """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), a slider's direction (required);
     for a ball or a weld the axis of the bore that holds it"""
+    port: Annotated[Port | dict[str, Port], BeforeValidator(ports)] = "averaged"
+    """how it holds bores and faces of solids and plane links: by their mean displacement and turn, or so that they keep
+    their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "stiff" }`"""
+    faces: Annotated[dict[str, tuple[str, ...]], BeforeValidator(face_names)] = Field(default_factory=dict)
+    """of a link from CAD, or from a mesh file with groups: the name of the face that holds it, or a list of names, by
+    link, `{ rod = "pin_bore" }`; if not given, what lies about `at`"""
+
+    def stiff(self, link: str) -> bool:
+        """Whether the seat on a link keeps its shape."""
+        return (self.port.get(link) if isinstance(self.port, dict) else self.port) == "stiff"
 
     @model_validator(mode="after")
     def _hinge_along_z(self) -> Self:

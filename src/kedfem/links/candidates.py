@@ -1,0 +1,228 @@
+"""What a link offers to joints: bores, journals, balls, plane faces; by name if its faces have names, else as they fit.
+
+For messages, and for bores whose axis nobody gives.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.optimize import least_squares
+
+from kedfem.links.record import Link, LinkFace
+from kedfem.links.rounds import CLOSED
+from kedfem.links.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface
+
+FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
+FEWEST = 3  # facets that a cylinder or a ball is told from
+ROUNDED = (
+    0.02  # least mean square of normals along any direction, of a ball; less along the axis of a cylinder
+)
+TRIMMED = 5  # times that the worse half of facets is left out
+SEVERAL = 20  # cylinders and balls that hang together
+SOME = 0.15  # of a ball's facets: less is a rounded corner
+
+Kind = Literal["bore", "journal", "ball seat", "ball", "plane face", "face"]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A surface that a joint could sit on.
+
+    name : of a face that has one, else empty
+    centre, direction, radius : as of `mesh.hexahedra.Face`; nan where they have no meaning
+    length : along the axis of a cylinder, else 0 [m]
+    """
+
+    kind: Kind
+    name: str
+    centre: Float[np.ndarray, "3"]
+    direction: Float[np.ndarray, "3"]
+    radius: float
+    length: float = 0.0
+
+    @property
+    def cylindrical(self) -> bool:
+        """Whether it has an axis to turn about."""
+        return self.kind in {"bore", "journal"}
+
+    def distance(self, point: Float[np.ndarray, "3"]) -> float:
+        """From a point to its axis, as far as that goes, or to its centre [m]."""
+        r = point - self.centre
+        if self.cylindrical:
+            along = np.clip(r @ self.direction, -self.length / 2, self.length / 2)
+            r = r - along * self.direction
+        return float(np.linalg.norm(r))
+
+    def beside(self, point: Float[np.ndarray, "3"]) -> float:
+        """From a point to its axis, however long [m]."""
+        r = point - self.centre
+        return float(np.linalg.norm(r - (r @ self.direction) * self.direction))
+
+
+def candidates(link: Link) -> list[Candidate]:
+    """All of a solid link: those with names if there are any, else round ones and plane faces."""
+    link = link.full or link
+    planes = link.kind == "solid" and not link.faces
+    return [*round_candidates(link), *(_planes(link) if planes else ())]
+
+
+def round_candidates(link: Link) -> list[Candidate]:
+    """Those of a solid link with names; if there are none, closed cylinders and balls as they fit."""
+    if link.kind != "solid":
+        return []
+    return [_named(link, each) for each in link.faces] or list(_fitted(link))
+
+
+def _named(link: Link, each: LinkFace) -> Candidate:
+    face = each.face
+    round_: dict[tuple[str, bool], Kind] = {
+        ("cylinder", True): "bore",
+        ("cylinder", False): "journal",
+        ("sphere", True): "ball seat",
+        ("sphere", False): "ball",
+    }
+    kind = round_.get((face.kind, face.inward), "plane face" if face.kind == "plane" else "face")
+    length = 0.0
+    if face.kind == "cylinder" and len(each.facets):
+        length = float(np.ptp(link.X[link.basis.mesh.facets[:, each.facets]] @ face.direction))
+    return Candidate(kind, face.name, face.centre, face.direction, face.radius, length)
+
+
+def _fitted(link: Link) -> Iterator[Candidate]:
+    """Closed cylinders and balls among the curved facets that hang together over smooth edges."""
+    facets, corners, normals = boundary(link)
+    first, second = neighbours(link, facets)
+    bent = _bent(link, facets, corners, normals, first, second)
+    smooth = bent[first] & bent[second] & (np.einsum("ek,ek->e", normals[first], normals[second]) > SMOOTH)
+    label = components(first, second, smooth, len(facets))
+    for number in np.unique(label[bent]):
+        left = np.flatnonzero(bent & (label == number))
+        for _ in range(SEVERAL):
+            kept, found = _best(corners[left], normals[left])
+            if found is None:
+                break
+            if found.length >= 0:
+                yield found
+            left = left[~kept]
+
+
+def _bent(
+    link: Link,
+    facets: Int[np.ndarray, " f"],
+    corners: Float[np.ndarray, "f c 3"],
+    normals: Float[np.ndarray, "f 3"],
+    first: Int[np.ndarray, " k"],
+    second: Int[np.ndarray, " k"],
+) -> Bool[np.ndarray, " f"]:
+    """Facets that are curved; of 8-node hexahedra, which have none, those with a smooth edge to one turned from them."""
+    level = PLANE_TOLERANCE * link.size
+    x = surface(link, facets).x
+    height = np.abs(np.einsum("fqk,fk->fq", x - corners[:, :1], normals)).max(axis=1)
+    bent = np.asarray(height > level)
+    if len(link.basis.element_dofs) == 8:
+        turned = np.einsum("ek,ek->e", normals[first], normals[second])
+        edge = (turned > SMOOTH) & (turned < 1 - 1e-6)
+        bent[np.concatenate([first[edge], second[edge]])] = True
+    return bent
+
+
+def _best(
+    corners: Float[np.ndarray, "f c 3"], normals: Float[np.ndarray, "f 3"]
+) -> tuple[Bool[np.ndarray, " f"], Candidate | None]:
+    """Which facets lie on one cylinder or ball, and it; of length -1 if it is but a part that no joint sits on.
+
+    A whole ball comes first, since its belt is nearly a cylinder; then cylinders with other facets beside them, as
+    rounded edges are; then balls with such.
+    """
+    for ball, rounds in ((True, 1), (False, TRIMMED), (True, TRIMMED)):
+        kept = np.ones(len(corners), bool)
+        for _ in range(rounds):
+            if kept.sum() < FEWEST:
+                break
+            values, vectors = np.linalg.eigh(normals[kept].T @ normals[kept] / kept.sum())
+            if ball and values[0] < ROUNDED:
+                break
+            centre, axis, radius = _fit(corners[kept].reshape(-1, 3), None if ball else vectors[:, 0])
+            off = np.abs(_distances(corners, centre, axis) - radius).max(axis=1) / radius
+            if (off[kept] <= FITS).all():
+                on = off <= FITS  # with those that an earlier fit had left out
+                return on, _candidate(corners[on], normals[on], centre, axis, radius)
+            kept = kept & (off <= max(FITS, float(np.median(off[kept]))))
+    return np.zeros(len(corners), bool), None
+
+
+def _fit(
+    x: Float[np.ndarray, "p 3"], axis: Float[np.ndarray, "3"] | None
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"] | None, float]:
+    """Centre, axis and radius of the cylinder through points whose axis is nearly known; of the ball if none is."""
+    middle = x.mean(axis=0)
+    y = x - middle
+    size = float(np.abs(y).max())
+    plane = np.eye(3) if axis is None else np.linalg.svd(axis[None])[2][1:]
+    z = y @ plane.T / size
+    A = np.column_stack([2 * z, np.ones(len(z))])
+    solved = np.linalg.lstsq(A, (z**2).sum(axis=1), rcond=None)[0]
+    c, r = solved[:-1], float(np.sqrt(max(solved[-1] + solved[:-1] @ solved[:-1], 1e-300)))
+    if axis is None:
+        return middle + size * c @ plane, None, size * r
+    given = axis
+
+    def turned(p: np.ndarray) -> np.ndarray:
+        a = given + p[3:] @ plane
+        return np.asarray(a / np.linalg.norm(a))
+
+    def off(p: np.ndarray) -> np.ndarray:
+        return np.asarray(_distances(y / size, p[:2] @ plane, turned(p)) - p[2])
+
+    p = least_squares(off, np.array([*c, r, 0.0, 0.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+    a = turned(p)
+    heights = x @ a
+    on = middle + size * p[:2] @ plane
+    return on + ((heights.min() + heights.max()) / 2 - on @ a) * a, a, float(size * p[2])
+
+
+def _distances(
+    x: Float[np.ndarray, "*k 3"], centre: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
+) -> Float[np.ndarray, "*k"]:
+    r = x - centre
+    if axis is not None:
+        r = r - (r @ axis)[..., None] * axis
+    return np.asarray(np.linalg.norm(r, axis=-1))
+
+
+def _candidate(
+    corners: Float[np.ndarray, "f c 3"],
+    normals: Float[np.ndarray, "f 3"],
+    centre: Float[np.ndarray, "3"],
+    axis: Float[np.ndarray, "3"] | None,
+    radius: float,
+) -> Candidate:
+    r = corners.mean(axis=1) - centre
+    inward = bool(np.einsum("fk,fk->f", r, normals).mean() < 0)
+    if axis is None:
+        # the mean of the corners of a whole ball is its centre, that of a corner's rounding lies on it
+        part = np.linalg.norm(r.mean(axis=0)) / radius
+        length = 0.0 if part < 1 - 2 * SOME else -1.0
+        return Candidate("ball seat" if inward else "ball", "", centre, np.full(3, np.nan), radius, length)
+    r = r - (r @ axis)[:, None] * axis
+    closed = np.linalg.norm(r.mean(axis=0)) < CLOSED * radius
+    length = float(np.ptp(corners @ axis)) if closed else -1.0
+    sign = np.sign(axis[np.abs(axis).argmax()])
+    return Candidate("bore" if inward else "journal", "", centre, sign * axis, radius, length)
+
+
+def _planes(link: Link) -> Iterator[Candidate]:
+    """Flat facets that hang together in one plane."""
+    facets, corners, normals = boundary(link)
+    first, second = neighbours(link, facets)
+    bent = _bent(link, facets, corners, normals, first, second)
+    level = np.einsum("ek,ek->e", normals[first], normals[second]) > 1 - 1e-9
+    label = components(first, second, level & ~bent[first] & ~bent[second], len(facets))
+    for number in np.unique(label[~bent]):
+        here = (label == number) & ~bent
+        yield Candidate(
+            "plane face", "", corners[here].mean(axis=(0, 1)), normals[here].mean(axis=0), float("nan")
+        )

@@ -1,0 +1,133 @@
+"""What to say where a joint finds nothing on a link, or too much: what is near, in which direction, in which units."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.links.candidates import Candidate, candidates
+from kedfem.links.record import Link
+from kedfem.links.rounds import Round
+
+MOST = 8  # candidates in a message
+SMALL = 0.1  # [m]: shorter lengths are told in millimetres
+STRAIGHT = 0.05  # [deg]: axes within are one direction
+ASKEW = 45.0  # [deg]: axes further off are others
+SCALES = (1000.0, 0.001)
+
+Vector = Float[np.ndarray, "3"]
+
+
+def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = None) -> str:
+    """The message that a link has nothing at a joint's point, with what it has instead, nearest first.
+
+    Parameters
+    ----------
+    where : how messages name the joint
+    axis : of the bore that was looked for
+    """
+    point = in_its_plane(link, point)
+    nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
+    gap = float(np.linalg.norm(nearest - point))
+    what = "a node of" if not link.meshed else "a bore or a flat face of"
+    told = (
+        f"{where}: must sit on {what} link '{link.name}' at {shown(point)}, "
+        f"got none there (nearest node {shown(nearest)}, {gap:.3g} m away)"
+    )
+    level = 1e-6 * link.size  # what is as near: the narrowest first
+    offered = sorted(candidates(link), key=lambda each: (round(each.distance(point) / level), each.radius))
+    hints = [_units(link, point, axis, gap, offered), _beside(point, axis, offered), _listed(offered, point)]
+    return "; ".join([told, *(hint for hint in hints if hint)])
+
+
+def ambiguous(link: Link, where: str, point: Vector, found: Sequence[Round]) -> str:
+    """The message that a joint could sit on several bores or journals."""
+    each = ", ".join(
+        f"{'bore' if x.inward else 'journal'} of radius {length(x.radius)}, {length(x.low)} to {length(x.high)} along it"
+        for x in found
+    )
+    return (
+        f"{where}: must sit on one bore or journal of link '{link.name}' at {shown(point)}, got {len(found)} that are as "
+        f"near: {each}; give the joint a point within one of them along the axis, or name its face in faces"
+    )
+
+
+def _units(
+    link: Link, point: Vector, axis: Vector | None, gap: float, offered: Sequence[Candidate]
+) -> str | None:
+    """Whether the part would have the joint's point if it were 1000 times larger or smaller."""
+    low, high = link.nodes.min(axis=0), link.nodes.max(axis=0)
+    room = 0.01 * link.size
+    for scale in SCALES:
+        if np.linalg.norm(point) < 0.1 * scale * link.size:
+            continue  # much of what is large is near the origin
+        boxed = bool(((scale * (low - room) <= point) & (point <= scale * (high + room))).all())
+        seated = any(each.cylindrical and _fits(each, point / scale, axis) for each in offered)
+        if seated or (boxed and gap > link.size):
+            word = "larger" if scale > 1 else "smaller"
+            return f"the part seems to be in other units: 1000 times {word} it would fit (scale = {scale:g})"
+    return None
+
+
+def _fits(each: Candidate, point: Vector, axis: Vector | None) -> bool:
+    straight = axis is None or abs(each.direction @ axis) > np.cos(np.radians(STRAIGHT))
+    return (
+        bool(straight and each.beside(point) <= 0.01 * each.radius)
+        and each.distance(point) <= 2 * each.length
+    )
+
+
+def _beside(point: Vector, axis: Vector | None, offered: Sequence[Candidate]) -> str | None:
+    """A bore or journal that passes the point, but in another direction or a little off."""
+    if axis is None:
+        return None
+    here = [each for each in offered if each.cylindrical and each.distance(point) <= each.radius]
+    for each in here:
+        name = f"a {each.kind} of radius {length(each.radius)}{_quoted(each)}"
+        off = float(np.degrees(np.arccos(min(1.0, abs(float(each.direction @ axis))))))
+        if STRAIGHT < off <= ASKEW:
+            return f"{name} passes here, but its axis is {off:.2g} deg off: it is {shown(each.direction)}"
+        if off <= STRAIGHT:
+            return f"{name} is here, but its axis is {length(each.beside(point))} beside the point"
+    return None
+
+
+def _listed(offered: Sequence[Candidate], point: Vector) -> str | None:
+    """Cylinders and balls, plane faces if there are none, other faces if there are none of these either."""
+    for kinds in ({"bore", "journal", "ball seat", "ball"}, {"plane face"}, {"face"}):
+        if of_kind := [each for each in offered if each.kind in kinds]:
+            told = ", ".join(
+                f"{described(each)} {length(each.distance(point))} away" for each in of_kind[:MOST]
+            )
+            more = len(of_kind) - MOST
+            return f"it has {told}" + (f", and {more} more" if more > 0 else "")
+    return None
+
+
+def described(each: Candidate) -> str:
+    """A candidate in words: ``bore 'pin' of radius 6 mm about (0, 0, 1) at (0.1, 0, 0)``."""
+    told = each.kind + _quoted(each)
+    if np.isfinite(each.radius):
+        told += f" of radius {length(each.radius)}"
+    if np.isfinite(each.direction).all():
+        told += f" {'about' if each.cylindrical else 'facing'} {shown(each.direction)}"
+    return f"{told} at {shown(each.centre)}"
+
+
+def _quoted(each: Candidate) -> str:
+    return f" '{each.name}'" if each.name else ""
+
+
+def length(x: float) -> str:
+    """A length in metres, in millimetres if it is small."""
+    return f"{1e3 * x:.4g} mm" if abs(x) < SMALL else f"{x:.4g} m"
+
+
+def shown(x: Vector) -> str:
+    """A point [m] or direction."""
+    return "(" + ", ".join(f"{v:.6g}" for v in np.round(x, 12) + 0.0) + ")"
+
+
+def in_its_plane(link: Link, point: Vector) -> Vector:
+    """The point as a plane link sees it, which knows no z."""
+    return np.array([*point[:2], link.X[0, 2]]) if link.kind == "plane" else point
