@@ -85,6 +85,60 @@ def check(scene: ScenePath) -> None:
 
 
 @app.command()
+def mesh(
+    part: Annotated[Path, typer.Argument(metavar="PART", help="A CAD file: STEP, IGES or BREP.")],
+    solid: Annotated[str | None, typer.Option(metavar="NAME", help="Which solid of an assembly.")] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Edge length of the elements, e.g. '3 mm'.")
+    ] = None,
+    across: Annotated[
+        int | None, typer.Option(help="Elements across the smallest width; 2 if nothing else is given.")
+    ] = None,
+    unknowns: Annotated[int | None, typer.Option(help="About so many unknowns.")] = None,
+    element: Annotated[str, typer.Option(metavar="KIND", help="hex27, hex20 or hex8.")] = "hex27",
+    scale: Annotated[
+        float | None, typer.Option(help="Metres per unit of the file, if not its own unit.")
+    ] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="Where mesh and picture go; default: beside the part.")
+    ] = None,
+) -> None:
+    """Mesh one part from CAD with hexahedra: a mesh file, a picture, its quality."""
+    from kedfem.errors import OutputError
+    from kedfem.mesh import part_mesh
+    from kedfem.output.mesh_picture import write_mesh_picture
+    from kedfem.output.vtu import write_mesh
+    from kedfem.report import mesh_tables
+    from kedfem.results import ready_folder
+    from kedfem.scene import link_from
+
+    shape = {"kind": "cad", "file": part.name, "solid": solid, "scale": scale}
+    sizes = {"size": size, "elements_across": across, "unknowns": unknowns}
+    given = {"shape": _given(shape), "mesh": _given(sizes), "element": element, "material": "steel"}
+    link = link_from(given)
+    with _progress() as watch:
+        watch("mesh", 0, 0)
+        made = part_mesh(link, part.parent)
+    for table in mesh_tables(part.name, made):
+        out.print(table)
+    target = ready_folder(folder or part.parent)
+    stem = part.stem if solid is None else f"{part.stem}-{solid}"
+    write_mesh(made, target / f"{stem}-mesh.vtu")
+    words = "the mesh, for ParaView or shape.kind = 'mesh'"
+    out.print(f"{target / f'{stem}-mesh.vtu'}  {words}", markup=False, soft_wrap=True)
+    try:
+        write_mesh_picture([(part.name, made)], target / f"{stem}-mesh.png", f"{part.name}: {made.way}")
+    except OutputError as error:
+        err.print(f"warning: {error}", style="yellow", markup=False)
+    else:
+        out.print(f"{target / f'{stem}-mesh.png'}  its picture", markup=False, soft_wrap=True)
+
+
+def _given(keys: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in keys.items() if value is not None}
+
+
+@app.command()
 def accuracy(
     scene: ScenePath,
     folder: Annotated[
@@ -151,7 +205,8 @@ def bench(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="One of: accuracy, beams, elements, following, growth, plane, reduction, solvers, start, steps, suite.",
+            help="One of: accuracy, beams, elements, following, growth, plane, ports, reduction, solvers, start, steps, "
+            "suite.",
         ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),

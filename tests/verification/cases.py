@@ -25,6 +25,7 @@ MODULES = (
     "mechanisms",
     "nominal_frames",
     "following",
+    "cad",
 )
 
 

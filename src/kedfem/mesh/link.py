@@ -6,17 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from kedfem.errors import MeshError, SceneError
+from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.file import mesh_from_file
 from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.hexahedra import HexMesh, frame_along, linear, quadratic, rectangle_quads, serendipity
+from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, rectangle_quads
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
 from kedfem.mesh.quads import quad_mesh
 from kedfem.mesh.quality import checked_mesh
+from kedfem.mesh.ways import cad_mesh
 from kedfem.scene import (
     Arc,
     Bar,
+    Cad,
     Extrusion,
     LinkScene,
     MeshFile,
@@ -54,12 +57,30 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
         The shape cannot be meshed as asked, a file cannot be used, or an element is not good enough.
     """
     where = f"links.{name}"
-    if isinstance(link.shape, MeshFile):
-        mesh = mesh_from_file(f"{where}.shape.file", folder / link.shape.file, link.shape.scale)
-    else:
-        mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
-    form = {"hex8": linear, "hex20": serendipity, "hex27": quadratic}[str(link.element)]
-    return checked_mesh(name, form(mesh), link.min_quality)
+    match link.shape:
+        case MeshFile() as shape:
+            mesh = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
+        case Cad() as shape:
+            key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
+            mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder)
+        case _:
+            mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
+    return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)
+
+
+def part_mesh(link: LinkScene, folder: Path) -> HexMesh:
+    """The mesh of a part from CAD on its own; messages name its file, a solid of an assembly is to be named.
+
+    Raises
+    ------
+    MeshError
+        As `link_mesh`.
+    """
+    if not isinstance(link.shape, Cad):
+        raise TypeError("a part on its own comes from CAD")
+    where = link.shape.file
+    mesh = cad_mesh(CadKeys(where, "--solid"), Path(where).stem, link, link.shape, folder)
+    return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)
 
 
 def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:
@@ -68,7 +89,7 @@ def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:
     Parameters and errors are those of `link_mesh`; there are 9 nodes to an element.
     """
     plate = link_plate(f"links.{name}", link, folder)
-    return checked_mesh(name, middle_mesh(plate), link.min_quality)
+    return checked_mesh(f"links.{name}", middle_mesh(plate), link.min_quality)
 
 
 def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
@@ -90,7 +111,9 @@ def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
             return part_plate(where, shape, link.mesh, folder)
         case other:
             kind = "no shape" if other is None else other.kind
-            raise MeshError(f"{where}.shape: must be bar, plate_link, extrusion, part, mesh or cad, got {kind}")
+            raise MeshError(
+                f"{where}.shape: must be bar, plate_link, extrusion, part, mesh or cad, got {kind}"
+            )
 
 
 def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:

@@ -1,6 +1,7 @@
 """A part from CAD on its own: its mesh, its faces, its quality."""
 
 import numpy as np
+from jaxtyping import Float
 from rich.table import Table
 from rich.text import Text
 
@@ -8,6 +9,9 @@ from kedfem.mesh import HexMesh, mesh_quality
 from kedfem.mesh.hexahedra import Face
 from kedfem.report.links import ELEMENTS
 from kedfem.report.words import with_prefix
+
+KINDS = ("bore", "journal", "ball seat", "ball", "plane", "part of a cylinder")
+CLOSED = 0.3  # how far the middle of a closed cylinder's sides may be off its axis, of its radius
 
 
 def mesh_tables(name: str, mesh: HexMesh) -> list[Table]:
@@ -21,32 +25,40 @@ def mesh_tables(name: str, mesh: HexMesh) -> list[Table]:
     table.add_row("unknowns", str(3 * len(mesh.points)))
     table.add_row("extent", " × ".join(with_prefix(float(side), "m") for side in high - low))
     table.add_row("worst scaled Jacobian", f"{quality.least:.3f} at ({x:.4g}, {y:.4g}, {z:.4g})")
-    seats = Table(
-        title="Faces that joints can sit on", caption="of planes: the outward normal; all lengths in m"
-    )
-    for column in ("face", "kind", "radius", "position", "axis"):
-        seats.add_column(column, justify="left" if column in ("face", "kind") else "right")
-    for face in sorted(mesh.faces, key=lambda face: (face.kind != "cylinder", face.kind != "sphere")):
-        if face.kind != "other":
-            seats.add_row(Text(face.name), _face_kind(face), *_face_place(face))
-    counts, edges = np.histogram(quality.scaled_jacobian, bins=10, range=(0.0, 1.0))
     bars = Table(title="Scaled Jacobian of the elements", show_header=False)
+    edges, counts = quality.histogram()
     for count, low_end in zip(counts, edges, strict=False):
         if count:
             bars.add_row(f"{low_end:.1f}", str(count), "█" * int(np.ceil(40 * count / counts.max())))
-    return [table, *([seats] if seats.row_count else []), bars]
+    return [table, *([_seats(mesh)] if mesh.faces else []), bars]
 
 
-def _face_kind(face: Face) -> str:
-    words = {"cylinder": ("journal", "bore"), "sphere": ("ball", "ball seat")}
-    return words[face.kind][face.inward] if face.kind in words else face.kind
-
-
-def _face_place(face: Face) -> tuple[str, str, str]:
-    """Radius, position and direction in words."""
-    x, y, z = face.centre
-    radius = "" if np.isnan(face.radius) else f"{face.radius:.5g}"
-    axis = (
-        "" if np.isnan(face.direction).any() else "({:.4g}, {:.4g}, {:.4g})".format(*(face.direction + 0.0))
+def _seats(mesh: HexMesh) -> Table:
+    """Faces with a form, those first that a joint finds by itself."""
+    table = Table(
+        title="Faces", caption="lengths in mm; for joints.NAME.faces, where a joint does not find its own"
     )
-    return radius, f"({x:.5g}, {y:.5g}, {z:.5g})", axis
+    for column in ("face", "kind", "radius", "position", "axis or normal"):
+        table.add_column(column, justify="left" if column in ("face", "kind") else "right", no_wrap=True)
+    rows = [(_face_kind(mesh, face), face) for face in mesh.faces if face.kind != "other"]
+    for kind, face in sorted(rows, key=lambda row: KINDS.index(row[0])):
+        radius = "" if np.isnan(face.radius) else f"{1e3 * face.radius:.4g}"
+        direction = "" if np.isnan(face.direction).any() else _shown(face.direction, 3)
+        table.add_row(Text(face.name), kind, radius, _shown(1e3 * face.centre, 2), direction)
+    return table
+
+
+def _face_kind(mesh: HexMesh, face: Face) -> str:
+    """What a joint can take a face for: cylinders only where they are closed."""
+    if face.kind != "cylinder":
+        return ("ball seat" if face.inward else "ball") if face.kind == "sphere" else "plane"
+    r = mesh.points[face.sides].mean(axis=1) - face.centre
+    r -= np.outer(r @ face.direction, face.direction)
+    if np.linalg.norm(r.mean(axis=0)) > CLOSED * face.radius:
+        return "part of a cylinder"
+    return "bore" if face.inward else "journal"
+
+
+def _shown(x: Float[np.ndarray, "3"], digits: int) -> str:
+    """A point or direction without the noise of rounding."""
+    return "({:g}, {:g}, {:g})".format(*(np.round(x, digits) + 0.0))

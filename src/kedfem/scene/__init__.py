@@ -24,7 +24,7 @@ from kedfem.scene.materials import Material
 from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
-from kedfem.scene.read import read_scene, scene_from
+from kedfem.scene.read import link_from, read_scene, scene_from
 from kedfem.scene.scene import Scene
 from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
 from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
@@ -89,6 +89,7 @@ __all__ = [
     "following_links",
     "inertia_tensor",
     "link_frames",
+    "link_from",
     "load_factor",
     "part_geometry",
     "rayleigh",

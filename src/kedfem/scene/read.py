@@ -6,7 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
+from kedfem.errors import SceneError
+from kedfem.scene.checks import meshing_faults
+from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, toml_table
+from kedfem.scene.links import LinkScene, spelt_out
+from kedfem.scene.parts import Entry
 from kedfem.scene.scene import Scene
 
 
@@ -25,6 +32,25 @@ def read_scene(path: str | Path) -> Scene:
     path = Path(path)
     raw, text = toml_table(path)
     return scene_from(raw, path.parent, source=text, stem=path.stem)
+
+
+def link_from(raw: Mapping[str, Any]) -> LinkScene:
+    """A solid link on its own, to be meshed; its faults are told by its keys, e.g. ``mesh.size``.
+
+    Raises
+    ------
+    SceneError
+        With all faults.
+    """
+    raw = spelt_out(raw)
+    try:
+        link, faults = LinkScene.model_validate(raw), []
+    except ValidationError as error:
+        link, faults = None, fault_lines(error, LinkScene, raw)
+    faults += meshing_faults(Entry((), raw, link))
+    if link is None or faults:
+        raise SceneError(list(dict.fromkeys(faults)))
+    return link
 
 
 def scene_from(

@@ -1,0 +1,222 @@
+"""Parts from CAD as links: the ladder of ways, where they go, how fine, what is kept between runs."""
+
+import math
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.errors import MeshError, SceneError
+from kedfem.mesh import HexMesh, link_mesh, mesh_quality, part_mesh, ways
+from kedfem.mesh.cad.solids import Solid
+from kedfem.scene import LinkScene, link_from, scene_from
+
+GEOMETRY = Path(__file__).parents[2] / "geometry"
+CUBE = Solid(1, "cube", 1.0, np.zeros(3), np.ones(3), ())
+
+
+def link(file: str = "crank.step", mesh: dict[str, Any] | None = None, **shape: Any) -> LinkScene:
+    given = {"kind": "cad", "file": file, **shape}
+    return link_from({"shape": given, "material": "steel", "mesh": mesh or {}})
+
+
+def made(file: str = "crank.step", mesh: dict[str, Any] | None = None, **shape: Any) -> HexMesh:
+    return part_mesh(link(file, mesh, **shape), GEOMETRY)
+
+
+def volume_and_centre(mesh: HexMesh) -> tuple[float, np.ndarray]:
+    from kedfem.links.solid import solid_link
+    from kedfem.scene import Material
+
+    material = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.3)
+    record = solid_link("part", mesh, material, np.eye(3))
+    m1 = record.m1[:, 0]
+    return float(m1.sum()), np.asarray(m1 @ record.X / m1.sum())
+
+
+class TestLadder:
+    def test_the_best_way_that_the_part_allows_is_taken_and_told(self) -> None:
+        assert "swept along z" in made().way
+        assert mesh_quality(made()).least > 0.3
+
+    def test_a_part_that_is_no_layers_is_filled_another_way_and_the_reason_told(self) -> None:
+        mesh = made("ball_ended_rod.step")
+        assert "tetrahedra" in mesh.way
+        assert "must consist of layers" in mesh.way
+        assert mesh_quality(mesh).least > 0.1
+
+    def test_a_part_that_no_way_fills_is_refused_with_the_reasons(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refused(*_: Any) -> HexMesh:
+            raise ways.OtherWayError("is not what this way wants")
+
+        monkeypatch.setattr(ways, "WAYS", (refused, refused))
+        message = r"^crank.step: must be a solid .* got none: is not what this way wants; is not what this way .*; take"
+        with pytest.raises(MeshError, match=message):
+            ways.best_mesh("crank.step", math, CUBE, ways.Sizing())
+
+    def test_the_better_of_two_poor_meshes_is_taken(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        poor, poorer = sheared(0.97, "first"), sheared(0.99, "second")
+        assert mesh_quality(poorer).least < mesh_quality(poor).least < ways.ENOUGH
+        for order in ([poor, poorer], [poorer, poor]):
+            monkeypatch.setattr(ways, "WAYS", tuple(lambda *_, mesh=mesh: mesh for mesh in order))
+            taken = ways.best_mesh("crank.step", math, CUBE, ways.Sizing())
+            assert taken.way.startswith("first")
+            assert ("worst scaled Jacobian" in taken.way) == (order[0] is poorer)
+
+
+def sheared(by: float, way: str) -> HexMesh:
+    """One hexahedron, sheared so far that its quality is √(1 − by²)."""
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    points = np.array([(x, y, z) for z in (-1, 1) for x, y in corners], dtype=float)
+    points[:, :2] = points[:, :2] @ np.array([[1, 0], [by, np.sqrt(1 - by**2)]])
+    return HexMesh(points, np.arange(8)[None], way=way)
+
+
+class TestApart:
+    """OpenCASCADE and gmsh break down and hang on some parts: neither may take kedfem with them."""
+
+    def test_what_hangs_is_given_up(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(ways, "LONGEST", 1)
+        with pytest.raises(
+            MeshError, match=r"^rod.step: must be a part .* work on, got none within 1 s; mend or"
+        ):
+            ways.apart("rod.step", time.sleep, 60)
+
+    def test_what_breaks_down_is_refused_and_the_next_works(self) -> None:
+        with pytest.raises(
+            MeshError, match=r"^rod.step: must be a part .* work on, got one at which they broke down"
+        ):
+            ways.apart("rod.step", os._exit, 3)
+        assert ways.apart("rod.step", math.sqrt, 4.0) == 2.0
+
+    def test_errors_come_through(self) -> None:
+        with pytest.raises(ValueError, match="math domain"):
+            ways.apart("rod.step", math.sqrt, -1.0)
+
+
+class TestPlacing:
+    def test_a_part_goes_where_the_scene_has_it(self) -> None:
+        """The crank's centre of mass lies on its own x axis."""
+        _, here = volume_and_centre(made())
+        _, there = volume_and_centre(made(origin=[1, 2, 3], towards=[1, 5, 3]))
+        assert_allclose(there, [1 - here[1], 2 + here[0], 3 + here[2]], atol=1e-9)
+
+    def test_the_z_axis_goes_as_near_to_a_direction_as_the_x_axis_allows(self) -> None:
+        axes = ways.file_axes(link(towards=[1, 0, 0], z=[5, 1, 0]).shape)  # type: ignore[arg-type]
+        assert_allclose(axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
+
+    def test_the_faces_move_with_the_part(self) -> None:
+        (bore,) = [
+            f for f in made(origin=[1, 2, 3]).faces if f.kind == "cylinder" and abs(f.radius - 0.012) < 1e-6
+        ]
+        assert bore.inward
+        assert_allclose(bore.centre[:2], [1, 2], atol=1e-6)
+        assert_allclose(abs(bore.direction), [0, 0, 1], atol=1e-6)
+
+    def test_a_scale_says_what_a_unit_is(self) -> None:
+        assert_allclose(
+            volume_and_centre(made(scale=0.002))[0], 8 * volume_and_centre(made(scale=0.001))[0], rtol=1e-6
+        )
+
+
+class TestSizes:
+    def test_smaller_elements_are_more(self) -> None:
+        counts = [len(made(mesh={"size": size}).cells) for size in (0.012, 0.006)]
+        assert 2 < counts[1] / counts[0] < 10
+
+    def test_about_as_many_unknowns_as_asked_for(self) -> None:
+        for wanted in (15_000, 40_000):
+            assert 0.75 < 3 * len(made(mesh={"unknowns": wanted}).points) / wanted < 1.33
+
+    def test_layers_are_the_least_through_each_slab(self) -> None:
+        assert len(made(mesh={"layers": 3}).cells) > 1.5 * len(made().cells)
+
+    def test_a_size_larger_than_the_part_is_refused(self) -> None:
+        with pytest.raises(
+            MeshError, match=r"crank.step: must be larger than its mesh.size 1 \[m\], got 0\.1"
+        ):
+            made(mesh={"size": 1.0})
+
+
+class TestKept:
+    def test_a_mesh_is_made_once(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path))
+        first = made()
+        monkeypatch.setattr(ways, "apart", None)
+        again = made()
+        assert np.array_equal(again.points, first.points)
+        assert again.way == first.way
+        with pytest.raises(TypeError):
+            made(mesh={"size": 0.01})
+
+    def test_a_damaged_entry_is_made_again(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path))
+        first = made()
+        for file in tmp_path.rglob("*.pkl"):
+            content = bytearray(file.read_bytes())
+            content[len(content) // 2] ^= 1
+            file.write_bytes(content)
+        assert np.array_equal(made().points, first.points)
+
+    def test_another_content_of_the_file_is_another_mesh(self, tmp_path: Path) -> None:
+        file = tmp_path / "part.step"
+        file.write_bytes((GEOMETRY / "crank.step").read_bytes())
+        before = part_mesh(link("part.step"), tmp_path)
+        file.write_bytes((GEOMETRY / "slotted_link.step").read_bytes())
+        assert len(part_mesh(link("part.step"), tmp_path).cells) != len(before.cells)
+
+
+class TestScene:
+    RAW: dict[str, Any] = {  # noqa: RUF012
+        "analysis": {"end_time": 0.01, "step": 1e-3},
+        "links": {"crank": {"material": "steel", "step": "crank.step"}},
+    }
+
+    def test_step_is_short_for_a_shape_from_cad(self) -> None:
+        scene = scene_from(self.RAW, GEOMETRY)
+        assert scene.links["crank"].shape == link().shape
+        again = scene_from(scene.model_dump(mode="json", by_alias=True, exclude_none=True), GEOMETRY)
+        assert again.links == scene.links
+
+    def test_a_solid_of_an_assembly_is_found_by_the_links_name(self) -> None:
+        raw = self.RAW | {"links": {"rod": {"material": "steel", "step": "engine.step"}}}
+        mesh = link_mesh("rod", scene_from(raw, GEOMETRY).links["rod"], GEOMETRY)
+        alone = made("connecting_rod.step")
+        assert_allclose(volume_and_centre(mesh)[0], volume_and_centre(alone)[0], rtol=1e-4)
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"step": "none.step"}, r"links.crank.step: must be a CAD file, got nothing at .*none.step"),
+            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.step: must stand without shape, got both"),
+            ({"mesh": {"unknowns": 500, "size": 0.003}}, r"links.crank.mesh.unknowns: must stand without size, got both"),
+            ({"mesh": {"elements": [4, 2, 1]}}, r"links.crank.mesh.elements: must be left out for a cad"),
+            ({"mesh": {"unknowns": 5}}, r"links.crank.mesh.unknowns: must be at least 100, got 5"),
+            ({"fidelity": "plane"}, r"links.crank.shape.kind: must be one of .* for a plane link, got 'cad'"),
+            ({"fidelity": "beam"}, r"links.crank.shape.kind: must be one of .* for a beam, got 'cad'"),
+        ],
+    )  # fmt: skip
+    def test_bad_keys_have_their_message(self, change: dict[str, Any], message: str) -> None:
+        raw = self.RAW | {"links": {"crank": self.RAW["links"]["crank"] | change}}
+        with pytest.raises(SceneError, match=message):
+            scene_from(raw, GEOMETRY)
+
+    def test_unknowns_are_for_parts_from_cad(self) -> None:
+        shape = {
+            "kind": "plate_link",
+            "between": [[0, 0], [1, 0]],
+            "width": 0.1,
+            "thickness": 0.1,
+            "bore_diameter": 0.02,
+        }
+        raw = self.RAW | {"links": {"arm": {"material": "steel", "shape": shape, "mesh": {"unknowns": 500}}}}
+        with pytest.raises(
+            SceneError, match=r"links.arm.mesh.unknowns: must be given for a part from CAD only, got one for"
+        ):
+            scene_from(raw, GEOMETRY)
