@@ -102,6 +102,10 @@ def test_the_key_belongs_to_the_contents_of_files(tmp_path: Path) -> None:
     assert contents([file]) != before
 
 
+def test_a_file_that_cannot_be_read_has_a_key_too(tmp_path: Path) -> None:
+    assert contents([tmp_path]) == contents([tmp_path / "none"])
+
+
 def test_nothing_is_kept_where_the_cache_is_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEDFEM_CACHE", "off")
     prepared(scene())

@@ -11,9 +11,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError, SceneError
+from kedfem.links.solid import solid_link
 from kedfem.mesh import HexMesh, link_mesh, mesh_quality, part_mesh, ways
 from kedfem.mesh.cad.solids import Solid
-from kedfem.scene import LinkScene, link_from, scene_from
+from kedfem.scene import LinkScene, Material, link_from, scene_from
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
 CUBE = Solid(1, "cube", 1.0, np.zeros(3), np.ones(3), ())
@@ -29,9 +30,6 @@ def made(file: str = "crank.step", mesh: dict[str, Any] | None = None, **shape: 
 
 
 def volume_and_centre(mesh: HexMesh) -> tuple[float, np.ndarray]:
-    from kedfem.links.solid import solid_link
-    from kedfem.scene import Material
-
     material = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.3)
     record = solid_link("part", mesh, material, np.eye(3))
     m1 = record.m1[:, 0]
@@ -98,6 +96,19 @@ class TestApart:
     def test_errors_come_through(self) -> None:
         with pytest.raises(ValueError, match="math domain"):
             ways.apart("rod.step", math.sqrt, -1.0)
+
+
+class TestStiffness:
+    @pytest.mark.parametrize("file", ["crank.step", "ball_ended_rod.step"])
+    def test_rigid_motions_strain_nothing(self, file: str) -> None:
+        """K0 u = 0 for the twelve fields 1, x, y, z along each axis that are rigid: [KED, App. A], to rounding."""
+        record = solid_link(
+            "part", made(file), Material(density=1, youngs_modulus=1, poisson_ratio=0.3), np.eye(3)
+        )
+        r, e = record.X - record.X.mean(axis=0), np.eye(3)
+        rigid = [np.tile(a, (record.n, 1)) for a in e] + [np.cross(a, r) / np.abs(r).max() for a in e]
+        for u in rigid:
+            assert np.abs(record.K0 @ u.ravel()).max() < 1e-12 * np.abs(record.K0).max() * np.sqrt(record.n)
 
 
 class TestPlacing:

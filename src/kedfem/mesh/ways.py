@@ -52,8 +52,6 @@ def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path
         The file cannot be used, or no way gives hexahedra.
     """
     file = folder / shape.file
-    if not file.is_file():
-        return _made(keys, name, link, shape, file)  # says what is wrong
     said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element]
     key = sha256(json.dumps(said).encode() + contents([file])).hexdigest()
     mesh: HexMesh = kept(
