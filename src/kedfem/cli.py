@@ -114,7 +114,7 @@ def mesh(
 
     shape = {"kind": "cad", "file": part.name, "solid": solid, "scale": scale}
     sizes = {"size": size, "elements_across": across, "unknowns": unknowns}
-    given = {"shape": _given(shape), "mesh": _given(sizes), "element": element, "material": "steel"}
+    given = {"shape": _given(shape), "mesh": _given(sizes), "element": element}
     link = link_from(given)
     with _progress() as watch:
         watch("mesh", 0, 0)

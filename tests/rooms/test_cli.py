@@ -15,6 +15,7 @@ import pytest
 
 import kedfem
 from kedfem.cli import DEFECT, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.mesh.file import mesh_from_file
 from kedfem.results import Results, read_results
 
 SOURCE = Path(kedfem.__file__).parents[1]
@@ -110,7 +111,7 @@ MAIN = "from kedfem.cli import main; main()"
 def test_help_names_every_command_and_each_explains_itself(run_kedfem: Command) -> None:
     said = run_kedfem("--help")
     assert said.code == 0
-    for name in ("run", "check", "accuracy", "new", "bench"):
+    for name in ("run", "check", "mesh", "accuracy", "new", "bench"):
         assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), (
             f"{name} is cut off or missing"
         )
@@ -196,6 +197,32 @@ def test_check_shows_what_would_be_modelled_and_writes_nothing(run_kedfem: Comma
     assert float(row[2]) == pytest.approx(0.6 * 0.01 * 0.025 * 2700, rel=0.05)
     assert "360 of" in said.out
     assert [p.name for p in arm.parent.iterdir()] == [arm.name]
+
+
+GEOMETRY = Path(__file__).parents[2] / "geometry"
+
+
+def test_mesh_shows_a_part_and_writes_its_mesh_and_picture(run_kedfem: Command, tmp_path: Path) -> None:
+    said = run_kedfem("mesh", GEOMETRY / "crank.step", "--folder", tmp_path / "out")
+    assert said.code == 0, said.err
+    assert "quadrilaterals swept along z" in said.out
+    assert re.search(r"│ bore +│ +12 │ +\(0, 0, -27\) │ +\(0, 0, 1\) │", said.out)
+    assert max(len(line) for line in said.out.splitlines() if "/" not in line) <= 80
+    assert (tmp_path / "out" / "crank-mesh.png").stat().st_size > 20_000
+    again = mesh_from_file("again", tmp_path / "out" / "crank-mesh.vtu", 1.0)
+    assert f" {len(again.cells)} hex27 " in said.out
+
+
+def test_mesh_tells_what_is_wrong_by_the_names_of_its_options(run_kedfem: Command, tmp_path: Path) -> None:
+    said = run_kedfem("mesh", GEOMETRY / "engine.step", "--solid", "rodd", "--folder", tmp_path)
+    assert said.code == USER_ERROR
+    assert "--solid: must name a solid of" in said.err
+    assert "did you mean 'rod'?" in said.err
+    said = run_kedfem("mesh", GEOMETRY / "crank.step", "--size=-3", "--across", "0", "--folder", tmp_path)
+    assert said.code == USER_ERROR
+    assert "mesh.size: must be a length [m], got '-3': no unit" in said.err
+    assert "mesh.elements_across: must be at least 1, got 0" in said.err
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("kind", KINDS)
