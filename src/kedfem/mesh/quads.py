@@ -11,9 +11,8 @@ from kedfem.errors import MeshError
 from kedfem.mesh.choice import SETTINGS, Setting, best_quads
 from kedfem.mesh.outline import Outline, edge_circles, outline_area, scaled_outline
 from kedfem.mesh.plane import PlaneQuads, Quads, directed_sides
-from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.session import gmsh_model, quadrilaterals
 
-_QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
 _LARGE = 1000  # quadrilaterals from which time matters: the first good mesh is taken, and relaxed less
 
 
@@ -119,18 +118,14 @@ def _meshed(gmsh: ModuleType, curves: list[_Curve], setting: Setting) -> PlaneQu
     gmsh.option.setNumber("Mesh.RecombinationAlgorithm", setting.recombination)
     gmsh.option.setNumber("Mesh.SubdivisionAlgorithm", setting.subdivision)
     gmsh.model.mesh.generate(2)
-    kinds, _, nodes = gmsh.model.mesh.getElements(2)
-    if list(kinds) != [_QUAD4]:
+    if (found := quadrilaterals(gmsh)) is None:
         return None
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    used, cells = np.unique(nodes[0], return_inverse=True)
-    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)], :2]
+    points, cells, used = found
     rims = [
         np.searchsorted(used, gmsh.model.mesh.getElements(1, curve.tag)[2][0]).reshape(-1, 2)
         for curve in curves
     ]
-    return _bounded(points, cells.reshape(-1, 4), curves, rims)
+    return _bounded(points, cells, curves, rims)
 
 
 def _bounded(

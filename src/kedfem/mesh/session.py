@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+from jaxtyping import Float, Int
+
 from kedfem.errors import MeshError
 
 #: Debian packages that hold the shared libraries that gmsh's wheel links to.
@@ -23,6 +26,7 @@ SYSTEM_PACKAGES = {
     "libX11.so.6": "libx11-6",
     "libgomp.so.1": "libgomp1",
 }
+_QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
 _one_at_a_time = threading.RLock()
 
 
@@ -81,6 +85,20 @@ def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
     finally:
         for name, value in before.items():
             gmsh.option.setNumber(name, value)
+
+
+def quadrilaterals(
+    gmsh: ModuleType,
+) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"], Int[np.ndarray, " n"]] | None:
+    """Nodes and cells of the plane mesh in gmsh's model, and gmsh's numbers of the nodes; None if triangles are left."""
+    kinds, _, nodes = gmsh.model.mesh.getElements(2)
+    if list(kinds) != [_QUAD4]:
+        return None
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    used, cells = np.unique(nodes[0], return_inverse=True)
+    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)], :2]
+    return points, cells.reshape(-1, 4), used.astype(np.int64)
 
 
 def _gmsh() -> ModuleType:

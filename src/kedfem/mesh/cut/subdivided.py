@@ -1,7 +1,6 @@
 """Any solid by hexahedra: gmsh's tetrahedra, each cut into four, relaxed where they are bad."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -16,6 +15,7 @@ from kedfem.mesh.cut.tetrahedra import Tetrahedra, subdivision
 from kedfem.mesh.cut.unfolding import unfolded
 from kedfem.mesh.hexahedra import HexMesh
 from kedfem.mesh.quality import mesh_quality, scaled_jacobian
+from kedfem.mesh.session import gmsh_options
 
 _REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
 _COUNT = 1000  # regular tetrahedra that fill a part with no small features, at two hexahedra across
@@ -216,7 +216,7 @@ def _tetrahedra(
     gmsh.model.mesh.clear()
     gmsh.logger.start()
     try:
-        with _options(gmsh, numbers):
+        with gmsh_options(gmsh, numbers):
             gmsh.model.mesh.generate(3)
             gmsh.model.mesh.setOrder(2)
             return _read(gmsh, solid.tag)
@@ -227,19 +227,6 @@ def _tetrahedra(
         return None
     finally:
         gmsh.logger.stop()
-
-
-@contextmanager
-def _options(gmsh: ModuleType, numbers: Mapping[str, float]) -> Iterator[None]:
-    """gmsh with these options, and with the former ones again afterwards."""
-    former = {name: gmsh.option.getNumber(name) for name in numbers}
-    try:
-        for name, number in numbers.items():
-            gmsh.option.setNumber(name, number)
-        yield
-    finally:
-        for name, number in former.items():
-            gmsh.option.setNumber(name, number)
 
 
 def _read(gmsh: ModuleType, solid: int) -> Tetrahedra | None:

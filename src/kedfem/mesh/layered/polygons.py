@@ -10,9 +10,9 @@ from scipy.spatial import KDTree
 from kedfem.mesh.choice import SETTINGS, Setting
 from kedfem.mesh.layered.fills import Rim
 from kedfem.mesh.plane import PlaneQuads, directed_sides
-from kedfem.mesh.session import gmsh_model, gmsh_options
+from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
-_QUAD4, _LINE, _POINT = 3, 1, 15  # gmsh's numbers of elements
+_LINE, _POINT = 1, 15  # gmsh's numbers of elements
 _ROUNDING = 1e-24  # square of the area between sides that are on one line
 
 
@@ -45,14 +45,10 @@ def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
     gmsh.model.mesh.setRecombine(2, surface)
     with gmsh_options(gmsh, options):
         gmsh.model.mesh.generate(2)
-    kinds, _, nodes = gmsh.model.mesh.getElements(2)
-    if list(kinds) != [_QUAD4]:
+    if (found := quadrilaterals(gmsh)) is None:
         return None
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    used, cells = np.unique(nodes[0], return_inverse=True)
-    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)], :2]
-    return _on_rim(rim, step, points, cells.reshape(-1, 4))
+    points, cells, _ = found
+    return _on_rim(rim, step, points, cells)
 
 
 def _drawn(gmsh: ModuleType, rim: Rim, step: int) -> int:
