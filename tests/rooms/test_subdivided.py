@@ -233,7 +233,7 @@ class TestParts:
         mesh = subdivided_mesh(gmsh, solid, Sizing())
         checked_mesh("arm", mesh, 0.1)
         assert mesh.cell_type == "hexahedron27"
-        assert len(np.unique(mesh.cells)) == len(mesh.points) < 250_000  # of 6,900 tetrahedra
+        assert len(np.unique(mesh.cells)) == len(mesh.points) < 130_000
         volume, centre, inertia = body_integrals(mesh)
         occ = gmsh.model.occ
         exact = occ.getMatrixOfInertia(3, solid.tag).reshape(3, 3)

@@ -20,7 +20,7 @@ from kedfem.mesh.session import gmsh_options
 _REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
 _COUNT = 1000  # regular tetrahedra that fill a part with no small features, at two hexahedra across
 
-_BUDGET = 6000  # tetrahedra from which a part without a given size is meshed coarser, at two hexahedra across
+_BUDGET = 2000  # tetrahedra from which a part without a given size is meshed coarser, at two hexahedra across
 _MOST = 30_000  # tetrahedra, about a million nodes: beyond it a given size is refused
 _TURN = np.pi / 4  # most that a tetrahedron's edge turns, where the least size lets it
 _FINEST = 2.5  # the size over the least size that curvature asks for
@@ -81,7 +81,7 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
         The solid.
     sizing : Sizing
         How fine; see :func:`tetrahedron_size`. Without a size, a part with many small features is made coarser, up to
-        one and a half times, until some 6,000 tetrahedra do (for across 2); fewer, and single elements stay bad.
+        one and a half times, until 2,000 tetrahedra do (for across 2), unless single elements stay bad.
 
     Returns
     -------
@@ -128,9 +128,15 @@ class Attempt:
 def _attempts(gmsh: ModuleType, solid: Solid, sizing: Sizing, said: list[str]) -> Iterator[Attempt]:
     """gmsh's tetrahedra under one setting after the other, where it makes any."""
     size = tetrahedron_size(solid, sizing)
-    for setting in SETTINGS:
-        tetrahedra, size = _affordable(gmsh, solid, sizing, size, setting, said)
+    _require_few(int(solid.volume / (_REGULAR * size**3)))
+    tetrahedra, coarse = _affordable(gmsh, solid, sizing, said)
+    if tetrahedra is not None:
+        _require_few(len(tetrahedra.cells))
+        yield Attempt(SETTINGS[0], coarse, tetrahedra)
+    for setting in SETTINGS[int(coarse == size) :]:
+        tetrahedra = _tetrahedra(gmsh, solid, sizing, size * setting.size, setting, said)
         if tetrahedra is not None:
+            _require_few(len(tetrahedra.cells))
             yield Attempt(setting, size, tetrahedra)
 
 
@@ -150,18 +156,16 @@ def _valid(least: float, mesh: HexMesh) -> HexMesh:
 
 
 def _affordable(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, size: float, setting: Setting, said: list[str]
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, said: list[str]
 ) -> tuple[Tetrahedra | None, float]:
-    """gmsh's tetrahedra, coarser under the first setting if they are too many and no size is given; their size."""
-    _require_few(int(solid.volume / (_REGULAR * size**3)))
-    largest = 1.5 * tetrahedron_size(solid, sizing)
+    """gmsh's tetrahedra under the first setting, coarser if they are too many and no size is given; their size."""
+    size = tetrahedron_size(solid, sizing)
+    largest = 1.5 * size
     budget = _BUDGET * (sizing.across / 2) ** 3
     while True:
-        tetrahedra = _tetrahedra(gmsh, solid, sizing, size * setting.size, setting, said)
+        tetrahedra = _tetrahedra(gmsh, solid, sizing, size, SETTINGS[0], said)
         count = 0 if tetrahedra is None else len(tetrahedra.cells)
-        _require_few(count)
-        asked = sizing.size is not None or setting != SETTINGS[0]
-        if asked or count <= 1.15 * budget or size >= 0.999 * largest:
+        if sizing.size is not None or count <= 1.15 * budget or size >= 0.999 * largest:
             return tetrahedra, size
         size = min(largest, size * max(1.1, (count / budget) ** (1 / 3)))
 
