@@ -1,5 +1,6 @@
 """``python -m geometry.gallery`` meshes all parts as they come and writes docs/pictures/parts.png and docs/parts.md."""
 
+import os
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -7,6 +8,7 @@ from time import perf_counter
 from geometry import PARTS
 from kedfem.mesh import HexMesh, mesh_quality, part_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
+from kedfem.report import face_kind
 from kedfem.scene import link_from
 
 HERE, DOCS = Path(__file__).parent, Path(__file__).parents[1] / "docs"
@@ -23,6 +25,7 @@ Written by `python -m geometry.gallery`: every STEP file of geometry/ with defau
 
 def main() -> None:
     """Mesh, measure and draw all parts."""
+    os.environ["KEDFEM_CACHE"] = "off"  # or nothing would be measured
     drawn: list[tuple[str, HexMesh]] = []
     lines = []
     for name in PARTS:
@@ -31,7 +34,7 @@ def main() -> None:
             link_from({"shape": {"kind": "cad", "file": f"{name}.step"}, "material": "steel"}), HERE
         )
         seconds, least = perf_counter() - start, mesh_quality(mesh).least
-        seats = sum(face.kind in {"cylinder", "sphere"} and face.inward for face in mesh.faces)
+        seats = sum(face_kind(mesh, face) in {"bore", "ball seat", "ball"} for face in mesh.faces)
         lines.append(
             f"| {name} | {mesh.way} | {len(mesh.cells):,} | {3 * len(mesh.points):,} | {least:.2f} | {seats} "
             f"| {seconds:.1f} |"

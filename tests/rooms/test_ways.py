@@ -14,6 +14,7 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.solid import solid_link
 from kedfem.mesh import HexMesh, link_mesh, mesh_quality, part_mesh, ways
 from kedfem.mesh.cad.solids import Solid
+from kedfem.report import face_kind
 from kedfem.scene import LinkScene, Material, link_from, scene_from
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
@@ -34,6 +35,30 @@ def volume_and_centre(mesh: HexMesh) -> tuple[float, np.ndarray]:
     record = solid_link("part", mesh, material, np.eye(3))
     m1 = record.m1[:, 0]
     return float(m1.sum()), np.asarray(m1 @ record.X / m1.sum())
+
+
+#: Radii [mm] of the bores, ball seats and balls that geometry/README.md lists.
+SEATS = {
+    "ball_ended_rod": [2.5, 12, 12],
+    "bell_crank": [6, 7, 10],
+    "bent_rocker": [6, 7, 12.5],
+    "clevis": [4.5, 8, 8],
+    "connecting_rod": [10, 15],
+    "crank": [12],
+    "piston": [10, 10, 34.5, 90],  # the last two: its hollow and the bowl in its crown
+    "slider": [10, 10],
+    "slotted_link": [9],
+    "wishbone": [12, 12, 15],
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", SEATS)
+def test_parts_mesh_unattended_with_their_bores_found(part: str) -> None:
+    mesh = made(f"{part}.step")
+    assert mesh_quality(mesh).least >= (0.1 if "tetrahedra" in mesh.way else 0.3)
+    seats = [face for face in mesh.faces if face_kind(mesh, face) in {"bore", "ball seat", "ball"}]
+    assert_allclose(sorted(1e3 * face.radius for face in seats), SEATS[part], rtol=1e-6)
 
 
 class TestLadder:

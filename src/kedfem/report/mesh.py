@@ -40,7 +40,7 @@ def _seats(mesh: HexMesh) -> Table:
     )
     for column in ("face", "kind", "radius", "position", "axis or normal"):
         table.add_column(column, justify="left" if column in ("face", "kind") else "right", no_wrap=True)
-    rows = [(_face_kind(mesh, face), face) for face in mesh.faces if face.kind != "other"]
+    rows = [(face_kind(mesh, face), face) for face in mesh.faces if face.kind != "other"]
     for kind, face in sorted(rows, key=lambda row: KINDS.index(row[0])):
         radius = "" if np.isnan(face.radius) else f"{1e3 * face.radius:.4g}"
         direction = "" if np.isnan(face.direction).any() else _shown(face.direction, 3)
@@ -48,7 +48,7 @@ def _seats(mesh: HexMesh) -> Table:
     return table
 
 
-def _face_kind(mesh: HexMesh, face: Face) -> str:
+def face_kind(mesh: HexMesh, face: Face) -> str:
     """What a joint can take a face for: cylinders only where they are closed."""
     if face.kind != "cylinder":
         return ("ball seat" if face.inward else "ball") if face.kind == "sphere" else "plane"
