@@ -170,6 +170,9 @@ class TestSizes:
         for wanted in (15_000, 40_000):
             assert 0.75 < 3 * len(made(mesh={"unknowns": wanted}).points) / wanted < 1.33
 
+    def test_fewer_unknowns_than_the_shape_allows_are_told(self) -> None:
+        assert made(mesh={"unknowns": 500}).way.endswith("; the nearest found to the 500 unknowns asked for")
+
     def test_layers_are_the_least_through_each_slab(self) -> None:
         assert len(made(mesh={"layers": 3}).cells) > 1.5 * len(made().cells)
 

@@ -132,7 +132,10 @@ def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> HexMe
         if 1 / NEAR < ratio < NEAR:
             break
         size *= ratio ** (1 / 2.5)  # in between what plates and lumps need
-    return min(found, key=lambda each: each[0])[1]
+    off, mesh = min(found, key=lambda each: each[0])
+    if off <= np.log(NEAR):
+        return mesh
+    return replace(mesh, way=f"{mesh.way}; the nearest found to the {wanted:,} unknowns asked for")
 
 
 def best_mesh(
