@@ -6,9 +6,8 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-import gmsh
-
 from geometry.step_files import write_step
+from kedfem.mesh.session import gmsh_model
 
 HERE = Path(__file__).parent
 
@@ -16,18 +15,8 @@ HERE = Path(__file__).parent
 @contextmanager
 def empty_model() -> Iterator[ModuleType]:
     """OpenCASCADE's kernel of an empty model, silent, on one thread; gmsh is closed if it was opened here."""
-    opened_here = not gmsh.isInitialized()
-    if opened_here:
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.option.setNumber("General.NumThreads", 1)
-    gmsh.model.add("part")
-    try:
+    with gmsh_model() as gmsh:
         yield gmsh.model.occ
-    finally:
-        gmsh.model.remove()
-        if opened_here:
-            gmsh.finalize()
 
 
 def drawn(name: str, occ: ModuleType) -> int:

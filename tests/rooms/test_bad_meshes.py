@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kedfem.errors import MeshError
-from kedfem.mesh import HexMesh, checked_mesh, link_mesh, quads
+from kedfem.mesh import HexMesh, checked_mesh, link_mesh, quads, session
 from kedfem.mesh.hexahedra import HEX8, HEX27
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
@@ -275,7 +275,7 @@ class TestGmsh:
         assert refused(SQUARE) == "gmsh: must be installed to mesh this shape (pip install gmsh), got none"
 
     def test_that_leaves_triangles(self, monkeypatch):
-        monkeypatch.setattr(quads, "_QUAD4", -1)
+        monkeypatch.setattr(session, "_QUAD4", -1)
         assert refused(SQUARE) == (
             "links.arm.shape: must be an area that quadrilaterals can fill, got no such mesh from gmsh "
             "(triangles were left); change mesh.size or the outline"

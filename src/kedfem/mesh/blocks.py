@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import HEX27, HexMesh, without_spare_nodes
+from kedfem.mesh.hexahedra import HEX27, HexMesh, node_numbers, without_spare_nodes
 from kedfem.mesh.quality import mesh_quality
-from kedfem.mesh.session import gmsh_copy, gmsh_options
+from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _MOST = 2000  # cubes of the size in the volume: a finer default is not taken
@@ -132,22 +132,20 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
     kinds, _, nodes = model.getElements(3)
     if list(kinds) != [_HEX27]:
         raise OtherWayError("other elements than hexahedra")
-    tags, coordinates, _ = model.getNodes()
-    order = np.argsort(tags)
-    cells = order[np.searchsorted(tags[order], nodes[0])].reshape(-1, len(HEX27))
-    return _right_handed(coordinates.reshape(-1, 3), cells[:, _from_gmsh(gmsh)])
+    points, tags = numbered_nodes(gmsh)
+    cells = np.searchsorted(tags, nodes[0]).reshape(-1, len(HEX27))
+    return _right_handed(points, cells[:, _from_gmsh(gmsh)])
 
 
 def _from_gmsh(gmsh: ModuleType) -> list[int]:
     """Of each node in VTK's order its place in gmsh's."""
     theirs = np.reshape(gmsh.model.mesh.getElementProperties(_HEX27)[4], (-1, 3)).round()
-    return [int(np.flatnonzero((theirs == node).all(axis=1))[0]) for node in HEX27]
+    return node_numbers(theirs, HEX27)
 
 
 def _right_handed(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> HexMesh:
     """The mesh, mirrored in its elements if gmsh has numbered them the other way round."""
     mesh = without_spare_nodes(HexMesh(points, cells))
     if (mesh_quality(mesh).scaled_jacobian < 0).all():
-        mirrored = [int(np.flatnonzero((node * [-1, 1, 1] == HEX27).all(axis=1))[0]) for node in HEX27]
-        mesh = HexMesh(mesh.points, mesh.cells[:, mirrored])
+        mesh = HexMesh(mesh.points, mesh.cells[:, node_numbers(HEX27, HEX27 * [-1, 1, 1])])
     return mesh

@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, NODES, QUAD9, shape_gradients
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache
 _DEPTH = (
@@ -121,17 +121,12 @@ def _degree(k: int) -> int:
     return {len(HEX8): 2, len(QUAD9): 3}.get(k, 5)
 
 
-def _nodes(k: int) -> Int[np.ndarray, "k d"]:
-    """Reference coordinates of the nodes of an element that has k."""
-    return {len(nodes): nodes for nodes in (QUAD9, HEX8, HEX20, HEX27)}[k]
-
-
 @cache
 def _tables(
     k: int,
 ) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
     """Gradients at the places where det J is sampled; from its values its coefficients; from those the halves'."""
-    nodes, p = _nodes(k), _degree(k)
+    nodes, p = NODES[k], _degree(k)
     d, ends = nodes.shape[1], -np.cos(np.pi * np.arange(p + 1) / p)
     places = np.stack(np.meshgrid(*[ends] * d, indexing="ij"), axis=-1).reshape(-1, d)
     transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, ends))] * d)
@@ -143,7 +138,7 @@ def _tables(
 @cache
 def _ends(k: int) -> Int[np.ndarray, " v"]:
     """The coefficients that are values: those at the corners."""
-    p, d = _degree(k), _nodes(k).shape[1]
+    p, d = _degree(k), NODES[k].shape[1]
     grid = np.stack(np.meshgrid(*[np.arange(p + 1)] * d, indexing="ij"), axis=-1).reshape(-1, d)
     return np.flatnonzero(((grid == 0) | (grid == p)).all(axis=1))
 
@@ -151,7 +146,7 @@ def _ends(k: int) -> Int[np.ndarray, " v"]:
 @cache
 def _column_coefficients(k: int) -> list[Float[np.ndarray, "c k"]]:
     """From the nodes the Bernstein coefficients, of degree 2 in each coordinate, of each column of J."""
-    nodes, p = _nodes(k), 2
+    nodes, p = NODES[k], 2
     d, line = nodes.shape[1], np.linspace(-1, 1, p + 1)
     places = np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
     transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)

@@ -27,6 +27,18 @@ HEX8: Int[np.ndarray, "8 3"] = HEX27[:8]
 CELL_TYPES = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}  # meshio's names
 
 
+#: Reference coordinates of the nodes of an element that has so many.
+NODES: dict[int, Int[np.ndarray, "k d"]] = {len(nodes): nodes for nodes in (QUAD9, HEX8, HEX20, HEX27)}
+
+
+Places = Float[np.ndarray, "_ d"] | Int[np.ndarray, "_ d"]
+
+
+def node_numbers(nodes: Places, at: Places) -> list[int]:
+    """Which of an element's nodes are at some reference coordinates."""
+    return [int(np.flatnonzero((nodes == place).all(axis=1))[0]) for place in at]
+
+
 @dataclass(frozen=True, slots=True)
 class Face:
     """A face of a part that has a name: what its geometry is, and the sides of elements on it.
@@ -200,11 +212,31 @@ def extruded(
         e · layers elements; nodes level by level from below.
     """
     heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
-    swept = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
-    below = [int(np.flatnonzero((node[:2] == QUAD9).all(axis=1))[0]) for node in HEX27]
-    levels = 2 * np.arange(layers)[:, None, None] + 1 + HEX27[:, 2]
-    cells = quads[None, :, below] + len(points) * levels
-    return HexMesh(swept, cells.reshape(-1, len(HEX27)))
+    return stacked(points, heights, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))
+
+
+def stacked(
+    points: Float[np.ndarray, "n 2"],
+    heights: Float[np.ndarray, " v"],
+    quads: Int[np.ndarray, "e 9"],
+    layer: Int[np.ndarray, " e"],
+) -> HexMesh:
+    """hex27 elements on plane quad9 cells, each in a layer between heights; nodes level by level, maybe unused ones.
+
+    Parameters
+    ----------
+    points : (n, 2) [m]
+        Plane nodes.
+    heights : (v,) [m]
+        Of all nodes, two to a layer and one more.
+    quads : (e, 9)
+        The cell that each element stands on, in VTK order, counter-clockwise.
+    layer : (e,)
+        The layer that each is in.
+    """
+    nodes = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
+    levels = 2 * layer[:, None] + 1 + HEX27[:, 2]
+    return HexMesh(nodes, quads[:, node_numbers(QUAD9, HEX27[:, :2])] + len(points) * levels)
 
 
 def quadratic(mesh: HexMesh) -> HexMesh:
@@ -254,13 +286,17 @@ def placed(mesh: HexMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray
     return replace(mesh, points=origin + mesh.points @ axes, faces=faces)
 
 
-def frame_along(line: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Rows x, y, z of the frame of a link drawn along `line`: x along it, z as near to global z as can be.
+def frame_along(
+    line: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None = None
+) -> Float[np.ndarray, "3 3"]:
+    """Rows x, y, z of the frame of a link drawn along `line`: x along it, z as near to `up`, global z, as can be.
 
-    A line along global z has the frame's z along global x.
+    A line along `up` has the frame's z along global x; one along x too, along global z.
     """
     x = line / np.linalg.norm(line)
-    normal = np.array([0.0, 0.0, 1.0]) if np.hypot(x[0], x[1]) > 1e-9 else np.array([1.0, 0.0, 0.0])
-    z = normal - (normal @ x) * x
-    z /= np.linalg.norm(z)
+    global_x, _, global_z = np.eye(3)
+    wanted = (global_z, global_x) if up is None else (up, global_x, global_z)
+    across = (each - (each @ x) * x for each in wanted)
+    z = next(each for each in across if np.linalg.norm(each) > 1e-9)
+    z = z / np.linalg.norm(z)
     return np.stack([x, np.cross(z, x), z])

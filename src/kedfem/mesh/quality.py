@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, Face, HexMesh, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, Face, HexMesh, shape_gradients
 
 Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
@@ -73,7 +73,7 @@ def scaled_jacobian(
     (e,) [-]
         Between -1 and 1; 0 where an element has no extent.
     """
-    nodes = {len(kind): kind for kind in (QUAD9, HEX8, HEX20, HEX27)}[cells.shape[1]]
+    nodes = NODES[cells.shape[1]]
     places = HEX27 if len(nodes) == len(HEX20) else nodes  # its Gauss points are 3³ too
     inner = np.sqrt(3 / 5 if len(nodes) != len(HEX8) else 1 / 3)
     gradients = shape_gradients(nodes, np.concatenate([places, inner * places]))

@@ -94,11 +94,16 @@ def quadrilaterals(
     kinds, _, nodes = gmsh.model.mesh.getElements(2)
     if list(kinds) != [_QUAD4]:
         return None
+    points, tags = numbered_nodes(gmsh)
+    used, cells = np.unique(nodes[0], return_inverse=True)
+    return points[np.searchsorted(tags, used), :2], cells.reshape(-1, 4), used.astype(np.int64)
+
+
+def numbered_nodes(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+    """Nodes of the mesh in gmsh's model, by gmsh's numbers, and these in rising order."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
-    used, cells = np.unique(nodes[0], return_inverse=True)
-    points = coordinates.reshape(-1, 3)[order[np.searchsorted(tags[order], used)], :2]
-    return points, cells.reshape(-1, 4), used.astype(np.int64)
+    return coordinates.reshape(-1, 3)[order], tags[order].astype(np.int64)
 
 
 def _gmsh() -> ModuleType:

@@ -17,7 +17,7 @@ from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.cut.subdivided import subdivided_mesh
-from kedfem.mesh.hexahedra import FORMS, HexMesh, placed, quadratic
+from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
 from kedfem.scene import Cad, LinkScene, Meshing
@@ -100,15 +100,8 @@ def _made(keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path) -> 
 
 def file_axes(shape: Cad) -> Float[np.ndarray, "3 3"]:
     """Where the x, y, z axes of a file go, as rows."""
-    x = np.array([1.0, 0.0, 0.0])
-    if shape.towards is not None:
-        x = np.subtract(shape.towards, shape.origin)
-        x /= np.linalg.norm(x)
-    z = np.array(shape.z or (0.0, 0.0, 1.0)) - (np.array(shape.z or (0.0, 0.0, 1.0)) @ x) * x
-    if np.linalg.norm(z) < 1e-9:  # x along z: as for a link drawn along z
-        z = np.array([1.0, 0.0, 0.0])
-    z /= np.linalg.norm(z)
-    return np.stack([x, np.cross(z, x), z])
+    along = (1.0, 0.0, 0.0) if shape.towards is None else np.subtract(shape.towards, shape.origin)
+    return frame_along(np.array(along), None if shape.z is None else np.array(shape.z))
 
 
 def sizing(mesh: Meshing) -> Sizing:

@@ -12,7 +12,8 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
 from kedfem.mesh import HexMesh, mesh_quality
-from kedfem.mesh.hexahedra import HEX27, QUAD9, quadratic, shape_functions
+from kedfem.mesh.cad.sides import owned_sides
+from kedfem.mesh.hexahedra import QUAD9, quadratic, shape_functions
 from kedfem.output.picture import ADVICE, TIMEOUT, drawing_fault
 from kedfem.results import replacing
 
@@ -40,7 +41,7 @@ def drawn(mesh: HexMesh) -> Drawn:
     """Outer sides of the elements in small patches, curved as the elements are."""
     full = quadratic(mesh)
     quality = mesh_quality(mesh).scaled_jacobian
-    sides, owners = _outer_sides(full.cells)
+    sides, owners = owned_sides(full.cells)
     k = FINENESS + 1
     r = np.linspace(-1, 1, k)
     places = np.stack(np.meshgrid(r, r, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -55,25 +56,6 @@ def drawn(mesh: HexMesh) -> Drawn:
         np.repeat(quality[owners], FINENESS**2),
         (start + rim).reshape(-1, k),
     )
-
-
-def _outer_sides(cells: Int[np.ndarray, "e 27"]) -> tuple[Int[np.ndarray, "s 9"], Int[np.ndarray, " s"]]:
-    """quad9 nodes of the sides that one element alone has, and which element."""
-    found = []
-    for axis in range(3):
-        across = [i for i in range(3) if i != axis]
-        for end in (-1, 1):
-            nodes = [
-                int(np.flatnonzero((HEX27[:, axis] == end) & (HEX27[:, across] == at).all(axis=1))[0])
-                for at in QUAD9
-            ]
-            found.append(cells[:, nodes])
-    sides, owners = np.concatenate(found), np.tile(np.arange(len(cells)), 6)
-    _, number, count = np.unique(
-        np.sort(sides[:, :4], axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    outer = count[number.ravel()] == 1
-    return sides[outer], owners[outer]
 
 
 def write_mesh_picture(meshes: Sequence[tuple[str, HexMesh]], png: Path, title: str) -> None:

@@ -5,13 +5,13 @@ from jaxtyping import Float
 from rich.table import Table
 from rich.text import Text
 
+from kedfem.links.rounds import CLOSED
 from kedfem.mesh import HexMesh, mesh_quality
 from kedfem.mesh.hexahedra import Face
 from kedfem.report.links import ELEMENTS
 from kedfem.report.words import with_prefix
 
 KINDS = ("bore", "journal", "ball seat", "ball", "plane", "part of a cylinder")
-CLOSED = 0.3  # how far the middle of a closed cylinder's sides may be off its axis, of its radius
 
 
 def mesh_tables(name: str, mesh: HexMesh) -> list[Table]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
+from kedfem.mesh.session import gmsh_options
 
 Format = Literal["STEP", "IGES", "BREP"]
 ENDINGS: dict[str, Format] = {
@@ -153,20 +154,16 @@ def imported(gmsh: ModuleType, file: CadFile, scaling: float, sewing: float | No
 @contextmanager
 def _options(gmsh: ModuleType, scaling: float, sewing: float | None) -> Iterator[None]:
     """gmsh's settings for one import, afterwards as they were."""
-    wanted = {"OCCScaling": scaling, "OCCSewFaces": sewing is not None}
+    wanted = {"Geometry.OCCScaling": scaling, "Geometry.OCCSewFaces": float(sewing is not None)}
     if sewing is not None:
-        wanted["Tolerance"] = sewing
-    before = {key: gmsh.option.getNumber(f"Geometry.{key}") for key in wanted}
+        wanted["Geometry.Tolerance"] = sewing
     unit = gmsh.option.getString("Geometry.OCCTargetUnit")
-    for key, value in wanted.items():
-        gmsh.option.setNumber(f"Geometry.{key}", value)
     gmsh.option.setString("Geometry.OCCTargetUnit", "")
     try:
-        yield
+        with gmsh_options(gmsh, wanted):
+            yield
     finally:
         gmsh.option.setString("Geometry.OCCTargetUnit", unit)
-        for key, value in before.items():
-            gmsh.option.setNumber(f"Geometry.{key}", value)
 
 
 @contextmanager

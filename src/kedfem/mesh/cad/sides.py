@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import HEX27, QUAD9, shape_functions, shape_gradients
+from kedfem.mesh.hexahedra import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
 
 
 def _side_nodes() -> Int[np.ndarray, "6 9"]:
@@ -14,7 +14,7 @@ def _side_nodes() -> Int[np.ndarray, "6 9"]:
             first, second = ((axis + 1) % 3, (axis + 2) % 3) if end > 0 else ((axis + 2) % 3, (axis + 1) % 3)
             places = np.empty((9, 3), dtype=int)
             places[:, axis], places[:, first], places[:, second] = end, QUAD9[:, 0], QUAD9[:, 1]
-            rows.append([int(np.flatnonzero((place == HEX27).all(axis=1))[0]) for place in places])
+            rows.append(node_numbers(HEX27, places))
     return np.array(rows)
 
 
@@ -24,7 +24,12 @@ SIDE_NODES = _side_nodes()
 
 
 def boundary_sides(cells: Int[np.ndarray, "e k"]) -> Int[np.ndarray, "f m"]:
-    """The sides that one hexahedron alone has, with their nodes in the order of quad9 as far as they have them.
+    """The sides of :func:`owned_sides`."""
+    return owned_sides(cells)[0]
+
+
+def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], Int[np.ndarray, " f"]]:
+    """The sides that one hexahedron alone has, with their nodes in the order of quad9 as far as they have them; which.
 
     Parameters
     ----------
@@ -35,11 +40,14 @@ def boundary_sides(cells: Int[np.ndarray, "e k"]) -> Int[np.ndarray, "f m"]:
     -------
     (f, 4), (f, 8) or (f, 9)
         Corners counter-clockwise seen from outside, middles of edges, centre.
+    (f,)
+        The hexahedron of each.
     """
     count = {8: 4, 20: 8, 27: 9}[cells.shape[1]]
     sides = cells[:, SIDE_NODES[:, :count]].reshape(-1, count)
     _, first, often = np.unique(np.sort(sides[:, :4], axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(sides[np.sort(first[often == 1])])
+    alone = np.sort(first[often == 1])
+    return sides[alone], alone // len(SIDE_NODES)
 
 
 def side_normals(

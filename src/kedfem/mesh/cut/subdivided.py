@@ -5,17 +5,17 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.cut.cad_surface import CadSurface
 from kedfem.mesh.cut.centring import centred
-from kedfem.mesh.cut.tetrahedra import Tetrahedra, subdivision
+from kedfem.mesh.cut.tetrahedra import Subdivision, Tetrahedra, subdivision
 from kedfem.mesh.cut.unfolding import unfolded
 from kedfem.mesh.hexahedra import HexMesh
 from kedfem.mesh.quality import mesh_quality, scaled_jacobian
-from kedfem.mesh.session import gmsh_options
+from kedfem.mesh.session import gmsh_options, numbered_nodes
 
 _REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
 _COUNT = 1000  # regular tetrahedra that fill a part with no small features, at two hexahedra across
@@ -97,8 +97,9 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
     best: tuple[float, HexMesh] | None = None
     aside: list[tuple[int, Attempt]] = []
     for attempt in _attempts(gmsh, solid, sizing, said):
-        bad = _bad_elements(attempt.tetrahedra)
-        if bad > max(_HOPELESS, _SHARE * 4 * len(attempt.tetrahedra.cells)):
+        mesh = attempt.hexahedra.mesh
+        bad = int((scaled_jacobian(mesh.points, mesh.cells) < _GOOD).sum())
+        if bad > max(_HOPELESS, _SHARE * len(mesh.cells)):
             aside.append((bad, attempt))
             continue
         found = _hexahedra(gmsh, attempt)
@@ -118,11 +119,11 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """What gmsh made under a setting, of that size [m]."""
+    """What gmsh made under a setting, of that size [m], as it is cut."""
 
     setting: Setting
     size: float
-    tetrahedra: Tetrahedra
+    hexahedra: Subdivision
 
 
 def _attempts(gmsh: ModuleType, solid: Solid, sizing: Sizing, said: list[str]) -> Iterator[Attempt]:
@@ -132,17 +133,12 @@ def _attempts(gmsh: ModuleType, solid: Solid, sizing: Sizing, said: list[str]) -
     tetrahedra, coarse = _affordable(gmsh, solid, sizing, said)
     if tetrahedra is not None:
         _require_few(len(tetrahedra.cells))
-        yield Attempt(SETTINGS[0], coarse, tetrahedra)
+        yield Attempt(SETTINGS[0], coarse, subdivision(tetrahedra))
     for setting in SETTINGS[int(coarse == size) :]:
         tetrahedra = _tetrahedra(gmsh, solid, sizing, size * setting.size, setting, said)
         if tetrahedra is not None:
             _require_few(len(tetrahedra.cells))
-            yield Attempt(setting, size, tetrahedra)
-
-
-def _bad_elements(tetrahedra: Tetrahedra) -> int:
-    """How many of the hexahedra are not good enough as they are cut."""
-    return int((mesh_quality(subdivision(tetrahedra).mesh).scaled_jacobian < _GOOD).sum())
+            yield Attempt(setting, size, subdivision(tetrahedra))
 
 
 def _valid(least: float, mesh: HexMesh) -> HexMesh:
@@ -180,18 +176,18 @@ def _require_few(count: int) -> None:
 
 def _hexahedra(gmsh: ModuleType, attempt: Attempt) -> tuple[float, HexMesh]:
     """The hexahedra of tetrahedra, relaxed, and the worst scaled Jacobian."""
-    hexahedra = subdivision(attempt.tetrahedra)
-    surface = CadSurface(gmsh, hexahedra, reach=0.3 * attempt.size)
-    mesh = hexahedra.mesh
-    start, _ = surface.settled(np.arange(len(mesh.points)), mesh.points)
-    points = start
+    mesh = attempt.hexahedra.mesh
+    surface = CadSurface(gmsh, attempt.hexahedra, reach=0.3 * attempt.size)
+    points, _ = surface.settled(np.arange(len(mesh.points)), mesh.points)
     with np.errstate(over="ignore", invalid="ignore"):  # trial steps may go far astray; they are not taken
         for wanted in (_WANTED, *_OTHERWISE):
             points = unfolded(points, mesh.cells, surface.settled, wanted)
             if scaled_jacobian(points, mesh.cells).min() >= _GOOD:
                 break
     points = centred(points, mesh.cells, surface.settled, _WANTED)
-    way = f"each of {len(attempt.tetrahedra.cells)} tetrahedra in four hexahedra; gmsh {attempt.setting.name}, optimised"
+    way = (
+        f"each of {len(mesh.cells) // 4} tetrahedra in four hexahedra; gmsh {attempt.setting.name}, optimised"
+    )
     mesh = replace(mesh, points=points, way=way)
     least = mesh_quality(mesh).least
     return least if valid_everywhere(mesh.points, mesh.cells).all() else min(least, 0.0), mesh
@@ -235,9 +231,7 @@ def _tetrahedra(
 
 def _read(gmsh: ModuleType, solid: int) -> Tetrahedra | None:
     """The second-order tetrahedra in gmsh's model; None if there are none, or others."""
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-    ranked = tags[order]
+    points, ranked = numbered_nodes(gmsh)
 
     def corners(dim: int, tag: int, nodes: int, used: int) -> Int[np.ndarray, "_ k"]:
         _, _, found = gmsh.model.mesh.getElements(dim, tag)
@@ -251,5 +245,4 @@ def _read(gmsh: ModuleType, solid: int) -> Tetrahedra | None:
     sides = {tag: corners(2, tag, 6, 3) for tag in faces}
     bounds = gmsh.model.getBoundary([(2, tag) for tag in faces], combined=False, oriented=False)
     rims = {tag: corners(1, tag, 3, 2) for tag in dict.fromkeys(tag for _, tag in bounds)}
-    points: Float[np.ndarray, "n 3"] = coordinates.reshape(-1, 3)[order]
     return Tetrahedra(points, cells, sides, {tag: edges for tag, edges in rims.items() if len(edges)})

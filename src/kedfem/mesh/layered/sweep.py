@@ -1,9 +1,11 @@
 """A plan's mesh swept through the slabs of a solid."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import HEX27, QUAD9, HexMesh, without_spare_nodes
+from kedfem.mesh.hexahedra import HexMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh
 
@@ -27,10 +29,8 @@ def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> HexM
     slab = np.repeat(np.arange(len(layers)), layers)
     material = np.stack([region.material for region in plan.regions])[flat.regions]
     cell, layer = np.nonzero(material[:, slab])
-    below = [int(np.flatnonzero((node[:2] == QUAD9).all(axis=1))[0]) for node in HEX27]
-    cells = quads[cell][:, below] + len(points) * (2 * layer[:, None] + 1 + HEX27[:, 2])
-    nodes = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
-    return without_spare_nodes(HexMesh(plan.extent * (nodes @ plan.axes), cells))
+    mesh = stacked(points, heights, quads[cell], layer)
+    return without_spare_nodes(replace(mesh, points=plan.extent * (mesh.points @ plan.axes)))
 
 
 def _levels(bounds: Float[np.ndarray, " h"], layers: Int[np.ndarray, " s"]) -> Float[np.ndarray, " v"]:
