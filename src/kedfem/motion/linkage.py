@@ -99,7 +99,13 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
 def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
     joint = scene.joints[name]
     axis = None if joint.axis is None else unit(joint.axis)
-    return joint_rows(joint.kind, name, *_pair(joint, bodies), np.asarray(joint.at) - centre, axis)
+    i, j = _pair(joint, bodies)
+    axes = None
+    if joint.axes is not None:
+        first = bodies.index(joint.links[0]) == i
+        one, other = (unit(each) for each in (joint.axes if first else joint.axes[::-1]))
+        axes = (one, other)
+    return joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis, axes)
 
 
 def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Row]:
@@ -110,7 +116,12 @@ def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Ro
 
 
 def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
-    """Numbers of a joint's bodies; the ground, where there is one, comes second: directions are fixed in it."""
+    """Numbers of a joint's bodies; the ground, where there is one, comes second: directions are fixed in it.
+
+    Of a slot the link with the pin comes first: directions are fixed in the link with the line.
+    """
+    if joint.kind == "slot":
+        return bodies.index(joint.links[0]), bodies.index(joint.links[1])
     i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
     return i, j
 

@@ -44,14 +44,22 @@ def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:
     return e1, cross(axis, e1)
 
 
-def joint_rows(kind: str, name: str, i: int, j: int, point: Vector, axis: Vector | None) -> list[Row]:
-    """Rows of a joint between bodies i and j.
+def joint_rows(
+    kind: str,
+    name: str,
+    i: int,
+    j: int,
+    point: Vector,
+    axis: Vector | None,
+    axes: tuple[Vector, Vector] | None = None,
+) -> list[Row]:
+    """Rows of a joint between bodies i and j; of a slot i has the pin and j the line.
 
     Parameters
     ----------
-    kind : spherical, revolute, prismatic or weld
     point : of the joint, reference position [m]
-    axis : unit vector; of a revolute joint its axis, of a prismatic joint its direction
+    axis : unit vector; of a revolute joint its axis, of a prismatic joint its direction, of a planar joint its normal
+    axes : unit vectors of a universal joint, in body i and in body j
     """
     x, y, z = np.eye(3)
     meet = [Row(GAP, i, j, point, b, name) for b in (x, y, z)]
@@ -60,11 +68,22 @@ def joint_rows(kind: str, name: str, i: int, j: int, point: Vector, axis: Vector
         return meet
     if kind == "weld":
         return meet + aligned
+    if kind == "universal":
+        assert axes is not None  # noqa: S101  (the scene requires them)
+        return [*meet, Row(TURN, i, j, *axes, name)]
     assert axis is not None  # noqa: S101  (the scene requires it)
     e1, e2 = perpendiculars(axis)
-    if kind == "revolute":
-        return [*meet, Row(TURN, i, j, axis, e1, name), Row(TURN, i, j, axis, e2, name)]
+    upright = [Row(TURN, i, j, axis, b, name) for b in (e1, e2)]
     slides = [Row(GAP, i, j, point, b, name) for b in (e1, e2)]
+    match kind:
+        case "revolute":
+            return meet + upright
+        case "planar":
+            return [Row(GAP, i, j, point, axis, name), *upright]
+        case "slot":
+            return slides
+        case "cylindrical" | "screw":
+            return slides + upright
     return slides + aligned
 
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from kedfem.scene.faults import either, line
-from kedfem.scene.links import GROUND
+from kedfem.scene.links import DIRECTED, GROUND, SQUARE
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
 
@@ -175,14 +175,7 @@ def joint_faults(parts: Parts) -> Iterator[str]:
         elif len(names) == 2 and names[0] == names[1]:
             yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
         yield from seat_faults(joint, parts)
-        if joint.word("kind") == "prismatic":
-            if len(names) == 2 and GROUND not in names:
-                got = f"got {names[0]!r} and {names[1]!r}"
-                yield joint.fault("links", f"must hold 'ground' for a prismatic joint, {got}")
-            if not joint.has("axis"):
-                yield joint.fault(
-                    "axis", "is required for a prismatic joint: 'x', 'y', 'z' or a vector, got nothing"
-                )
+        yield from direction_faults(joint)
     pairs = (
         [link_names(joint) for joint in parts.joints.values()] if parts.driven else []
     )  # else links may fly
@@ -192,6 +185,33 @@ def joint_faults(parts: Parts) -> Iterator[str]:
             yield line(link.where, "must be held by a joint, got none")
         elif link.name not in reached:
             yield line(link.where, "must be connected with the ground through joints, got no way there")
+
+
+def direction_faults(joint: Entry) -> Iterator[str]:
+    """Joints without the directions or the lead that they need, or with those of other kinds."""
+    kind = joint.word("kind")
+    if kind in DIRECTED and not joint.has("axis"):
+        yield joint.fault("axis", f"is required for a {kind} joint: 'x', 'y', 'z' or a vector, got nothing")
+    for key, owner, wanted in (
+        (
+            "axes",
+            "universal",
+            "is required for a universal joint: two axes, of the first link and of the second",
+        ),
+        ("lead", "screw", "is required for a screw [m], travel in one turn"),
+    ):
+        if kind == owner and not joint.has(key):
+            yield joint.fault(key, f"{wanted}, got nothing")
+        if kind != owner and joint.has(key):
+            yield joint.fault(key, f"must be given for a {owner} joint only, got one for a {kind} joint")
+    if kind == "universal" and joint.has("axis"):
+        yield joint.fault("axis", "must be left out for a universal joint (it has axes), got one")
+    axes = joint.record.axes if joint.record is not None else None
+    if axes is not None and abs(cosine := sum(a * b for a, b in zip(*axes, strict=True))) > SQUARE:
+        angle = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+        yield joint.fault("axes", f"must be at right angles to each other, got {angle:.6g} deg")
+    if joint.record is not None and joint.record.lead == 0.0:
+        yield joint.fault("lead", "must not be zero [m] (a screw without lead is a revolute joint), got 0")
 
 
 def seat_faults(joint: Entry, parts: Parts) -> Iterator[str]:

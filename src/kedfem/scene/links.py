@@ -20,6 +20,11 @@ GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
 Element = Literal["hex27", "hex20", "hex8", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
 Count = Annotated[StrictInt, Field(ge=1)]
+JointKind = Literal[
+    "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
+]
+DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # joints that need an axis
+SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
 PORTS = ("averaged", "stiff")
 Port = Literal["averaged", "stiff"]
 
@@ -172,15 +177,22 @@ def face_names(value: object) -> object:
 class Joint(Record):
     """A joint between two links, or a link and the ground."""
 
-    kind: Literal["revolute", "spherical", "weld", "prismatic"]
-    """hinge; ball; rigid connection; slider along a line of the ground"""
+    kind: JointKind
+    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without turning;
+    cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
+    axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
+    the second"""
     links: tuple[str, str]
-    """the two links that it joins; `"ground"` for the frame"""
+    """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
     at: Point
     """its centre"""
     axis: Axis | None = None
-    """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), a slider's direction (required);
-    for a ball or a weld the axis of the bore that holds it"""
+    """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), the direction of what slides, the normal of a
+    planar joint (required for those); for a ball or a weld the axis of the bore that holds it"""
+    axes: tuple[Axis, Axis] | None = None
+    """of a universal joint: the axis in the first link and that in the second, at right angles"""
+    lead: Annotated[float, Quantity("m")] | None = None
+    """of a screw: travel in one turn, positive if right-handed"""
     port: Annotated[Port | dict[str, Port], BeforeValidator(ports)] = "averaged"
     """how it holds bores and faces of solids and plane links: by their mean displacement and turn, or so that they keep
     their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "stiff" }`"""

@@ -105,6 +105,11 @@ class Scene(Record):
         return None if self.drive is None else self.drive.joint
 
     @property
+    def driven_joints(self) -> dict[str, Drive]:
+        """The joints whose motion is prescribed, and the drive of each."""
+        return {} if self.drive is None else {self.drive.joint: self.drive}
+
+    @property
     def results_folder(self) -> Path:
         """Where the results go."""
         return self._folder / (self.output.folder or f"{self._stem}-results")
