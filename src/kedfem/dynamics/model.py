@@ -15,7 +15,7 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
 from kedfem.links.record import Link
-from kedfem.links.reduced import on_functions, reduced, rigid
+from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, wave_frequency
 from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
@@ -143,9 +143,7 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = {
-        key: _rigid(scene, x) if scene.links[x.name].fidelity == "rigid" else x for key, x in links.items()
-    }
+    links = _made_rigid(scene, links)
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     joined = attachments(
         scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)]
@@ -160,9 +158,19 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     )  # fmt: skip
 
 
-def _rigid(scene: Scene, link: Link) -> Link:
-    """A rigid link, no stiffer than what bends it less by far in a step than the step's own error."""
-    return rigid(link) if link.fit is None else rigid(link, RESOLVED / time_grid(scene).step)
+def _made_rigid(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
+    """The same with rigid links made so: stiff beside the elastic ones, whatever they are made of themselves.
+
+    Those whose frames follow are no stiffer than what bends them less by far in a step than the step's own error.
+    """
+    made = {key for key, link in links.items() if scene.links[link.name].fidelity == "rigid"}
+    elastic = [link for key, link in links.items() if key not in made]
+    out = dict(links)
+    for key in made:
+        highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
+        followed = links[key].fit is not None
+        out[key] = rigid(links[key], min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
+    return out
 
 
 def keys(name: str, link: Segments) -> list[str]:

@@ -110,21 +110,24 @@ def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
     return np.concatenate([link.one[:, None], X @ axes[sizes > STRAIGHT * sizes[0]].T], axis=1)
 
 
-def rigid(link: Link, highest: float = np.inf) -> Link:
+def rigid(link: Link, frequency: float | None = None) -> Link:
     """The changed copy of a link that only moves rigidly: {1, x, y, z} made stiff.
-
-    Its own vibrations are put RIGID times above an axial wave's passing frequency √(E/ρ)/L.
 
     Parameters
     ----------
-    highest : what they are put at, at most [rad/s]: in frames that follow the rounding of positions is stretched by K0
+    frequency : what its own vibrations are put at [rad/s]; RIGID times its `wave_frequency` if not given
     """
     made = reduced(link, rigid_functions(link))
-    density = float(link.m1[:, 0].sum() / link.volume.sum())
-    stiffness = min((RIGID**2 * link.E / density) / link.size**2, highest**2)
+    stiffness = (RIGID * wave_frequency(link) if frequency is None else frequency) ** 2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)
+
+
+def wave_frequency(link: Link) -> float:
+    """Of the order of a link's first axial vibration: √(E/ρ)/L, how often a wave passes along it [1/s]."""
+    density = float(link.m1[:, 0].sum() / link.volume.sum())
+    return float(np.sqrt(link.E / density) / link.size)
 
 
 def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
