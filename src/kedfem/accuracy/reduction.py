@@ -254,7 +254,8 @@ def _training(full: Prepared) -> RigidMotion:
 
 def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:
     """The time at which each load is greatest, so that short ones are not missed."""
-    factors = [np.abs(load.factor(t)) for loads in full.model.loads for load in loads]
+    phi = drive_angle(full.scene.motion, t)[0]
+    factors = [np.abs(load.factor(t, phi)) for loads in full.model.loads for load in loads]
     return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])
 
 

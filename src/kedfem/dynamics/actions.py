@@ -1,6 +1,7 @@
 """Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -154,13 +155,12 @@ def _motor(find: _Ends, name: str, motor: Motor) -> Action:
 
 
 def _spring(find: _Ends, name: str, spring: Spring) -> Action:
-    if not isinstance(spring, LineSpring):
-        made = _hinge(find, f"springs/{name}", spring.joint)
-        return replace(made, stiffness=spring.stiffness, damping=spring.damping, free=spring.free_angle)
+    law: dict[str, Any] = {"stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free}
+    if not isinstance(spring, LineSpring) or spring.between is None:
+        made = _slide if isinstance(spring, LineSpring) else _hinge
+        return replace(made(find, f"springs/{name}", str(spring.joint)), **law)
     one, other = (
         find.point(f"springs.{name}.between[{i}].at", end.link, np.asarray(end.at))
         for i, end in enumerate(spring.between)
     )
-    a, b = (np.asarray(end.at) for end in spring.between)
-    free = float(np.linalg.norm(a - b)) if spring.free_length is None else spring.free_length
-    return Action(f"springs/{name}", DISTANCE, (one, other), spring.stiffness, spring.damping, free)
+    return Action(f"springs/{name}", DISTANCE, (one, other), **law)

@@ -1,6 +1,6 @@
-"""Loads P of the general equation: every one is a constant pattern of the link times a factor over time.
+"""Loads P of the general equation: every one is constant patterns of the link times factors over time.
 
-[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ.
+[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ; couples on the turn of a seat.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,13 +10,34 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import on_part
-from kedfem.errors import SceneError
+from kedfem.dynamics.coupling import on_part, seat_of
+from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import face_seat, is_flat, same_face, surface_weights
+from kedfem.links.seats import (
+    Seat,
+    face_normals,
+    face_seat,
+    is_flat,
+    joint_seat,
+    same_face,
+    seat_couples,
+    surface_weights,
+)
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import BodyLoad, ForceLoad, Load, Scene, SurfaceLoad, load_factor
+from kedfem.scene import (
+    BodyLoad,
+    ForceLoad,
+    Load,
+    PressureLoad,
+    Scene,
+    SurfaceLoad,
+    TorqueLoad,
+    load_factor,
+)
+
+Times = Float[np.ndarray, " t"]
+Vector = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +46,14 @@ class Pattern:
 
     forces : (n, d) at factor one, reference components [N]
     follows : turns with the link
-    factor : times (t,) → factors (t,)
+    factor : times (t,) and angles of the drive (t,) → factors (t,)
+    share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
     """
 
     forces: Float[np.ndarray, "n d"]
     follows: bool
-    factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
+    factor: Callable[[Times, Times], Times]
+    share: tuple[Vector, Vector] | None = None
 
 
 def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern, ...]]:
@@ -44,12 +67,69 @@ def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern
     out: dict[str, list[Pattern]] = {key: [] for key in links}
     if any(scene.gravity):
         for key, link in links.items():
-            out[key].append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, np.ones_like))
+            out[key].append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, _always))
     for name, load in scene.loads.items():
-        for key, weights in _weights(f"loads.{name}", load, links).items():
-            forces = np.outer(weights, as_rows(links[key], np.asarray(load.vector)))
-            out[key].append(Pattern(forces, load.frame == "link", partial(load_factor, load.factor)))
+        for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
+            out[key] += found
     return {key: tuple(found) for key, found in out.items()}
+
+
+def _always(t: Times, phi: Times) -> Times:
+    return np.ones_like(t)
+
+
+def _load_patterns(
+    scene: Scene, where: str, load: Load, links: Mapping[str, Link]
+) -> dict[str, list[Pattern]]:
+    """The patterns of a load on each segment of its link."""
+    parts = {key: link for key, link in links.items() if link.name == load.link}
+    factor = partial(load_factor, load.factor)
+    match load:
+        case TorqueLoad() if parts:
+            return _torque(scene, where, load, parts)
+        case PressureLoad() if parts:
+            faces = _face(where, load, parts)
+            pushed = {key: face_normals(parts[key], seat) for key, seat in faces.items()}
+            return {key: [Pattern(-load.pressure * x, True, factor)] for key, x in pushed.items()}
+        case ForceLoad() | BodyLoad() | SurfaceLoad():
+            follows, vector = load.frame == "link", np.asarray(load.vector)
+            return {
+                key: [Pattern(np.outer(w, as_rows(links[key], vector)), follows, factor)]
+                for key, w in _weights(where, load, parts).items()
+            }
+        case _:
+            return {}
+
+
+def _torque(
+    scene: Scene, where: str, load: TorqueLoad, parts: Mapping[str, Link]
+) -> dict[str, list[Pattern]]:
+    """A couple on the segment that has its seat; of fixed direction m it is Σ (m · R e_k) times the one about R e_k."""
+    m, factor = np.asarray(load.vector), partial(load_factor, load.factor)
+    at = np.asarray(scene.joints[load.joint].at if load.joint is not None else load.at)
+    key, couples = on_part(parts, load.link, at, lambda link: _couples(scene, where, load, link, at))
+    if load.frame == "link" or parts[key].planar:
+        return {key: [Pattern(np.tensordot(m, couples, 1), True, factor)]}
+    about = [(one, axis) for one, axis in zip(couples, np.eye(3), strict=True)]
+    return {key: [Pattern(one, True, factor, (axis, m)) for one, axis in about]}
+
+
+def _couples(
+    scene: Scene, where: str, load: TorqueLoad, link: Link, at: Vector
+) -> Float[np.ndarray, "3 n d"]:
+    """Forces of unit couples about x, y and z on a link's seat."""
+    if link.kind == "beam":
+        out = np.zeros((3, link.n, 3))
+        out[2, :, 2] = _point_weights(where, link, at)
+        return out
+    if load.joint is not None:
+        return seat_couples(link, seat_of(scene, load.joint, link), where)
+    axis = np.asarray(load.vector) / (np.linalg.norm(load.vector) or 1.0)
+    try:
+        seat = joint_seat(link, f"{where}.at", at, axis if np.any(axis) else None)
+    except MeshError:
+        seat = joint_seat(link, f"{where}.at", at, None)  # a bore or journal across the torque
+    return seat_couples(link, seat, where)
 
 
 def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
@@ -58,26 +138,26 @@ def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]
     return Pattern(forces, False, partial(load_factor, load.factor))
 
 
-def _weights(where: str, load: Load, links: Mapping[str, Link]) -> dict[str, Float[np.ndarray, " n"]]:
+def _weights(
+    where: str, load: ForceLoad | BodyLoad | SurfaceLoad, parts: Mapping[str, Link]
+) -> dict[str, Float[np.ndarray, " n"]]:
     """Which segments of its link a load acts on, and how much of it each function takes."""
-    parts = {key: link for key, link in links.items() if link.name == load.link}
+    if not parts:
+        return {}
     match load:
-        case ForceLoad() if parts:
-            key, weights = on_part(
-                parts, load.link, np.asarray(load.at), lambda x: _point_weights(where, load, x)
-            )
+        case ForceLoad():
+            at = np.asarray(load.at)
+            key, weights = on_part(parts, load.link, at, lambda x: _point_weights(where, x, at))
             return {key: weights}
         case BodyLoad():
             return {key: link.volume for key, link in parts.items()}
-        case SurfaceLoad() if parts:
-            return _surface_weights(where, load, parts)
-        case _:
-            return {}
+        case SurfaceLoad():
+            return {key: surface_weights(parts[key], seat) for key, seat in _face(where, load, parts).items()}
 
 
-def _point_weights(where: str, load: ForceLoad, link: Link) -> Float[np.ndarray, " n"]:
-    rows = point_rows(link, f"{where}.at", np.asarray(load.at))
-    beside = float(np.linalg.norm(rows.X - load.at))
+def _point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:
+    rows = point_rows(link, f"{where}.at", at)
+    beside = float(np.linalg.norm(rows.X - at))
     if link.kind == "beam" and beside > 1e-6 * link.size:
         raise SceneError(
             f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
@@ -85,22 +165,20 @@ def _point_weights(where: str, load: ForceLoad, link: Link) -> Float[np.ndarray,
     return rows.value
 
 
-def _surface_weights(
-    where: str, load: SurfaceLoad, parts: Mapping[str, Link]
-) -> dict[str, Float[np.ndarray, " n"]]:
+def _face(where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]) -> dict[str, Seat]:
     """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
     at = np.asarray(load.at)
     for link in parts.values():
         if not link.meshed:
             raise SceneError(
-                f"{where}: a surface force needs a solid or a plane link, got the beam '{link.name}'"
+                f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'"
             )
     key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
     found = {key: seat}
     for other in parts.keys() - {key} if is_flat(seat) else ():
         if (same := same_face(parts[other], seat)) is not None:
             found[other] = same
-    return {key: surface_weights(parts[key], seat) for key, seat in found.items()}
+    return found
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
@@ -108,6 +186,15 @@ def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np
     if link.kind == "beam":
         return np.concatenate([motion.p2[:, body, :2], motion.alpha[:, body, 2:]], axis=1)
     return motion.p2[:, body, : link.d]
+
+
+def amounts(load: Pattern, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
+    """What a load's forces are multiplied by over time."""
+    factor = load.factor(motion.t, motion.phi)
+    if load.share is None:
+        return factor
+    drawn, fixed = load.share
+    return np.asarray(factor * (motion.R[:, body] @ drawn @ fixed))
 
 
 def applied(
@@ -126,7 +213,7 @@ def applied(
     F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
     R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
     for load in loads:
-        factor = load.factor(motion.t)
+        factor = amounts(load, motion, body)
         if factor.any():
             F += factor[:, None, None] * (load.forces @ R if load.follows else load.forces)
     return np.asarray(F)

@@ -1,12 +1,13 @@
 """The elastic motion step by step: M δ'' + C δ' + K δ = P − M R0'', [KED, eq. (20)]."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
+from kedfem.dynamics.acted import ActedSteps, Forces, loaded, still_forces
 from kedfem.dynamics.acting import first_forces
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
@@ -23,7 +24,7 @@ from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
-from kedfem.dynamics.state import LinkState
+from kedfem.dynamics.state import LinkState, Nodal
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
@@ -38,7 +39,7 @@ POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-Steps = CondensedSteps | LiteralSteps | DenseSteps | FollowingSteps | FollowingDense
+Steps = CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | FollowingSteps | FollowingDense
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
     'take a smaller step, or frames = "following"'
@@ -59,12 +60,14 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         follower = FollowingDense if dense else FollowingSteps
         tolerance = FREE if scene.driven is None else CONVERGED
         return follower(model.links, model.joints, scheme, model.damping, actions(scene, model), tolerance)
-    small = all(map(_is_small, model.links)) and find_spec("numba")
+    every = actions(scene, model)
+    small = all(map(_is_small, model.links)) and find_spec("numba") and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
         solver = LiteralSteps
     stresses = stiffening(model) if scene.analysis.stiffening else None
-    return solver(model.links, model.joints, scheme, model.damping, stresses)
+    made = solver(model.links, model.joints, scheme, model.damping, stresses)
+    return made if isinstance(made, DenseSteps) or not every else ActedSteps(made, every)
 
 
 def _is_small(link: Link) -> bool:
@@ -98,6 +101,8 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
                     if stuck.taken:
                         yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
                     raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
+            elif isinstance(solver, ActedSteps):
+                links, state = solver.advance(state, forcings(model, part), part)
             else:
                 links, state = solver.advance(state, forcings(model, part))
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
@@ -184,9 +189,13 @@ def first_states(
     t = h * np.arange(1 if at_rest else 3)
     motion = rigid_motion(linkage, along, t, drive_angle(law, t))
     moments = instants(model, motion, stresses)
+    every = actions(scene, model)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
+        forces = first_forces(every, model.links, motion, [(x.u, x.v) for x in start])
+        if every and not following(scene):
+            at = loaded(moments[0].at, forces)
+            return initial_states(model.links, model.joints, at, model.damping, start)
         states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
         states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
@@ -198,6 +207,12 @@ def first_states(
         )
         each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
         return rigid_start(model.links, model.joints, states, each)
+    if every:
+        rows = still_forces(
+            Forces(every, model.links, h), motion,
+            lambda k, more: quasi_static(model.links, model.joints, _acted(moments[k : k + 1], [more]))[0],
+        )  # fmt: skip
+        moments = _acted(moments, rows)
     u = quasi_static(model.links, model.joints, moments)
     if following(scene):
         u = far_deflected(model.links, model.joints, moments, u)
@@ -214,6 +229,11 @@ def first_states(
             for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+
+
+def _acted(moments: Sequence[Instant], rows: Sequence[Sequence[Nodal]]) -> list[Instant]:
+    """Instants with more forces on the links."""
+    return [replace(now, at=loaded(now.at, more)) for now, more in zip(moments, rows, strict=True)]
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:

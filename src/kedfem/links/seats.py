@@ -148,6 +148,48 @@ def surface_weights(link: Link, seat: Seat) -> Float[np.ndarray, " n"]:
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
 
 
+def face_normals(link: Link, seat: Seat) -> Float[np.ndarray, "n d"]:
+    """Area integrals ∫ N_a n dΓ of a seat's surface, n its outward normal: a pressure p gives forces −p times them.
+
+    Returns
+    -------
+    (n, d) [m²]
+    """
+    if seat.facets is None:
+        return np.zeros((link.n, link.d))
+    if link.full is not None and link.Q is not None:
+        return np.asarray(link.Q.T @ face_normals(link.full, seat))
+    on = surface(link, seat.facets)
+    local = np.einsum("fqm,fq,fqk->kfm", on.N, on.dA, on.normals)
+    rows = [np.bincount(on.dofs.ravel(), weights=x.ravel(), minlength=link.n) for x in local[: link.d]]
+    return np.stack(rows, axis=1)
+
+
+def seat_couples(link: Link, seat: Seat, where: str) -> Float[np.ndarray, "3 n d"]:
+    """Forces of unit couples about x, y, z that work on the turn of a seat's affine fit; they have no resultant force.
+
+    The turn in the plane of two principal directions i, j is ½ (∂_i u_j − ∂_j u_i), or where the fit does not know ∂_j
+    (j across a flat seat) ∂_i u_j.
+
+    Parameters
+    ----------
+    where : how messages name the load
+    """
+    D, known = seat.directions, seat.spread > 0
+    if link.d == 2:
+        known = known & [True, True, False]
+    couples = np.zeros((3, link.n, 3))
+    for k in [2] if link.d == 2 else range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        if not (known[i] or known[j]):
+            raise MeshError(f"{where}.at: must be a bore or a face of link '{link.name}', got a single point")
+        both = 0.5 if known[i] and known[j] else 1.0
+        turn = both * (np.outer(D[i], D[j]) * known[i] - np.outer(D[j], D[i]) * known[j])
+        about = np.linalg.det(D) * D[k]
+        couples += about[:, None, None] * (seat.fit[1:].T @ turn)
+    return couples[:, :, : link.d]
+
+
 def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
     """The function whose node is at a point."""
     distance = np.where(link.one != 0, np.linalg.norm(link.X - point, axis=1), np.inf)

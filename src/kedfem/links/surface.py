@@ -21,12 +21,13 @@ SMOOTH = np.cos(np.radians(35))  # between neighbouring facets of one curved fac
 @dataclass(frozen=True, slots=True)
 class Surface:
     """Quadrature on facets of a link, in the elements' own functions: x (f, q, 3) [m], dA (f, q) [m²],
-    N (f, q, m) and the functions' numbers dofs (f, m)."""
+    N (f, q, m), the functions' numbers dofs (f, m) and outward unit normals (f, q, 3)."""
 
     x: Float[np.ndarray, "f q 3"]
     dA: Float[np.ndarray, "f q"]
     N: Float[np.ndarray, "f q m"]
     dofs: Int[np.ndarray, "f m"]
+    normals: Float[np.ndarray, "f q 3"]
 
 
 def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
@@ -44,7 +45,8 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     face = 2 * fixed + corners[0, np.arange(len(facets)), fixed].astype(int)
     dofs = link.basis.element_dofs[:, elements].T
     gauss = 4 ** (link.d - 1)
-    x, dA, N = (
+    x, normals, dA, N = (
+        np.empty((len(facets), gauss, 3)),
         np.empty((len(facets), gauss, 3)),
         np.empty((len(facets), gauss)),
         np.empty((len(facets), gauss, dofs.shape[1])),
@@ -55,9 +57,13 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
         nodes = link.X[dofs[here]]
         tangents = np.einsum("qmk,fmj->kfqj", gradient, nodes)
         N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
-        element = tangents[0] if link.d == 2 else np.cross(tangents[0], tangents[1])
-        dA[here] = link.thickness * np.linalg.norm(element, axis=2) * weights
-    return Surface(x, dA, N, dofs)
+        # of a plane link the second tangent is z
+        element = np.cross(tangents[0], tangents[1] if link.d == 3 else [0.0, 0.0, 1.0])
+        size = np.linalg.norm(element, axis=2)
+        dA[here] = link.thickness * size * weights
+        outward = np.sign(np.einsum("fqk,fqk->f", element, x[here] - nodes.mean(axis=1)[:, None]))
+        normals[here] = element / size[:, :, None] * outward[:, None, None]
+    return Surface(x, dA, N, dofs, normals)
 
 
 def _face_functions(elem: skfem.Element, fixed: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -103,7 +103,11 @@ def _motor_law(motor: Motor) -> str:
 def _spring_law(spring: Spring) -> tuple[str, str]:
     """Where a spring is, and its constants."""
     if isinstance(spring, LineSpring):
-        on, units = f"spring between {' and '.join(end.link for end in spring.between)}", ("N/m", "N s/m")
+        ends = " and ".join(end.link for end in spring.between or ())
+        on, units = (
+            f"spring between {ends}" if ends else f"spring along joint {spring.joint}",
+            ("N/m", "N s/m"),
+        )
     else:
         on, units = f"spring about joint {spring.joint}", ("N m/rad", "N m s/rad")
     constants = zip((spring.stiffness, spring.damping), units, strict=True)

@@ -21,7 +21,7 @@ from kedfem.results.acting import acting
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
-from kedfem.scene import ForceLoad, Probe, Scene
+from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
 
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
@@ -96,7 +96,8 @@ def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
     """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
     joints = [joint.at for joint in scene.joints.values() if link in joint.links]
     bodies = [body.at for body in scene.bodies.values() if body.link == link]
-    forces = [load.at for load in scene.loads.values() if isinstance(load, ForceLoad) and load.link == link]
+    single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]
+    forces = [load.at for load in single if load.at is not None]
     return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
 
 
@@ -272,7 +273,7 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
         a = nominal + in_space(carrier, elastic)
         force = wrenches[0](block)[0] - slider.mass * (a - gravity)
         for x in slider.loads:
-            force += np.outer(x.factor(motion.t), in_space(carrier, carrier.one @ x.forces))
+            force += np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
         return np.asarray(force)
 
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]

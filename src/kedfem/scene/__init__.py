@@ -16,8 +16,10 @@ from kedfem.scene.loads import (
     ForceLoad,
     Load,
     PointMass,
+    PressureLoad,
     RigidBody,
     SurfaceLoad,
+    TorqueLoad,
     inertia_tensor,
 )
 from kedfem.scene.materials import Material
@@ -68,6 +70,7 @@ __all__ = [
     "PointMass",
     "Polyline",
     "Polynomial",
+    "PressureLoad",
     "Probe",
     "Ramp",
     "RectangleSection",
@@ -82,6 +85,7 @@ __all__ = [
     "Table",
     "TimeGrid",
     "TorqueCurve",
+    "TorqueLoad",
     "TorsionSpring",
     "TubeSection",
     "drive_angle",

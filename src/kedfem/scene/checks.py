@@ -258,9 +258,17 @@ def load_faults(parts: Parts) -> Iterator[str]:
         kind = load.word("kind")
         if link is None:
             continue
-        if kind == "surface" and fidelity(link) not in {"solid", "plane"}:
+        yield from factor_faults(load, parts)
+        meshed = fidelity(link) in {"solid", "plane"} or (fidelity(link) == "rigid" and link.has("shape"))
+        if kind in {"surface", "pressure"} and not meshed:
             got = f"got {link.name!r}, which is {fidelity(link)}"
-            yield load.fault("link", f"must name a solid or a plane link for a surface load, {got}")
+            what = "surface load" if kind == "surface" else "pressure"
+            yield load.fault("link", f"must name a solid or a plane link for a {what}, {got}")
+        if kind == "torque" and fidelity(link) == "rigid" and not link.has("shape"):
+            got = f"got {link.name!r}, a slider"
+            yield load.fault("link", f"must name a link with a shape for a torque, {got}")
+        if kind == "torque" and load.word("joint") is not None and parts.joints:
+            yield from torque_joint_faults(load, parts)
         if kind == "body" and fidelity(link) == "rigid" and not link.has("shape"):
             got = f"got {link.name!r}, which is rigid"
             yield load.fault("link", f"must name a link with a shape for a body load, {got}")
@@ -272,6 +280,19 @@ def load_faults(parts: Parts) -> Iterator[str]:
             yield probe.fault("frame", "must be 'link' for a stress, got 'world'")
     for body in parts.bodies.values():
         yield from flywheel_faults(body, parts)
+
+
+def factor_faults(load: Entry, parts: Parts) -> Iterator[str]:
+    """A factor over the angle of a drive that is not there."""
+    if load.word("factor", "over") == "angle" and not parts.driven:
+        yield load.fault("factor", "needs a drive over its angle, got a scene without one", "over")
+
+
+def torque_joint_faults(load: Entry, parts: Parts) -> Iterator[str]:
+    """A torque at a joint that is not one of its link."""
+    here = [joint.name for joint in parts.joints.values() if load.word("link") in link_names(joint)]
+    if load.word("joint") not in here:
+        yield load.fault("joint", unknown_name("a joint of the link", str(load.word("joint")), here))
 
 
 def flywheel_faults(body: Entry, parts: Parts) -> Iterator[str]:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from kedfem.errors import SceneError
 from kedfem.scene.faults import fault_lines
+from kedfem.scene.loads import FACTOR_UNITS
 from kedfem.scene.placing import Placement
 from kedfem.scene.points import known_points
 from kedfem.scene.shapes import PartGeometry
@@ -86,8 +87,14 @@ def part_geometry(path: Path) -> PartGeometry:
     return part
 
 
-def motion_table(path: Path) -> tuple[list[float], list[float]]:
-    """Times [s] and angles [rad] of a CSV file with two columns, under an optional heading with units.
+def motion_table(
+    path: Path, names: tuple[str, str] = ("time", "angle"), si: tuple[str, str] = ("s", "rad")
+) -> tuple[list[float], list[float]]:
+    """Two columns of a CSV file, in SI units, under an optional heading with units.
+
+    Parameters
+    ----------
+    names, si : what the columns are, and their SI units
 
     Raises
     ------
@@ -97,14 +104,14 @@ def motion_table(path: Path) -> tuple[list[float], list[float]]:
     rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
     factors = (1.0, 1.0)
     if rows and not _numbers(rows[0][1]):
-        factors = _heading_factors(path, rows[0][1])
+        factors = _heading_factors(path, rows[0][1], names, si)
         rows = rows[1:]
     pairs = []
     for i, row in rows:
         numbers = _numbers(row)
         if numbers is None:
             raise SceneError(
-                f"{path.name}, line {i}: must be two numbers, time and angle, got {','.join(row)!r}"
+                f"{path.name}, line {i}: must be two numbers, {names[0]} and {names[1]}, got {','.join(row)!r}"
             )
         pairs.append(numbers)
     return [time * factors[0] for time, _ in pairs], [angle * factors[1] for _, angle in pairs]
@@ -118,19 +125,23 @@ def _numbers(row: list[str]) -> tuple[float, float] | None:
     return time, angle
 
 
-def _heading_factors(path: Path, row: list[str]) -> tuple[float, float]:
+def _heading_factors(
+    path: Path, row: list[str], names: tuple[str, str], si: tuple[str, str]
+) -> tuple[float, float]:
     """SI units per unit of each column, from a heading such as 'time [ms], angle [deg]'."""
     units = [re.search(r"\[(.*)\]", cell) for cell in row]
     if len(units) != 2:
-        raise SceneError(f"{path.name}, line 1: must head two columns, time and angle, got {','.join(row)!r}")
+        raise SceneError(
+            f"{path.name}, line 1: must head two columns, {names[0]} and {names[1]}, got {','.join(row)!r}"
+        )
     try:
-        time, angle = (
-            si_number(f"1 {unit[1]}", si) if unit else 1.0
-            for unit, si in zip(units, ("s", "rad"), strict=True)
+        one, other = (
+            si_number(f"1 {unit[1]}", of) if unit else 1.0 for unit, of in zip(units, si, strict=True)
         )
     except ValueError as reason:
-        raise SceneError(f"{path.name}, line 1: must have units of time and angle, got: {reason}") from None
-    return time, angle
+        wanted = f"must have units of {names[0]} and {names[1]}"
+        raise SceneError(f"{path.name}, line 1: {wanted}, got: {reason}") from None
+    return one, other
 
 
 def with_motion_table(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
@@ -147,3 +158,28 @@ def with_motion_table(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
     except SceneError as error:
         return dict(raw), [f"drive.motion.file: {fault}" for fault in error.faults]
     return {**raw, "drive": {**drive, "motion": {"kind": "table", "time": time, "angle": angle}}}, []
+
+
+def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with the factors of its loads read from the files that they name; and faults."""
+    loads, faults = raw.get("loads"), []
+    if not isinstance(loads, Mapping):
+        return dict(raw), []
+    read = dict(loads)
+    for name, load in loads.items():
+        factor = load.get("factor") if isinstance(load, Mapping) else None
+        if not isinstance(factor, Mapping) or not isinstance(factor.get("file"), str):
+            continue
+        over = factor.get("over", "time")
+        if over not in FACTOR_UNITS or factor.keys() & {"time", "at", "value"}:
+            continue
+        try:
+            at, value = motion_table(
+                folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1")
+            )
+        except SceneError as error:
+            faults += [f"loads.{name}.factor.file: {fault}" for fault in error.faults]
+            continue
+        table = {key: x for key, x in factor.items() if key != "file"}
+        read[name] = {**load, "factor": {**table, "over": over, "at": at, "value": value}}
+    return {**raw, "loads": read}, faults

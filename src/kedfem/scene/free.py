@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, get_args
 
 from kedfem.scene.checks import fidelity, link_names
 from kedfem.scene.damping import rayleigh
 from kedfem.scene.frames import default_frames
 from kedfem.scene.initial import SLIDING, TURNING
-from kedfem.scene.links import GROUND
+from kedfem.scene.links import GROUND, Joint
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.units import Quantity, si_number
 from kedfem.scene.wording import shown, unknown_name
 
-FOLLOWING = 'needs analysis.frames = "following"'
+EVERY_JOINT = frozenset(get_args(Joint.model_fields["kind"].annotation))
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
 
 
@@ -36,6 +36,9 @@ def frame_faults(parts: Parts) -> Iterator[str]:
     if parts.analysis.raw.get("stiffening") is True and any_following(parts):
         wanted = "must stand with nominal frames (those that follow know all of it)"
         yield parts.analysis.fault("stiffening", f"{wanted}, got it with frames that follow")
+    if parts.analysis.raw.get("stiffening") is True and (parts.motors or parts.springs):
+        wanted = "must stand without motors and springs, whose stresses it does not know"
+        yield parts.analysis.fault("stiffening", f"{wanted}, got {shown([*parts.motors, *parts.springs])}")
     if parts.analysis.word("solver") == "literal" and any_following(parts):
         yield parts.analysis.fault("solver", "must be 'condensed' for frames that follow, got 'literal'")
     for link in parts.links.values():
@@ -73,7 +76,7 @@ def motor_faults(parts: Parts) -> Iterator[str]:
             continue
         kind, key = joint.word("kind"), "torque" if motor.has("torque") else "force"
         wanted = {"torque": "revolute", "force": "prismatic"}[key]
-        if kind in {"spherical", "weld", *AXES} - {wanted} and motor.has(key):
+        if kind in EVERY_JOINT - {wanted} and motor.has(key):
             got = f"got {joint.name!r}, which is {kind}"
             yield motor.fault("joint", f"must name a {wanted} joint for a {key}, {got}")
         yield from held_joint_faults(parts, motor, joint)
@@ -82,8 +85,8 @@ def motor_faults(parts: Parts) -> Iterator[str]:
 def spring_faults(parts: Parts) -> Iterator[str]:
     """Springs on links or joints that do not exist, or that they cannot move."""
     for spring in parts.springs.values():
-        if spring.word("kind") == "torsion":
-            yield from torsion_faults(parts, spring)
+        if spring.word("kind") == "torsion" or spring.has("joint"):
+            yield from joint_spring_faults(parts, spring)
             continue
         names = end_links(spring)
         for i, name in enumerate(names):
@@ -92,19 +95,21 @@ def spring_faults(parts: Parts) -> Iterator[str]:
                 yield spring.fault("between", unknown_name("a link", name, known), i, "link")
         if names == [GROUND, GROUND]:
             yield spring.fault("between", "must hold a link, got the ground twice")
-        yield from nominal_faults(parts, spring, "between", [name for name in names if name])
 
 
-def torsion_faults(parts: Parts, spring: Entry) -> Iterator[str]:
-    """A torsion spring away from a hinge, or where it cannot move anything."""
+def joint_spring_faults(parts: Parts, spring: Entry) -> Iterator[str]:
+    """A torsion spring away from a hinge, one along what is no slide, or where it cannot move anything."""
     joint = joint_of(parts, spring)
     if joint is None:
         if spring.word("joint") and parts.joints:
             yield spring.fault("joint", unknown_name("a joint", str(spring.word("joint")), parts.joints))
         return
     kind = joint.word("kind")
-    if kind in {"spherical", "weld", "prismatic"}:
-        yield spring.fault("joint", f"must name a revolute joint, got {joint.name!r}, which is {kind}")
+    wanted = "revolute" if spring.word("kind") == "torsion" else "prismatic"
+    if kind in EVERY_JOINT - {wanted}:
+        yield spring.fault("joint", f"must name a {wanted} joint, got {joint.name!r}, which is {kind}")
+    elif kind == "prismatic" and GROUND not in link_names(joint):
+        yield spring.fault("joint", f"must name a joint on the ground, got {joint.name!r}")
     yield from held_joint_faults(parts, spring, joint)
 
 
@@ -114,25 +119,9 @@ def joint_of(parts: Parts, entry: Entry) -> Entry | None:
 
 
 def held_joint_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]:
-    """A motor or spring on a joint that the drive moves, or between links with nominal frames."""
+    """A motor or spring on a joint that the drive moves."""
     if parts.drive.word("joint") == joint.name:
         yield entry.fault("joint", f"must name a joint that the drive does not move, got {joint.name!r}")
-    else:
-        yield from nominal_faults(parts, entry, "joint", link_names(joint))
-
-
-def nominal_faults(parts: Parts, entry: Entry, key: str, names: list[str]) -> Iterator[str]:
-    """A motor or spring on links whose nominal frames leave its force no say: it depends on the state."""
-    held = [parts.links[name] for name in names if name in parts.links]
-    driven = link_names(parts.joints[name]) if (name := parts.drive.word("joint")) in parts.joints else []
-    nominal = [
-        link.name
-        for link in held
-        if frames_of(parts, link) == "nominal" and not (fidelity(link) == "rigid" and link.name in driven)
-    ]
-    if nominal:
-        got = f"got nominal frames of {nominal[0]!r}"
-        yield entry.fault(key, f"{FOLLOWING}, as forces that depend on the motion do, {got}")
 
 
 def end_links(spring: Entry) -> list[str | None]:

@@ -107,6 +107,14 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
     )
 
 
-def load_factor(factor: Factor, t: Times) -> Times:
-    """Factor of a load at times t (t,) [s]: linear between the table's times, held outside."""
-    return np.asarray(np.interp(np.asarray(t, dtype=float), factor.time, factor.value))
+def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
+    """Factor of a load at times t (t,) [s] and angles phi (t,) of the drive [rad].
+
+    Linear between the table's points; held outside, or repeated after its period.
+    """
+    at, value = np.array(factor.at), np.array(factor.value)
+    x = np.asarray(t if factor.over == "time" or phi is None else phi, dtype=float)
+    if factor.period is not None:
+        x = at[0] + np.mod(x - at[0], factor.period)
+        at, value = np.append(at, at[0] + factor.period), np.append(value, value[0])
+    return np.asarray(np.interp(x, at, value))

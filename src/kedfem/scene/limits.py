@@ -10,7 +10,7 @@ from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import FLAT, off_plane, spring_ends, vector
+from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
 from kedfem.scene.shapes import Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
@@ -32,10 +32,7 @@ def planar_faults(parts: Parts) -> Iterator[str]:
     if parts.gravity[2] != 0.0:
         yield f"gravity: must lie in the xy plane in {here} [m/s^2], got {vector(parts.gravity)}"
     for load in parts.loads.values():
-        if load.record is not None and load.record.vector[2] != 0.0:
-            yield load.fault(
-                "vector", f"must lie in the xy plane in {here}, got {vector(load.record.vector)}"
-            )
+        yield from leaving(load, f"in {here}")
     yield from mixed_faults(parts)
     yield from plane_faults(parts, here)
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.base import Fault, Record, refuse
-from kedfem.scene.loads import Force
+from kedfem.scene.base import Record, refuse
+from kedfem.scene.loads import Abscissa, Force, Torque, curve_faults
 from kedfem.scene.units import Quantity
-
-Torque = Annotated[float, Quantity("N*m")]
-Abscissa = Annotated[Any, Field()]
-"""A place in a curve: its unit depends on what the curve is over."""
 
 
 class Curve(Record):
@@ -36,21 +31,6 @@ class Curve(Record):
                 refuse([(("at", i), reason.message())])
         refuse(curve_faults(numbers, self.value, quantity))
         return self.fill(at=tuple(numbers))
-
-
-def curve_faults(at: list[float], value: tuple[float, ...], quantity: Quantity) -> list[Fault]:
-    """What is wrong with a curve: places and messages."""
-    if not at:
-        return [(("at",), f"must hold at least one value{quantity.bracket}, got none")]
-    faults: list[Fault] = []
-    for i, (before, after) in enumerate(pairwise(at), start=1):
-        if after <= before:
-            message = f"must be above the one before, {before:.6g}{quantity.bracket}, got {after:.6g}"
-            faults.append((("at", i), message))
-            break
-    if len(value) != len(at):
-        faults.append((("value",), f"must hold one value for each of the {len(at)} of at, got {len(value)}"))
-    return faults
 
 
 class TorqueCurve(Curve):

@@ -94,9 +94,19 @@ def obstacles(parts: Parts, name: str) -> Iterator[str]:
     if parts.gravity[2] != 0.0:
         yield f"gravity: must lie in the xy plane {whose} [m/s^2], got {vector(parts.gravity)}"
     for load in parts.loads.values():
-        if load.record is not None and load.record.vector[2] != 0.0:
-            yield load.fault("vector", f"must lie in the xy plane {whose}, got {vector(load.record.vector)}")
+        yield from leaving(load, whose)
     yield from plane_obstacles(parts, name)
+
+
+def leaving(load: Entry, whose: str) -> Iterator[str]:
+    """A force out of the xy plane, or a torque in it."""
+    given = getattr(load.record, "vector", None)
+    if given is None:
+        return
+    if load.record.kind == "torque" and any(given[:2]):
+        yield load.fault("vector", f"must be along z {whose}, got {vector(given)}")
+    elif load.record.kind != "torque" and given[2] != 0.0:
+        yield load.fault("vector", f"must lie in the xy plane {whose}, got {vector(given)}")
 
 
 def joint_obstacles(parts: Parts, name: str, whose: str) -> Iterator[str]:
@@ -158,7 +168,7 @@ def touching(parts: Parts, name: str) -> Iterator[Entry]:
 def spring_ends(spring: Entry) -> list[Entry]:
     """The ends of a spring between two points, as entries, if it is good."""
     ends = getattr(spring.record, "between", ())
-    return [Entry((*spring.where, "between", i), {}, end) for i, end in enumerate(ends)]
+    return [Entry((*spring.where, "between", i), {}, end) for i, end in enumerate(ends or ())]
 
 
 def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:
@@ -170,5 +180,5 @@ def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:
     for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
         yield ("shape", "outline", i), getattr(item, "to", item)
     for key in ("at", "centre"):
-        if hasattr(record, key):
+        if getattr(record, key, None) is not None:
             yield (key,), getattr(record, key)

@@ -22,7 +22,7 @@ from kedfem.scene.checks import drive_faults, joint_faults, link_faults, load_fa
 from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive, MotionLaw
 from kedfem.scene.faults import fault_lines
-from kedfem.scene.files import scene_folder, with_motion_table
+from kedfem.scene.files import scene_folder, with_factor_tables, with_motion_table
 from kedfem.scene.frames import default_frames
 from kedfem.scene.free import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
 from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
@@ -129,7 +129,8 @@ class Scene(Record):
         if isinstance(analysis := raw.get("analysis"), Mapping) and analysis.get("accuracy") is not None:
             raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_table(raw, scene_folder.get())
-        faults = placement.faults + faults
+        raw, more = with_factor_tables(raw, scene_folder.get())
+        faults = placement.faults + faults + more
         if raw.get("drive") is not None and raw.get("joints", {}) == {}:
             faults.append("joints: is required with a drive, got nothing")
         with known_points(placement):

@@ -1,14 +1,16 @@
-"""Springs with dampers: between two points, or about a hinge."""
+"""Springs with dampers: between two points, along a slide or about a hinge."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from kedfem.scene.base import Record, refuse
+from kedfem.scene.loads import Force, Torque
 from kedfem.scene.points import Point
-from kedfem.scene.units import Angle, Quantity
+from kedfem.scene.units import Angle, Length, Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", least=0.0)]
 Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
@@ -35,28 +37,68 @@ class _Elastic(Record):
             refuse([(("stiffness",), "must be positive, or damping, got neither")])
         return self
 
+    @model_validator(mode="after")
+    def _preloaded(self) -> Self:
+        if getattr(self, "preload", None) is None:
+            return self
+        for key in ("free_length", "free_travel", "free_angle"):
+            if getattr(self, key, None) is not None:
+                refuse([(("preload",), f"must stand without {key}, got both")])
+        if not getattr(self, "stiffness", 1.0):
+            refuse([(("preload",), "must stand with a stiffness, got none")])
+        return self
+
 
 class LineSpring(_Elastic):
-    """A spring and a damper between two points: it pulls with k (l − l0) + c l'."""
+    """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l'.
+
+    Along a slide l is the travel of the joint's first link that is not the ground against the other, from the drawn
+    position, and what it pulls back is that link.
+    """
 
     kind: Literal["spring"] = "spring"
-    between: tuple[SpringEnd, SpringEnd]
+    between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
+    joint: str | None = None
+    """a prismatic joint on the ground that it lies along, instead of two ends"""
     stiffness: Stiffness = 0.0
     """k"""
     damping: Damper = 0.0
     """c"""
     free_length: FreeLength | None = None
-    """l0, at which it does not pull; as long as drawn if not given"""
+    """l0 between two points, at which it does not pull; as long as drawn if not given"""
+    free_travel: Length | None = None
+    """l0 along a slide, at which it does not pull; 0, the drawn position, if not given"""
+    preload: Force | None = None
+    """with what it pulls in the drawn position, instead of l0; negative: it pushes"""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
+        if self.between is None:
+            if self.joint is None:
+                refuse([(("between",), "is required, or a joint, got neither")])
+            if self.free_length is not None:
+                refuse([(("free_length",), "must be free_travel [m] along a joint, got a length")])
+            return self
+        if self.joint is not None:
+            refuse([(("between",), "must stand without joint, got both")])
+        if self.free_travel is not None:
+            refuse([(("free_travel",), "must be free_length [m] between two points, got a travel")])
         a, b = self.between
-        if a.at == b.at and self.free_length != 0.0:
+        if a.at == b.at and (self.free_length != 0.0 or self.preload):
             refuse(
                 [(("between",), "must be two different points unless free_length = 0, got the same twice")]
             )
         return self
+
+    @property
+    def free(self) -> float:
+        """l0: the length or travel at which it does not pull [m]."""
+        drawn = 0.0 if self.between is None else math.dist(*(end.at for end in self.between))
+        given = self.free_travel if self.between is None else self.free_length
+        if self.preload is not None:
+            return drawn - self.preload / self.stiffness
+        return drawn if given is None else given
 
 
 class TorsionSpring(_Elastic):
@@ -69,9 +111,18 @@ class TorsionSpring(_Elastic):
     """k"""
     damping: TorsionDamper = 0.0
     """c"""
-    free_angle: Angle = 0.0
-    """φ0, at which it does not turn, from the drawn position: the turn of the joint's first link that is not the ground
-    against the other, about the joint's axis"""
+    free_angle: Angle | None = None
+    """φ0, at which it does not turn, from the drawn position; 0 if not given: the turn of the joint's first link that is
+    not the ground against the other, about the joint's axis"""
+    preload: Torque | None = None
+    """with what it turns back in the drawn position, −k φ0, instead of φ0"""
+
+    @property
+    def free(self) -> float:
+        """φ0 [rad]."""
+        if self.preload is not None:
+            return -self.preload / self.stiffness
+        return self.free_angle or 0.0
 
 
 Spring = Annotated[LineSpring | TorsionSpring, Field(discriminator="kind")]

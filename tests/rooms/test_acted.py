@@ -1,0 +1,203 @@
+"""Springs, dampers and motors on links with nominal frames: the same answer as with frames that follow, for small forces."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.acted import ActedSteps
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.errors import SolveError
+from kedfem.results.audit import Account
+from kedfem.results.recording import recording
+from kedfem.scene import scene_from
+
+E, RHO = 2.1e11, 7850.0
+LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "ground", "at": [0.1, 0.4]}]}
+
+
+def four_bar(frames: str, fidelity: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
+    """A slow four-bar of steel, a quarter of a turn."""
+    analysis = {"turns": 0.25, "steps_per_turn": steps, "frames": frames, "initial": "quasi-static"}
+    mesh = {"elements": 2} if fidelity == "beam" else {}
+    bars = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
+    joints = {
+        "A": ["ground", "crank"],
+        "B": ["crank", "coupler"],
+        "C": ["coupler", "rocker"],
+        "D": ["rocker", "ground"],
+    }
+    return {
+        "points": {
+            "A": [0, 0], "D": [0.3, 0],
+            "B": {"from": "A", "distance": 0.1, "angle": "60 deg"},
+            "C": {"from": ["B", "D"], "distances": [0.3, 0.25]},
+        },
+        "materials": {"m": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.3}},
+        "links": {
+            name: {
+                "material": "m", "fidelity": fidelity, "mesh": mesh,
+                "shape": {"kind": "bar", "between": ends, "width": 0.02, "thickness": 0.01},
+            }
+            for name, ends in bars.items()
+        },
+        "joints": {name: {"kind": "revolute", "links": links, "at": name} for name, links in joints.items()},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}},
+        "analysis": {**analysis, **rest.pop("analysis", {})},
+        **rest,
+    }  # fmt: skip
+
+
+def run(raw: dict[str, Any]) -> tuple[Prepared, list[Block]]:
+    ready, _ = prepared(scene_from(raw))
+    solver = steps_of(ready.scene, ready.model)
+    return ready, list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver))
+
+
+def places(raw: dict[str, Any]) -> dict[tuple[Any, ...], np.ndarray]:
+    """Displacement over time of all nodes, by link and place: segments or not."""
+    ready, blocks = run(raw)
+    found = {}
+    for k, link in enumerate(ready.model.links):
+        u = np.concatenate([block.links[k].u for block in blocks])
+        found |= {(link.name, *np.round(x, 9)): u[:, j, :2] for j, x in enumerate(link.X)}
+    return found
+
+
+def apart(a: dict[tuple[Any, ...], np.ndarray], b: dict[tuple[Any, ...], np.ndarray]) -> float:
+    assert b.keys() <= a.keys()
+    return max(float(np.abs(a[key] - b[key]).max()) for key in b)
+
+
+def largest(a: dict[tuple[Any, ...], np.ndarray]) -> float:
+    return max(float(np.abs(x).max()) for x in a.values())
+
+
+def line(load: float) -> dict[str, Any]:
+    """A spring with damper and a torsion spring whose forces are all in proportion to a load."""
+    return {
+        "s": {**LINE, "stiffness": 10 * load, "damping": 0.1 * load, "preload": load},
+        "t": {
+            "kind": "torsion",
+            "joint": "D",
+            "stiffness": 0.1 * load,
+            "damping": 1e-3 * load,
+            "preload": 0.01 * load,
+        },
+    }
+
+
+def test_the_difference_to_frames_that_follow_falls_with_the_square_of_the_load() -> None:
+    found = []
+    for load in (400.0, 200.0):
+        followed, nominal = (
+            places(four_bar(frames, springs=line(load))) for frames in ("following", "nominal")
+        )
+        assert apart(followed, nominal) < 2e-3 * largest(nominal)
+        found.append(apart(followed, nominal))
+    assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.parametrize("initial", ["rest", "quasi-static"])
+@pytest.mark.parametrize("rho_inf", [1.0, 0.8])
+def test_the_literal_solver_finds_the_same(initial: str, rho_inf: float) -> None:
+    """It assembles and factors all of it at every step."""
+    analysis = {"initial": initial, "rho_inf": rho_inf}
+    condensed = four_bar("nominal", springs=line(200.0), analysis=analysis, steps=90)
+    literal = four_bar("nominal", springs=line(200.0), analysis={**analysis, "solver": "literal"}, steps=90)
+    ready, _ = prepared(scene_from(literal))
+    solver = steps_of(ready.scene, ready.model)
+    assert isinstance(solver, ActedSteps)
+    assert isinstance(solver.inner, LiteralSteps)
+    one, other = places(condensed), places(literal)
+    assert apart(one, other) < 1e-9 * largest(one)
+
+
+def channel(ready: Prepared, blocks: list[Block], name: str) -> np.ndarray:
+    """One recorded channel over time."""
+    (found,) = (x for x in recording(ready.scene, ready.model) if x.channel.name == name)
+    return np.concatenate([found.rows(block)[:, 0] for block in blocks])
+
+
+def tied(k: float, **analysis: Any) -> dict[str, Any]:
+    """A spring between the ends of the coupler."""
+    ends = [{"link": "coupler", "at": "C"}, {"link": "coupler", "at": "B"}]
+    tie = {"kind": "spring", "between": ends, "stiffness": k}
+    pull = {**LINE, "stiffness": 1e3, "preload": 1e3}
+    return four_bar("nominal", springs={"s": pull, "tie": tie}, steps=90, analysis=analysis)
+
+
+def test_a_spring_may_be_far_stiffer_than_the_links() -> None:
+    """One of 1e12 N/m keeps the ends of the coupler, E A / L = 1.4e8 N/m, apart as drawn."""
+    soft, stiff = (np.ptp(channel(*run(tied(k)), "springs/tie/length")) for k in (1.0, 1e12))
+    assert 0 < stiff < 1e-3 * soft
+    one, other = places(tied(1e12)), places(tied(1e12, solver="literal"))
+    assert apart(one, other) < 1e-7 * largest(one)
+
+
+def test_the_same_law_drives_a_motor() -> None:
+    """Over the speed of its joint, elastic part and all; constant ones are loads on both links."""
+    curve = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
+    for torque in (curve, 2.0, {"over": "angle", "at": [-1, 1], "value": [3, -3]}):
+        followed, nominal = (
+            places(four_bar(frames, motors={"m": {"joint": "C", "torque": torque}}))
+            for frames in ("following", "nominal")
+        )
+        assert apart(followed, nominal) < 1e-3 * largest(nominal)
+
+
+@pytest.mark.parametrize("fidelity", ["plane", "solid"])
+def test_meshed_links_bear_springs_too(fidelity: str) -> None:
+    followed, nominal = (
+        places(four_bar(frames, fidelity, springs=line(50.0), steps=72))
+        for frames in ("following", "nominal")
+    )
+    assert apart(followed, nominal) < 1e-3 * largest(nominal)
+
+
+def test_without_a_force_a_spring_changes_nothing() -> None:
+    slack = {"s": {**LINE, "stiffness": 1e-9, "preload": 0.0}}
+    plain, held = places(four_bar("nominal")), places(four_bar("nominal", springs=slack))
+    assert apart(plain, held) < 1e-9 * largest(plain)
+
+
+def balance(raw: dict[str, Any]) -> tuple[float, float]:
+    """What is left over of the energy, and the work of the loads."""
+    ready, blocks = run(raw)
+    account = Account(ready.model)
+    work = [account.rows(block)["work"][-1, 0] for block in blocks]
+    return account.balance.energy, work[-1]
+
+
+def test_the_energy_left_over_falls_with_the_square_of_the_step() -> None:
+    (long, work), (short, same) = (
+        balance(four_bar("nominal", springs=line(200.0), steps=n)) for n in (360, 720)
+    )
+    assert long / short == pytest.approx(4.0, rel=0.3)
+    assert work == pytest.approx(same, rel=1e-3)
+
+
+def test_the_work_is_that_which_springs_store() -> None:
+    """Of a spring without damper: the energy ½ k (l − l0)² that it had more at first."""
+    spring = {"s": {**LINE, "stiffness": 2000.0, "preload": 50.0}}
+    ready, blocks = run(four_bar("nominal", springs=spring, steps=720))
+    account = Account(ready.model)
+    work = np.concatenate([account.rows(block)["work"][:, 0] for block in blocks])
+    force, length = (channel(ready, blocks, f"springs/s/{x}") for x in ("force", "length"))
+    start = np.linalg.norm(np.subtract(ready.scene.joints["C"].at[:2], [0.1, 0.4]))
+    assert_allclose(force, 2000.0 * (length - start) + 50.0, rtol=1e-9)
+    stored = force**2 / 2 / 2000.0
+    assert_allclose(work, stored[0] - stored, atol=1e-4 * np.ptp(stored))
+
+
+def test_forces_that_tear_the_links_apart_are_told() -> None:
+    raw = four_bar(
+        "nominal", springs={"s": {**LINE, "stiffness": 1e9}}, analysis={"initial": "rest"}, steps=20
+    )
+    with pytest.raises(SolveError, match="springs, motors: the sweeps of a step must settle"):
+        run(raw)
