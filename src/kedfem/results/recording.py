@@ -9,18 +9,21 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.inertias import inertias_of_model
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Carried, Model, Slider, on_segment
 from kedfem.dynamics.ports import turned_ports
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.linkage import joint_axis, linkage
+from kedfem.motion.path import Path
 from kedfem.motion.rows import cross
 from kedfem.results.acting import acting
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
+from kedfem.results.rigid import rigid_forces
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
 
 XYZ = ("x", "y", "z")
@@ -29,12 +32,15 @@ INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint w
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
-def recording(scene: Scene, model: Model, account: Account | None = None) -> list[Recorded]:
+def recording(
+    scene: Scene, model: Model, account: Account | None = None, along: Path | None = None
+) -> list[Recorded]:
     """All channels that a scene asks for.
 
     Parameters
     ----------
     account : of energy and momentum, if one is kept already
+    along : path of the rigid motion, if joint forces of rigid links are wanted beside those of elastic ones
 
     Raises
     ------
@@ -43,14 +49,27 @@ def recording(scene: Scene, model: Model, account: Account | None = None) -> lis
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    drive = [] if scene.driven is None else [*_torque(scene, model, scene.driven), _rigid_torque(model)]
+    drive = [] if scene.driven is None else _torque(scene, model, scene.driven)
     energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
-    return [*probes, *joints, *drive, *acting(scene, model), *energies]
+    return [*probes, *joints, *drive, *_rigid(scene, model, along), *acting(scene, model), *energies]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
     """The rows of every channel."""
     return {each.channel.name: each.rows(block) for each in recorded}
+
+
+def _rigid(scene: Scene, model: Model, along: Path | None) -> list[Recorded]:
+    """What joints and drive would bear were all links rigid."""
+    if scene.driven is None:
+        return []
+    linked = linkage(scene)
+    forces = rigid_forces(scene, linked, inertias_of_model(scene, linked, model), along)
+
+    def rows(name: str) -> Callable[[Block], Rows]:
+        return lambda block: forces.rows(block.motion, block.step)[name]
+
+    return [Recorded(each.channel, rows(each.channel.name)) for each in forces.every]
 
 
 def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
@@ -293,28 +312,6 @@ def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
             return []
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
-
-
-def _rigid_torque(model: Model) -> Recorded:
-    """The drive's torque if all links were rigid: virtual work of P − M R0'' along the drive, −Σ F · ∂R0/∂φ."""
-    channel = Channel(
-        "drive/rigid_torque", ("torque",), "N m", "world", "torque of the drive were all links rigid"
-    )
-
-    def torque(block: Block) -> Rows:
-        motion, work = block.motion, np.zeros(len(block))
-        elastic = zip(model.links, model.bodies, (history.F for history in block.links), strict=True)
-        for link, body, F in (*elastic, *((x.link, x.body, _on_carried(x, block)) for x in model.carried)):
-            v, w = motion.v_phi[:, body], motion.omega_phi[:, body]
-            N = motion.R[:, body] @ (link.X.T @ in_space(link, F))  # Σ (R X) ⊗ F
-            moment = np.stack([N[:, i, j] - N[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
-            total = np.tensordot(F, link.one, (1, 0))
-            if link.kind == "beam":
-                moment[:, 2] += total[:, 2]
-            work += (in_space(link, total) * v + w * moment).sum(axis=1)
-        return -work[:, None]
-
-    return Recorded(channel, torque)
 
 
 def _holder(model: Model, name: str, joint: str) -> int:

@@ -1,0 +1,265 @@
+"""Links as rigid bodies: masses, their moments, and loads, in the drawn position; what acts on each over time.
+
+All that a rigid body does to the balance of forces is in ∫ρ dV, ∫ρ X dV and ∫ρ X ⊗ X dV; all that a load does in Σ f and
+Σ X ⊗ f, whatever the link is made of.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.coupling import slider_axis
+from kedfem.dynamics.loads import Pattern, patterns
+from kedfem.dynamics.model import Model
+from kedfem.links.bodies import euler_tensor
+from kedfem.links.record import Link, in_space
+from kedfem.motion.linkage import Linkage, unit
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
+from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, load_factor
+
+Vector = Float[np.ndarray, "3"]
+Wrenches = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
+
+
+@dataclass(frozen=True, slots=True)
+class RigidLoad:
+    """One load on one body.
+
+    body : its number
+    force : (3,) Σ f at factor one, as drawn [N]
+    moment : (3, 3) Σ X ⊗ f, X from the linkage's centre [N m]
+    couple : about z, of planar beams [N m]
+    follows, factor : as in `Pattern`
+    """
+
+    body: int
+    force: Vector
+    moment: Float[np.ndarray, "3 3"]
+    couple: float
+    follows: bool
+    factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
+
+
+@dataclass(slots=True)
+class Inertias:
+    """Moments of mass of all bodies (ground first), as drawn, X from the linkage's centre, and the loads.
+
+    mass : (B,) [kg]
+    first : (B, 3) ∫ρ X dV [kg m]
+    second : (B, 3, 3) ∫ρ X ⊗ X dV [kg m²]
+    spin : (B,) inertia of the sections of planar beams about z [kg m²]
+    centre, gravity : (3,) of the linkage [m]; [m/s²]
+    """
+
+    mass: Float[np.ndarray, " B"]
+    first: Float[np.ndarray, "B 3"]
+    second: Float[np.ndarray, "B 3 3"]
+    spin: Float[np.ndarray, " B"]
+    centre: Vector
+    gravity: Vector
+    loads: list[RigidLoad] = field(default_factory=list)
+
+    def add(self, body: int, mass: float, at: Vector, second: Float[np.ndarray, "3 3"] | float = 0.0) -> None:
+        """A mass with its centre at a drawn point, and its second moment about that."""
+        arm = at - self.centre
+        self.mass[body] += mass
+        self.first[body] += mass * arm
+        self.second[body] += mass * np.outer(arm, arm) + second
+
+    def add_link(self, body: int, link: Link) -> None:
+        """A link, or a segment of one."""
+        weights, arms = link.m1[:, 0], link.X - np.outer(link.one, self.centre)
+        mass = float(link.one @ weights)
+        moments = link.mX - np.outer(weights, self.centre)  # ∫ρ N_a X dV
+        if link.planar:
+            arms, moments = arms * [1, 1, 0], moments * [1, 1, 0]
+        self.mass[body] += mass
+        self.first[body] += link.one @ moments
+        self.second[body] += arms.T @ moments
+        self.spin[body] += float(link.one @ link.m1[:, 2]) if link.kind == "beam" else 0.0
+
+    def add_load(self, body: int, link: Link, load: Pattern) -> None:
+        """A load on a link or segment."""
+        f = in_space(link, load.forces)
+        arms = (link.X - np.outer(link.one, self.centre)) * [1, 1, 0 if link.planar else 1]
+        couple = float(link.one @ load.forces[:, 2]) if link.kind == "beam" else 0.0
+        self.loads.append(RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor))
+
+    def centre_of(self, body: int) -> Vector | None:
+        """Centre of mass of a body, as drawn [m]; None without mass."""
+        if not self.mass[body] > 0:
+            return None
+        return np.asarray(self.centre + self.first[body] / self.mass[body])
+
+
+def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
+    """Of an elastic model: attached bodies are in the mass of its links, sliders are bodies of their own again."""
+    out = _none(scene, linkage)
+    first = int(any(scene.gravity))
+    riding = [sum(len(x.loads) for x in model.sliders if x.carrier == k) for k in range(len(model.links))]
+    for link, body, loads, last in zip(model.links, model.bodies, model.loads, riding, strict=True):
+        out.add_link(body, link)
+        _add_loads(out, body, link, loads[first : len(loads) - last])
+    for carried in model.carried:
+        out.add_link(carried.body, carried.link)
+        _add_loads(out, carried.body, carried.link, carried.loads[first:])
+    for slider in model.sliders:
+        carrier = model.links[slider.carrier]
+        at = slider.weights @ carrier.X
+        out.add(model.bodies[slider.carrier], -slider.mass, _flat(carrier, at, out.centre))
+    _add_sliders(out, scene, linkage)
+    return out
+
+
+def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> Inertias:
+    """Of records of links without attached bodies, by name; links that are missing there have no mass.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a load does not fit its link.
+    """
+    out = _none(scene, linkage)
+    loads = patterns(scene, dict(links))
+    for name, link in links.items():
+        body = linkage.bodies.index(name)
+        out.add_link(body, link)
+        _add_loads(out, body, link, loads[name][int(any(scene.gravity)) :])
+    for each in scene.bodies.values():
+        if slider_axis(scene, each.link) is None:
+            _add_body(out, scene, linkage, each)
+    bare = [name for name in scene.links if name not in links and slider_axis(scene, name) is None]
+    _add_forces(out, scene, linkage, bare)
+    _add_sliders(out, scene, linkage)
+    return out
+
+
+def acting(inertias: Inertias, motion: RigidMotion) -> Wrenches:
+    """P − M R0'' of all bodies over time as forces and moments, [KED, eqs. (17)(19)], moments about the points drawn at
+    the linkage's centre.
+
+    Returns
+    -------
+    (T, B, 3) each [N, N m], world components, ground first
+    """
+    R, c = motion.R, inertias.centre
+    a = inertias.gravity - motion.p2 - motion.R2 @ c
+    S = np.einsum("tbij,bj->tbi", R, inertias.first)
+    force = inertias.mass[:, None] * a - np.einsum("tbij,bj->tbi", motion.R2, inertias.first)
+    moment = cross(S, a) - _axial((R @ inertias.second) @ np.swapaxes(motion.R2, -1, -2))
+    moment[..., 2] -= inertias.spin * motion.alpha[..., 2]
+    for load in inertias.loads:
+        f, m = _load(load, motion)
+        force[:, load.body] += f
+        moment[:, load.body] += m
+    return force, moment
+
+
+def kinetic_energy(inertias: Inertias, motion: RigidMotion) -> Float[np.ndarray, " T"]:
+    """½ ∫ρ |x'|² dV of all bodies [J]."""
+    R1 = _rate(motion)
+    v = motion.v + np.einsum("tbij,j->tbi", R1, inertias.centre)
+    moving = np.einsum("b,tbi,tbi->t", inertias.mass, v, v)
+    mixed = np.einsum("tbi,tbij,bj->t", v, R1, inertias.first)
+    turning = np.einsum("tbij,bjk,tbik->t", R1, inertias.second, R1)
+    spinning = motion.omega[..., 2] ** 2 @ inertias.spin
+    return np.asarray(0.5 * (moving + 2 * mixed + turning + spinning))
+
+
+def load_power(inertias: Inertias, motion: RigidMotion) -> Float[np.ndarray, " T"]:
+    """Power of loads and gravity on the rigid motion [W]."""
+    v = motion.v + cross(motion.omega, motion.R @ inertias.centre)
+    arm = np.einsum("tbij,bj->tbi", motion.R, inertias.first)
+    power = np.asarray((inertias.mass[:, None] * v + cross(motion.omega, arm)).sum(axis=1) @ inertias.gravity)
+    for load in inertias.loads:
+        f, m = _load(load, motion)
+        power = power + (f * v[:, load.body] + m * motion.omega[:, load.body]).sum(axis=1)
+    return power
+
+
+def _rate(motion: RigidMotion) -> Float[np.ndarray, "T B 3 3"]:
+    """R' = ω × R, column by column."""
+    R = np.swapaxes(motion.R, -1, -2)
+    return np.swapaxes(cross(motion.omega[:, :, None], R), -1, -2)
+
+
+def _load(load: RigidLoad, motion: RigidMotion) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Force and moment of a load over time, about the point drawn at the linkage's centre."""
+    R, factor = motion.R[:, load.body], load.factor(motion.t)[:, None]
+    N = R @ load.moment
+    force = np.broadcast_to(load.force, (len(R), 3))
+    if load.follows:
+        N, force = N @ np.swapaxes(R, 1, 2), R @ load.force
+    moment = _axial(N)
+    moment[:, 2] += load.couple
+    return factor * force, factor * moment
+
+
+def _axial(N: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3"]:
+    """Σ a × b of N = Σ a ⊗ b."""
+    return np.stack([N[..., i, j] - N[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
+
+
+def _none(scene: Scene, linkage: Linkage) -> Inertias:
+    B, gravity = len(linkage.bodies), np.asarray(scene.gravity)
+    return Inertias(np.zeros(B), np.zeros((B, 3)), np.zeros((B, 3, 3)), np.zeros(B), linkage.centre, gravity)
+
+
+def _flat(link: Link, at: Vector, centre: Vector) -> Vector:
+    """A point of a link; of a planar one at the height of the linkage's centre, as all its mass."""
+    return np.where([True, True, not link.planar], at, centre)
+
+
+def _add_loads(out: Inertias, body: int, link: Link, loads: Iterable[Pattern]) -> None:
+    for load in loads:
+        out.add_load(body, link, load)
+
+
+def _add_sliders(out: Inertias, scene: Scene, linkage: Linkage) -> None:
+    """Rigid sliders: their mass, and that of bodies on them, at the joint with the link that they belong to."""
+    sliders = [name for name in scene.links if slider_axis(scene, name) is not None]
+    for name in sliders:
+        joints = [x for x in scene.joints.values() if name in x.links]
+        pin = next((x for x in joints if x.kind != "prismatic"), joints[0])
+        extra = sum(x.mass for x in scene.bodies.values() if x.link == name)
+        out.add(linkage.bodies.index(name), scene.links[name].mass + extra, np.asarray(pin.at))
+    _add_forces(out, scene, linkage, sliders)
+
+
+def _add_forces(out: Inertias, scene: Scene, linkage: Linkage, links: Iterable[str]) -> None:
+    """Forces at points of links that have no mesh."""
+    wanted = set(links)
+    for load in scene.loads.values():
+        if isinstance(load, ForceLoad) and load.link in wanted:
+            f = np.asarray(load.vector)
+            arm = np.asarray(load.at) - out.centre
+            out.loads.append(
+                RigidLoad(
+                    linkage.bodies.index(load.link), f, np.outer(arm, f), 0.0, load.frame == "link",
+                    partial(load_factor, load.factor),
+                )
+            )  # fmt: skip
+
+
+def _add_body(out: Inertias, scene: Scene, linkage: Linkage, body: Body) -> None:
+    """A body attached to a link; a flywheel is a thin disc across the axis of the hinge that it sits on."""
+    number, at = linkage.bodies.index(body.link), np.asarray(body.at)
+    match body:
+        case PointMass(mass=mass):
+            out.add(number, mass, at)
+        case RigidBody(mass=mass, inertia=inertia, centre=centre):
+            out.add(number, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+        case Flywheel(mass=mass, inertia=inertia):
+            axis = _axis_at(scene, body)
+            out.add(number, mass, at, inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
+
+
+def _axis_at(scene: Scene, body: Flywheel) -> Vector:
+    """Axis of the hinge that a flywheel sits on."""
+    hinges = [x for x in scene.joints.values() if body.link in x.links and x.kind == "revolute" and x.axis]
+    nearest = min(hinges, key=lambda x: float(np.linalg.norm(np.subtract(x.at, body.at))))
+    return unit(nearest.axis or (0.0, 0.0, 1.0))

@@ -1,0 +1,100 @@
+"""Forces of all joints and drives of rigid links: Jᵀ λ balances what acts on the bodies, at many times at once.
+
+Rows that repeat others leave some of λ open: the least λ in scaled rows is taken, and `open_directions` tells what of a
+joint's force depends on that choice. All is linear in what acts, with factors that only depend on the pose.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.motion.linkage import Linkage, scaled
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross, features, jacobian
+
+
+@dataclass(frozen=True, slots=True)
+class Reactions:
+    """How rows bear on bodies at T times, moments about the bodies' points that are drawn at the linkage's centre.
+
+    motion : the rigid motion
+    each : (T, m, B − 1, 6) force and moment on each body of a unit of scaled λ, world components; without the ground
+    Q, U : QR of the scaled rows J
+    column : (k,) what the columns of J have been multiplied by
+    """
+
+    linkage: Linkage
+    motion: RigidMotion
+    each: Float[np.ndarray, "T m b 6"]
+    Q: Float[np.ndarray, "T m k"]
+    U: Float[np.ndarray, "T k k"]
+    column: Float[np.ndarray, " k"]
+
+    def on(self, joint: str, body: int, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 T m 3"]:
+        """Force and moment that a joint, with its drive, exerts on a body, from scaled λ.
+
+        Parameters
+        ----------
+        at : the body's point that the moment is about, as drawn [m]
+        """
+        rows = rows_of(self.linkage, joint)
+        out = np.zeros((2, *self.Q.shape[:2], 3))
+        own = self.each[:, rows, body - 1]
+        arm = (self.motion.R[:, body] @ (at - self.linkage.centre))[:, None]
+        out[0][:, rows] = own[..., :3]
+        out[1][:, rows] = own[..., 3:] - cross(arm, own[..., :3])
+        return out
+
+    def effort(
+        self, joint: str, body: int, axis: Float[np.ndarray, "T 3"], turns: bool
+    ) -> Float[np.ndarray, "T m 1"]:
+        """Torque of the drive of a hinge, or force of that of a slide, on a body, from scaled λ.
+
+        Parameters
+        ----------
+        axis : that it is about, or along, in the world
+        """
+        rows = rows_of(self.linkage, joint) & self.linkage.rows.driven
+        own = self.each[:, rows, body - 1, 3:] if turns else self.each[:, rows, body - 1, :3]
+        out = np.zeros((*self.Q.shape[:2], 1))
+        out[:, rows] = own @ axis[..., None]
+        return out
+
+    def responses(self, A: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T c k"]:
+        """What is A λ of forces and moments on all bodies but the ground, with the least λ that balances them.
+
+        Jᵀ λ = −(force, moment), λ = −Q U⁻ᵀ (force, moment).
+        """
+        at_rows = np.swapaxes(self.Q, 1, 2) @ A
+        return np.asarray(-self.column * np.swapaxes(np.linalg.solve(self.U, at_rows), 1, 2))
+
+    def open_directions(
+        self, A: Float[np.ndarray, "T m c"]
+    ) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
+        """Along which directions A λ is open, and along which there is any at all.
+
+        Returns
+        -------
+        Σ D Dᵀ and Σ A Aᵀ over the times, D being A on the null space of Jᵀ; as shares of the largest entry of the latter
+        """
+        D = A - self.Q @ (np.swapaxes(self.Q, 1, 2) @ A)
+        open_, borne = (np.einsum("tmx,tmy->xy", x, x) for x in (D, A))
+        size = max(float(np.abs(borne).max()), np.finfo(float).tiny)
+        return open_ / size, borne / size
+
+
+def rows_of(linkage: Linkage, joint: str) -> Bool[np.ndarray, " m"]:
+    """Which rows are a joint's."""
+    return np.array([name == joint for name in linkage.joints], bool)
+
+
+def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions:
+    """How all joints and drives bear on the bodies at the times of a motion."""
+    bodies, c = len(linkage.bodies), linkage.centre
+    poses = (motion.R, motion.p + motion.R @ c - c)
+    f = features(linkage.rows, poses, motion.phi)
+    J = scaled(jacobian(linkage.rows, f, bodies), linkage.rows, linkage.size)
+    column = np.tile(np.repeat([linkage.size, 1.0], 3), bodies - 1)
+    Q, U = np.linalg.qr(J)
+    return Reactions(linkage, motion, (J / column).reshape(*J.shape[:2], -1, 6), Q, U, column)

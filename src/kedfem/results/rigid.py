@@ -1,0 +1,190 @@
+"""Channels of rigid inverse dynamics: forces of joints and drive were all links rigid, beside those of elastic links."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.coupling import slider_axis
+from kedfem.dynamics.inertias import Inertias, acting
+from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.path import Path
+from kedfem.motion.reactions import Reactions, reactions
+from kedfem.motion.rigid import RigidMotion
+from kedfem.results.records import Channel
+from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
+
+Rows = Float[np.ndarray, "T c"]
+Responses = Float[np.ndarray, "T c k"]
+XYZ = ("x", "y", "z")
+OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
+ALONG = 1e-6  # sine of an angle between axes that are the same
+SLIDES = ("prismatic", "cylindrical")
+KEPT = 4000  # time points of a turn whose responses are kept, some kilobytes each
+
+
+@dataclass(frozen=True, slots=True)
+class Borne:
+    """A channel of what a joint or drive bears.
+
+    which : 0 force, 1 moment, 2 effort of the drive
+    body, at : the body that it acts on, and the point that moments are about, as drawn [m]
+    project : (c, 3) from world components to columns of a force or moment; what statics leave open is not in them
+    """
+
+    channel: Channel
+    joint: str
+    which: int
+    body: int
+    at: Float[np.ndarray, "3"]
+    project: Float[np.ndarray, "c 3"]
+
+
+@dataclass(slots=True)
+class RigidForces:
+    """Rigid inverse dynamics of a scene; worked out once for each motion.
+
+    turn : time steps after which all poses return; 0 if they do not
+    """
+
+    scene: Scene
+    linkage: Linkage
+    inertias: Inertias
+    every: tuple[Borne, ...]
+    turn: int = 0
+    _motion: RigidMotion | None = None
+    _rows: dict[str, Rows] = field(default_factory=dict)
+    _kept: list[Responses] = field(default_factory=list)
+
+    def rows(self, motion: RigidMotion, step: int | None = None) -> dict[str, Rows]:
+        """The rows of all channels.
+
+        Parameters
+        ----------
+        step : number of the first time step, where the motion is a part of the scene's own; in order
+        """
+        if motion is not self._motion:
+            force, moment = acting(self.inertias, motion)
+            wrench = np.concatenate([force, moment], axis=2)[:, 1:].reshape(len(motion.t), -1, 1)
+            values = (self._responses(motion, step) @ wrench)[..., 0]
+            ends = np.cumsum([len(each.channel.columns) for each in self.every])[:-1]
+            parts = np.split(values, ends, axis=1)
+            self._rows = {each.channel.name: x for each, x in zip(self.every, parts, strict=True)}
+            self._motion = motion
+        return self._rows
+
+    def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
+        """All channels from forces and moments; where poses return, those of the first turn again."""
+        if not self.turn or step is None or step < 1:
+            return self._made(motion)
+        known = sum(map(len, self._kept))
+        if known < self.turn and step == known + 1:
+            self._kept.append(self._made(motion))
+            return self._kept[-1]
+        if known < self.turn or step <= known:
+            return self._made(motion)
+        if len(self._kept) > 1:
+            self._kept = [np.concatenate(self._kept)]
+        return self._kept[0][(step - 1 + np.arange(len(motion.t))) % self.turn]
+
+    def _made(self, motion: RigidMotion) -> Responses:
+        found = reactions(self.linkage, motion)
+        return found.responses(np.concatenate([self._of(found, each) for each in self.every], axis=2))
+
+    def _of(self, found: Reactions, each: Borne) -> Float[np.ndarray, "T m c"]:
+        """A channel from scaled λ."""
+        if each.which < 2:
+            return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
+        joint, bodies = self.scene.joints[each.joint], self.linkage.bodies
+        other = next(bodies.index(name) for name in joint.links if bodies.index(name) != each.body)
+        axis = found.motion.R[:, other] @ joint_axis(joint)
+        return found.effort(each.joint, each.body, axis, joint.kind not in SLIDES)
+
+
+def rigid_forces(
+    scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None
+) -> RigidForces:
+    """What can be told of a driven scene: the drive, and with a path all joints where nothing moves freely."""
+    every = [_drive(scene, linkage, name) for name in scene.driven_joints]
+    if along is not None and not linkage.mobility:
+        found = reactions(linkage, _on_grid(linkage, along))
+        every = [*(x for name in scene.joints for x in _joint(scene, linkage, found, name)), *every]
+    return RigidForces(scene, linkage, inertias, tuple(every), returning(scene, along))
+
+
+def returning(scene: Scene, along: Path | None) -> int:
+    """Time steps in a turn after which all poses return; 0 if they do not, or are too many to be kept."""
+    turn = turn_steps(scene) or 0.0
+    whole = abs(turn - round(turn)) < 1e-9 * turn
+    returns = isinstance(scene.motion, ConstantSpeed) and along is not None and along.periodic and whole
+    return round(turn) if returns and turn <= KEPT else 0
+
+
+def stated_link(scene: Scene, joint: Joint) -> str:
+    """The link that a joint's force is said of: the first that is neither the ground nor a slider beside another link."""
+    links = [name for name in joint.links if name != GROUND]
+    return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
+
+
+def moving_link(joint: Joint) -> str:
+    """The link that a joint's coordinate is of: the first that is not the ground."""
+    return next(name for name in joint.links if name != GROUND)
+
+
+def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
+    joint = scene.joints[name]
+    link = moving_link(joint)
+    what, unit = ("force", "N") if joint.kind in SLIDES else ("torque", "N m")
+    text = f"{what} of the drive on link {link} were all links rigid"
+    several = f"{name}/" if len(scene.driven_joints) > 1 else ""
+    channel = Channel(f"drive/{several}rigid_{what}", (what,), unit, "world", text)
+    return Borne(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
+
+
+def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[Borne]:
+    joint = scene.joints[name]
+    link = stated_link(scene, joint)
+    other = next(each for each in joint.links if each != link)
+    body, at = linkage.bodies.index(link), np.asarray(joint.at)
+    label = f"of joint {name} on link {link} from {other} were all links rigid"
+    about = f"moment {label}, about the joint's nominal point"
+    out, on = [], found.on(name, body, at)
+    for which, (what, text, unit) in enumerate((("force", f"force {label}", "N"), ("moment", about, "N m"))):
+        columns, project, left = told(*found.open_directions(on[which]))
+        if columns:
+            channel = Channel(f"joints/{name}/rigid_{what}", columns, unit, "world", text + left)
+            out.append(Borne(channel, name, which, body, at, project))
+    return out
+
+
+def told(
+    loose: Float[np.ndarray, "3 3"], borne: Float[np.ndarray, "3 3"]
+) -> tuple[tuple[str, ...], Float[np.ndarray, "c 3"], str]:
+    """Columns of a joint's force that statics tell, from world components, and in words what they leave out.
+
+    Parameters
+    ----------
+    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `open_directions`
+    """
+    size, axes = np.linalg.eigh(loose)
+    lost = axes[:, size > OPEN]
+    P = np.eye(3) - lost @ lost.T
+    if np.trace(P @ borne @ P) < OPEN or lost.shape[1] == 3:
+        return (), np.zeros((0, 3)), ""
+    if not lost.shape[1]:
+        return XYZ, np.eye(3), ""
+    kept = np.flatnonzero(np.linalg.norm(lost, axis=1) < ALONG)
+    if len(kept) == 3 - lost.shape[1]:  # what is open lies along axes of the world
+        return tuple(XYZ[k] for k in kept), np.eye(3)[kept], ""
+    which = ", ".join("(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(n, 6)) + ")" for n in lost.T)
+    return XYZ, P, f"; without what is along {which}, which statics leave open"
+
+
+def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
+    """The linkage at the drive angles of its path, at rest."""
+    c, zero = linkage.centre, np.zeros_like(along.p)
+    p = along.p + c - along.R @ c
+    still = np.zeros_like(along.R)
+    return RigidMotion(
+        np.zeros(len(along.phi)), along.phi, along.R, p, zero, zero, zero, still, zero, zero, zero
+    )
