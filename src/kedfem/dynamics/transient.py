@@ -12,10 +12,13 @@ from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
+from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
+from kedfem.dynamics.interface import static_tie
+from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
@@ -85,7 +88,7 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     states = first_states(scene, linkage, along, law, model, stresses)
     start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
     yield Block(0, start, _first(model, solver, states))
-    state: Any = solver.begin(states)
+    state: Any = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
@@ -99,8 +102,31 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
                         yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
                     raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
             else:
-                links, state = solver.advance(state, forcings(model, part))
+                rows = joint_rows(model.rows, part)
+                given = (forcings(model, part),) if rows is None else (forcings(model, part), rows)
+                links, state = solver.advance(state, *given)
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def begun(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: list[LinkState]
+) -> Any:
+    """A solver's state at the first time point."""
+    if not model.rows or isinstance(solver, FollowingSteps | FollowingDense):
+        return solver.begin(states)
+    rows = rows_at_start(scene, linkage, along, model)
+    return solver.begin(states, None if rows is None else rows.state(model.joints, states))
+
+
+def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> FirstRows | None:
+    """Rows of joints at t = 0 with their derivatives in time; None without any."""
+    if not model.rows:
+        return None
+    grid = time_grid(scene)
+    h = min(grid.step, grid.end / (INSTANTS - 1))
+    t = h * np.arange(INSTANTS)
+    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, drive_angle(scene.motion, t)))
+    return None if rows is None else first_rows(rows, h)
 
 
 def _first(model: Model, solver: Steps, states: list[LinkState]) -> list[LinkHistory]:
@@ -187,7 +213,10 @@ def first_states(
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
         forces = first_forces(actions(scene, model), model.links, motion, [(x.u, x.v) for x in start])
-        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+        states = initial_states(
+            model.links, model.joints, moments[0].at, model.damping, start,
+            rows_at_start(scene, linkage, along, model),
+        )  # fmt: skip
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
         states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
         if not any(link.rigid and link.fit is not None for link in model.links):
@@ -213,7 +242,8 @@ def first_states(
             replace(x, stressed=static_excess(link, x.u, now.R))
             for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
-    return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+    rows = rows_at_start(scene, linkage, along, model)
+    return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
@@ -223,11 +253,13 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
         forcing = stresses.stressed(forcing)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
+    rows = joint_rows(model.rows, motion)
     return [
         Instant(
             [each.at(k) for each in forcing],
             [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
             None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
+            None if rows is None else static_tie(rows, k),
         )
         for k in range(len(motion.t))
     ]
