@@ -31,7 +31,7 @@ def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Pr
     stage("motion")
     joined, along = moving(scene)
     stage("mesh and matrices")
-    return Prepared(scene, joined, along, elastic_model(scene, joined))
+    return Prepared(scene, joined, along, elastic_model(scene, joined, along=along))
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:

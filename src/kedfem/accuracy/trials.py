@@ -61,7 +61,7 @@ class Trials:
                 name: self._bare(scene, name) for name in scene.links if scene.links[name].shape is not None
             }
             self.models[key] = self._reduced(
-                Prepared(scene, joined, along, elastic_model(scene, joined, bare))
+                Prepared(scene, joined, along, elastic_model(scene, joined, bare, along))
             )
         return replace(self.models[key], scene=scene, path=along)
 

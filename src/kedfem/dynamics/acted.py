@@ -15,8 +15,11 @@ from jaxtyping import Float
 from kedfem.dynamics.action import TURN, Action, elastic_vectors, kernel_table, nominal_vectors
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
+from kedfem.dynamics.interface import RowState, Tie
+from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal
+from kedfem.dynamics.tied import Begun, stepwise_tied
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
@@ -32,6 +35,8 @@ Each = Float[np.ndarray, " A"]
 Law = Callable[[Sequence[NodalOf], Sequence[NodalOf]], "Found"]
 State = tuple[Sequence[NodalOf], Sequence[NodalOf]]
 Answer = Callable[[Sequence[Nodal]], State]
+Taken = tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]
+"""A step: the states of all links, interface unknowns and forces of the rows of joints, if there are any."""
 Deflection = Callable[[int, Sequence[Nodal]], list[NodalOf]]
 
 
@@ -174,13 +179,13 @@ class ActedSteps:
         """Matrices factored so far."""
         return self.inner.factorisations
 
-    def begin(self, states: Sequence[LinkState]) -> list[LinkState]:
+    def begin(self, states: Sequence[LinkState], rows: RowState | None = None) -> Begun:
         """The state of the first time point."""
-        return self.inner.begin(states)
+        return self.inner.begin(states, rows)
 
     def advance(
-        self, state: list[LinkState], forcing: Sequence[Forcing], motion: RigidMotion
-    ) -> tuple[list[LinkHistory], list[LinkState]]:
+        self, state: Begun, forcing: Sequence[Forcing], motion: RigidMotion, rows: JointRows | None = None
+    ) -> tuple[list[LinkHistory], Begun]:
         """All time points of a block; see `DenseSteps.advance`.
 
         Raises
@@ -189,21 +194,34 @@ class ActedSteps:
             If the sweeps of a step do not settle.
         """
         x, v = self.forces.nominal(motion)
-        numbers = iter(range(len(motion.t)))
+        laws = (self.forces.law(float(t), *each) for t, *each in zip(motion.t, x, v, strict=True))
 
-        def step(states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-            k = next(numbers)
-            return self._step(states, at, self.forces.law(float(motion.t[k]), x[k], v[k]))
+        def step(states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None = None) -> Taken:
+            return self._step(partial(self._taken, states, at, tie), states, next(laws))
 
-        return stepwise(step, state, forcing)
+        if rows is not None:
+            return stepwise_tied(step, state, forcing, rows, self.inner.scheme)
+        links, last = stepwise(lambda states, at: step(states, at)[0], state.links, forcing)
+        return links, Begun(last)
 
-    def _step(self, states: Sequence[LinkState], at: Sequence[Nominal], law: Law) -> list[LinkState]:
+    def _taken(
+        self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None, rows: Sequence[Nodal]
+    ) -> Taken:
+        """What a step comes to under more forces on the rows."""
+        now = loaded(at, rows)
+        if tie is None:
+            return self.inner.step(states, now), np.zeros(0), np.zeros(0)
+        return self.inner.tied_step(states, now, tie)
+
+    def _step(
+        self, taken: Callable[[Sequence[Nodal]], Taken], states: Sequence[LinkState], law: Law
+    ) -> Taken:
         """States of all links one step later."""
-        new: list[LinkState] = []
+        last: list[Taken] = []
 
-        def answer(rows: Sequence[Nodal]) -> tuple[list[Nodal], list[Nodal]]:
-            new[:] = self.inner.step(states, loaded(at, rows))
-            return [s.u for s in new], [s.v for s in new]
+        def answer(rows: Sequence[Nodal]) -> State:
+            last[:] = [taken(rows)]
+            return [s.u for s in last[0][0]], [s.v for s in last[0][0]]
 
         begin = self._now or law([s.u for s in states], [s.v for s in states])
         found = solved(self.forces, law, answer, begin, self._slope, SETTLED * self._largest)
@@ -215,7 +233,7 @@ class ActedSteps:
         self._now, _, self._slope = found
         self._largest = np.maximum(self._largest, np.abs(self._now.Q))
         self.forces.turned = self._now.q
-        return list(new)
+        return last[0]
 
 
 def loaded(at: Sequence[Nominal], rows: Sequence[Nodal]) -> list[Nominal]:

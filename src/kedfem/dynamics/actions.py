@@ -19,8 +19,8 @@ from kedfem.dynamics.action import (
     End,
     Vector,
 )
-from kedfem.dynamics.coupling import seat_of, slider_axis
 from kedfem.dynamics.model import Model, Slider, on_segment
+from kedfem.dynamics.places import seat_of, slider_axis
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows

@@ -10,11 +10,14 @@ from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
+from kedfem.dynamics.interface import RowState, Tie
+from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import Rotation, add_port_forces, port_rotation
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
 from kedfem.dynamics.stiffening import Stiffening, Turning, predicted, swept, with_turnings
-from kedfem.dynamics.substructure import coupled, effective_coefficients, factored
+from kedfem.dynamics.substructure import effective_coefficients, factored, tied
+from kedfem.dynamics.tied import Begun, stepwise_tied
 from kedfem.links.record import Link, mass_times
 
 
@@ -35,17 +38,20 @@ class CondensedSteps:
         ]
         self.factorisations = len(self.parts)
 
-    def begin(self, states: Sequence[LinkState]) -> list[LinkState]:
+    def begin(self, states: Sequence[LinkState], rows: RowState | None = None) -> Begun:
         """The state of the first time point."""
-        return list(states)
+        return Begun(list(states), rows)
 
     def advance(
-        self, state: list[LinkState], forcing: Sequence[Forcing]
-    ) -> tuple[list[LinkHistory], list[LinkState]]:
+        self, state: Begun, forcing: Sequence[Forcing], rows: JointRows | None = None
+    ) -> tuple[list[LinkHistory], Begun]:
         """All time points of a block; see `DenseSteps.advance`."""
         if self.stiffening is not None:
             forcing = self.stiffening.stressed(forcing)
-        return stepwise(self.step, state, forcing)
+        if rows is None:
+            links, last = stepwise(self.step, state.links, forcing)
+            return links, Begun(last)
+        return stepwise_tied(self.tied_step, state, forcing, rows, self.scheme)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)].
@@ -55,11 +61,22 @@ class CondensedSteps:
         states : now
         at : orientation and P − M R0'' of each link at the end of the step
         """
-        rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
         if self.stiffening is not None:
+            rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
             return self._stiffened(states, at, rhs, self.stiffening.turnings(at))
-        g, forces = coupled(self.parts, [nominal.R for nominal in at], rhs)
-        return [self._next(k, states[k], at[k], g[k], rhs[k], forces[k]) for k in range(len(self.links))]
+        return self.tied_step(states, at, None)[0]
+
+    def tied_step(
+        self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
+    ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+        """The same where joints hold by rows; also the interface unknowns and the rows' forces."""
+        rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
+        g, forces, z, m = tied(self.parts, [nominal.R for nominal in at], rhs, tie)
+        return (
+            [self._next(k, states[k], at[k], g[k], rhs[k], forces[k]) for k in range(len(self.links))],
+            z,
+            m,
+        )
 
     def _stiffened(
         self, states: Sequence[LinkState], at: Sequence[Nominal], rhs: Sequence[Nodal],

@@ -1,24 +1,25 @@
 """Joints as shared port points: W u = B z with constant scalar weights W and a constant selection B.
 
-Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once.
+Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once. Joints whose directions
+vary in time have port points of each link's own, and hold by rows over these (`row_joints`).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Bool, Float, Int
 
-from kedfem.errors import KedfemError, MeshError, SceneError
+from kedfem.dynamics.places import part_seat, slider_axis
+from kedfem.dynamics.row_joints import RowJoint, needs_rows
+from kedfem.dynamics.row_ports import Own, Ways, row_joint
+from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
-from kedfem.motion.linkage import joint_axis, unit
+from kedfem.links.seats import Seat, holds, is_flat, port_weights
+from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
-
-T = TypeVar("T")
 
 DEPENDENT = 1e-9  # relative: ports of one seat repeat each other to rounding, others differ by far more
 
@@ -35,7 +36,9 @@ class Attachment:
         what other ports of the link imply is left out
     B : (q, k) held components, in world axes, from the interface unknowns z
     shares : per link j (dp, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
-    loose : (dp, r) port forces of this link, world axes, that no λ tells: statically indeterminate
+    from_rows : (dp, m): the same from the forces that rows of joints exert on their links' ports, world axes; m all
+        components of all these ports, and empty where λ alone tells the forces
+    loose : (dp, r) port forces of this link, world axes, that neither tells: statically indeterminate
     """
 
     nodes: Int[np.ndarray, " b"]
@@ -46,6 +49,7 @@ class Attachment:
     keep: Int[np.ndarray, " q"]
     B: Float[np.ndarray, "q k"]
     shares: tuple[Float[np.ndarray, "m _"], ...] = ()
+    from_rows: Float[np.ndarray, "m _"] = field(default_factory=lambda: np.zeros((0, 0)))
     loose: Float[np.ndarray, "m r"] = field(default_factory=lambda: np.zeros((0, 0)))
 
 
@@ -103,9 +107,15 @@ class _Ports:
         )
 
 
-def attachments(
-    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut] = ()
-) -> dict[str, Attachment]:
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """All joints of a scene: what each link has of them, and those that hold by rows."""
+
+    attachments: dict[str, Attachment]
+    rows: tuple[RowJoint, ...]
+
+
+def joined(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways) -> Joined:
     """All joints of a scene, and cuts between segments, as attachments of its elastic links.
 
     Parameters
@@ -121,7 +131,18 @@ def attachments(
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
+    rows: list[tuple[RowJoint, list[Own | None]]] = []
+    columns: list[list[int]] = []  # of each side's own unknowns
     for name, joint in scene.joints.items():
+        if needs_rows(scene, name):
+            row, own = row_joint(scene, name, links, ways)
+            if own == [None, None]:
+                continue
+            for each in own:
+                columns.append(_own_columns(ports, name, each, first_of, unknowns))
+                unknowns += len(columns[-1]) if each is not None and each.key else 0
+            rows.append((row, own))
+            continue
         elastic = {link.name for link in links.values()}
         seats = dict(part_seat(scene, name, links, link) for link in joint.links if link in elastic)
         held = list(seats)
@@ -139,12 +160,44 @@ def attachments(
             unknowns += new
     for cut in cuts:
         for point, *weights in zip(cut.points, *cut.weights, strict=True):
-            for key, row in zip(cut.keys, weights, strict=True):
+            for key, row_ in zip(cut.keys, weights, strict=True):
                 d = ports[key].link.d
-                ports[key].add(row, point, "", list(range(d)), unknowns, np.eye(d))
+                ports[key].add(row_, point, "", list(range(d)), unknowns, np.eye(d))
             unknowns += d
     every = [ports[name].attachment(unknowns) for name in links]
-    return dict(zip(links, independent(every), strict=True))
+    sides = list(zip((side for _, both in rows for side in both), columns, strict=True))
+    bear = [k for side, here in sides if side is not None and not side.slider for k in here]
+    riding = [k for side, here in sides if side is not None and side.slider for k in here]
+    found, Z = independent(every, bear, riding)
+    return Joined(dict(zip(links, found, strict=True)), tuple(_on(rows, columns, Z)))
+
+
+def _own_columns(
+    ports: dict[str, _Ports], name: str, own: Own | None, first_of: dict[str, int], unknowns: int
+) -> list[int]:
+    """The unknowns of one side of a joint that holds by rows: all components of its ports; a slider's own travel."""
+    if own is None:
+        return []
+    if own.slider:
+        return [first_of[own.slider]]
+    d = ports[own.key].link.d
+    for k, (weights, point) in enumerate(zip(own.weights, own.points, strict=True)):
+        ports[own.key].add(weights, point, name, list(range(d)), unknowns + d * k, np.eye(d))
+    return list(range(unknowns, unknowns + d * len(own.points)))
+
+
+def _on(
+    rows: Sequence[tuple[RowJoint, list[Own | None]]], columns: Sequence[list[int]], Z: np.ndarray
+) -> Iterator[RowJoint]:
+    """Joints with rows on the interface unknowns, as these turned out."""
+    of_side = iter(columns)
+    for row, own in rows:
+        sides = [
+            None if side is None or each is None
+            else replace(side, onto=(each.selection @ Z[here]).reshape(*side.onto.shape[:2], -1))
+            for side, each, here in zip(row.sides, own, of_side, strict=False)
+        ]  # fmt: skip
+        yield replace(row, sides=(sides[0], sides[1]))
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first: int) -> int:
@@ -165,32 +218,43 @@ def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first:
     return 2
 
 
-def independent(every: Sequence[Attachment]) -> list[Attachment]:
+def independent(
+    every: Sequence[Attachment], own: Sequence[int] = (), riding: Sequence[int] = ()
+) -> tuple[list[Attachment], Float[np.ndarray, "k r"]]:
     """Joints on one seat repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
 
     With all rows W = L W_r of the independent ones W_r, (B − L B_r) z = 0. An orthonormal basis Z of these z makes
     B_r Z the new B. L is scalar, so it commutes with the link's rotation.
+
+    Parameters
+    ----------
+    own : unknowns z of ports on which rows of joints bear, side by side
+    riding : those of rigid sliders on which rows bear
+
+    Returns
+    -------
+    attachments on the new unknowns, and Z
     """
     relations = [_relation(each) for each in every]
     B = np.vstack([each.B for each in every])
-    shares, loose = np.eye(len(B)), np.zeros((len(B), 0))
+    shares, loose, from_rows = np.eye(len(B)), np.zeros((len(B), 0)), np.zeros((len(B), 0))
     Z = np.eye(B.shape[1])
     if not all(kept.all() for kept, _ in relations):
         L = scipy.linalg.block_diag(*(L for _, L in relations))
         kept = np.concatenate([kept for kept, _ in relations])
         Z = _null_space(B - L @ B[kept])
-        shares, loose = _port_forces(L, B)
+        shares, from_rows, loose = _port_forces(L, B, own, riding)
     ends = np.cumsum([len(each.keep) for each in every])[:-1]
     columns = np.cumsum([kept.sum() for kept, _ in relations])[:-1]
     return [
         replace(
             each, keep=each.keep[kept], B=each.B[kept] @ Z, loose=_placed(each, theirs),
-            shares=tuple(_placed(each, x) for x in np.split(share, columns, axis=1)),
+            shares=tuple(_placed(each, x) for x in np.split(share, columns, axis=1)), from_rows=_placed(each, rows),
         )
-        for each, (kept, _), share, theirs in zip(
-            every, relations, np.split(shares, ends), np.split(loose, ends), strict=True
+        for each, (kept, _), share, theirs, rows in zip(
+            every, relations, np.split(shares, ends), np.split(loose, ends), np.split(from_rows, ends), strict=True
         )
-    ]  # fmt: skip
+    ], Z  # fmt: skip
 
 
 def _relation(each: Attachment) -> tuple[Bool[np.ndarray, " h"], Float[np.ndarray, "h q"]]:
@@ -220,18 +284,22 @@ def _independent_rows(W: Float[np.ndarray, "p b"]) -> tuple[Int[np.ndarray, " r"
 
 
 def _port_forces(
-    L: Float[np.ndarray, "h q"], B: Float[np.ndarray, "h k"]
-) -> tuple[Float[np.ndarray, "h q"], Float[np.ndarray, "h r"]]:
-    """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = 0.
+    L: Float[np.ndarray, "h q"], B: Float[np.ndarray, "h k"], own: Sequence[int], riding: Sequence[int]
+) -> tuple[Float[np.ndarray, "h q"], Float[np.ndarray, "h o"], Float[np.ndarray, "h r"]]:
+    """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = p.
+
+    p is zero but for what rows exert on their own unknowns.
 
     Returns
     -------
-    (h, q) μ from λ, and (h, r) the μ that neither equation sees
+    (h, q) μ from λ, (h, o) μ from p of the rows' own unknowns, and (h, r) the μ that neither equation sees
     """
-    G = np.vstack([L.T, B.T])
-    shares = np.linalg.pinv(G, rcond=DEPENDENT)[:, : L.shape[1]]
-    shares[np.abs(shares) < DEPENDENT] = 0.0  # rounding
-    return shares, _null_space(G)
+    told = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
+    G = np.vstack([L.T, B.T[told]])
+    inverse = np.linalg.pinv(G, rcond=DEPENDENT)
+    inverse[np.abs(inverse) < DEPENDENT] = 0.0  # rounding
+    q = L.shape[1]
+    return inverse[:, :q], inverse[:, q + np.searchsorted(told, np.asarray(own, int))], _null_space(G)
 
 
 def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:
@@ -245,51 +313,6 @@ def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarra
     out = np.zeros((each.components * len(each.weights), rows.shape[1]))
     out[each.keep] = rows
     return out
-
-
-def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
-    """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
-    if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
-        return None
-    joint = next(j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links)
-    return joint_axis(joint)
-
-
-def seat_of(scene: Scene, name: str, link: Link) -> Seat:
-    """The seat of a joint on a link."""
-    joint = scene.joints[name]
-    axis = None if joint.axis is None or joint.kind == "prismatic" else unit(joint.axis)
-    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.faces.get(link.name, ()))
-
-
-def on_part(
-    links: Mapping[str, Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
-) -> tuple[str, T]:
-    """The segment of a link that has something at a point, nearest first, and what was found on it.
-
-    Raises
-    ------
-    MeshError, SceneError
-        That of the nearest segment, if none has it.
-    """
-    parts = {key: link for key, link in links.items() if link.name == name}
-    gap = {
-        key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min())
-        for key, link in parts.items()
-    }
-    first: KedfemError | None = None
-    for key in sorted(parts, key=lambda key: gap[key]):
-        try:
-            return key, found(parts[key])
-        except (MeshError, SceneError) as error:
-            first = first or error
-    raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
-
-
-def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, Seat]:
-    """The segment of a link on which a joint sits, and the seat."""
-    at = np.asarray(scene.joints[joint].at)
-    return on_part(links, name, at, lambda link: seat_of(scene, joint, link))
 
 
 def port_points(

@@ -11,6 +11,8 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, Products
+from kedfem.dynamics.interface import RowState
+from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
@@ -66,8 +68,8 @@ class DenseSteps:
         self._stress = None if stiffening is None else stress_terms(links, T, stiffening)
         self._matrices = self._padded()
 
-    def begin(self, states: Sequence[LinkState]) -> tuple[np.ndarray, ...]:
-        """The loop's own state, from link states."""
+    def begin(self, states: Sequence[LinkState], rows: RowState | None = None) -> tuple[np.ndarray, ...]:
+        """The loop's own state, from link states; last the forces of rows of joints, and their e, e', e''."""
         D, n, P = self._sizes
         L = len(self.links)
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
@@ -75,18 +77,19 @@ class DenseSteps:
         for i, (link, joint, part, s) in enumerate(
             zip(self.links, self.joints, self.parts, states, strict=True)
         ):
-            for out, rows in ((u, s.u), (v, s.v), (a, s.a)):
-                out[i, : link.d, : link.n] = coordinates(link, part, rows)
-            for out, rows in ((F, s.F), (f, s.f)):
-                out[i, : link.d, : link.n] = work_on(part, rows)
+            for out, x in ((u, s.u), (v, s.v), (a, s.a)):
+                out[i, : link.d, : link.n] = coordinates(link, part, x)
+            for out, x in ((F, s.F), (f, s.f)):
+                out[i, : link.d, : link.n] = work_on(part, x)
             for k in range(3 if s.C is not None else 0):
                 C[k, i, : link.d, : link.n] = work_on(part, s.C[k])  # type: ignore[index]
             R[i, : link.d, : link.d] = s.R
             forces[i] = self._ports_padded(joint, s.port_forces)
-        return u, v, a, F, f, R, forces, C
+        p, e = np.zeros(self.joints[0].B.shape[1]), np.zeros((3, 0))
+        return u, v, a, F, f, R, forces, C, *((p, e) if rows is None else (rows.p.copy(), rows.e.copy()))
 
     def advance(
-        self, state: tuple[np.ndarray, ...], forcing: Sequence[Forcing]
+        self, state: tuple[np.ndarray, ...], forcing: Sequence[Forcing], rows: JointRows | None = None
     ) -> tuple[list[LinkHistory], tuple[np.ndarray, ...]]:
         """All time points of a block, one step after the other, [KED, eq. (20)].
 
@@ -94,6 +97,7 @@ class DenseSteps:
         ----------
         state : of `begin` or of the block before; it is used up
         forcing : per link over the block
+        rows : of joints that hold by rows, over the block
 
         Returns
         -------
@@ -109,12 +113,13 @@ class DenseSteps:
         Kg = np.empty((T if any(part.unit for part in self.parts) else 0, L, D, n))
         forces, strain = np.empty((T, L, D * P)), np.empty((T, L))
         history = (u, v, a, g, forces, strain, Kg)
-        self._loop(forcing, (R, F), state, history)
+        self._loop(forcing, rows, (R, F), state, history)
         return [self._history(i, each, history) for i, each in enumerate(forcing)], state
 
     def _loop(
         self,
         forcing: Sequence[Forcing],
+        rows: JointRows | None,
         padded: tuple[np.ndarray, np.ndarray],
         state: tuple[np.ndarray, ...],
         history: tuple[np.ndarray, ...],
@@ -124,12 +129,21 @@ class DenseSteps:
         if self._stress is None:
             from kedfem.dynamics.kernel import advance_block
 
-            advance_block(self.coefficients, *known, state, history)
+            advance_block(self.coefficients, *known, self._ties(len(padded[0]), rows), state, history)
             return
         from kedfem.dynamics.stiffened_kernel import advance_stiffened
 
         limits, stressed = (self.scheme.h, SETTLED, SWEEPS), self._stress.over_block(forcing)
-        advance_stiffened(self.coefficients, limits, *known, stressed, state, history)
+        advance_stiffened(self.coefficients, limits, *known, stressed, state[:8], history)
+
+    def _ties(self, steps: int, rows: JointRows | None) -> tuple[np.ndarray, ...]:
+        """Rows over time, their compliance 1/κ and the damping that acts on e', times 1 − α_f; Newmark's rate."""
+        s, k = self.scheme, self.joints[0].B.shape[1]
+        share = 1 - s.alpha_f
+        if rows is None:
+            return np.zeros((steps, 0, k)), np.zeros(0), np.zeros(0), s.rate
+        kappa = share * (rows.stiffness + rows.damping * s.a1)
+        return rows.C, 1 / kappa, share * rows.damping, s.rate
 
     def _history(self, i: int, forcing: Forcing, history: tuple[np.ndarray, ...]) -> LinkHistory:
         link, joint, part = self.links[i], self.joints[i], self.parts[i]

@@ -8,7 +8,8 @@ N = D·S coordinates (component first), P ports, Q = D·P port components; k int
     matrices : G (L, N, N), Yt (L, Q, N), S (L, Q, Q), W (L, Q, N), B (L, Q, k)
     columns, count : (L, k), (L,) which interface unknowns a link knows, and how many
     forcing : R (T, L, D, D), F (T, L, D, S)
-    state : u, v, a, F, f (L, D, S), R (L, D, D), port forces (L, Q), C (3, L, D, S)
+    ties : C (T, r, k), 1/κ (r,), (1 − α_f) c (r,) and Newmark's rate (3) of joints that hold by rows, e = C z
+    state : u, v, a, F, f (L, D, S), R (L, D, D), port forces (L, Q), C (3, L, D, S), rows' forces on z (k,), e (3, r)
     history : u, v, a, g (T, L, D, S), port forces (T, L, Q), strain energy (T, L); K0 g (T, L, D, S), or none
 
 Imported when it is first needed: numba takes a while to load. Plain loops, so that nothing is allocated in a step.
@@ -19,20 +20,28 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+DEPENDENT = 1e-11  # as in `interface`
+
 compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 @compiled
-def advance_block(coefficients, matrices, columns, count, forcing, state, history):  # type: ignore[no-untyped-def]
+def advance_block(coefficients, matrices, columns, count, forcing, ties, every, history):  # type: ignore[no-untyped-def]
     """Take T generalised-α steps of all links in place, [KED, eq. (20)].
 
     With g the displacement and r the right-hand side in the link frame, w = W g its ports:
 
         g = G r + Y w,   λ = S w − Yᵀ r,   Σ Bᵀ R λ = 0,   R w = B z
 
+    but for what rows of joints exert on z (`tied`).
     G, Y, S are A⁻¹ with ports held, the shapes of moved ports, and the port stiffness of A = c_M + c_K K0.
     """
     G, Yt, S, W, B = matrices
+    state, (known, e) = every[:8], every[8:]
+    Cs, compliance, dampers, rate = ties
+    r = len(compliance)
+    CH, CGC, m, left = np.zeros((r, B.shape[2])), np.zeros((r, r)), np.zeros(r), np.zeros(r)
+    room = (CH, CGC, np.zeros(r), m, left, np.zeros(B.shape[2]), np.zeros(r), np.zeros(r))
     Rs, Fs = forcing
     T, L, D, n = Fs.shape
     Q, k = B.shape[1], B.shape[2]
@@ -48,7 +57,10 @@ def advance_block(coefficients, matrices, columns, count, forcing, state, histor
             times(Yt[i], rhs[i], reaction[i])
             turned_ports(Rs[t, i], B[i], count[i], RB[i])
             gathered(S[i], RB[i], reaction[i], columns[i], count[i], SRB[i], H, z)
-        solve_definite(H, z)
+        if r:
+            tied(coefficients, Cs[t], (compliance, dampers, rate), room, H, z, known, e)
+        else:
+            solve_definite(H, z)
         for i in range(L):
             for q in range(Q):
                 force[q], w[q] = -reaction[i, q], 0.0
@@ -192,19 +204,132 @@ def add_transposed(A, x, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
+def tied(coefficients, C, springs, room, H, z, known, e):  # type: ignore[no-untyped-def]
+    """z becomes the solution of H z = z + Cᵀ m + known forces, C z + m / κ = 0: `interface.solved` and `after_step`.
+
+    Rows that depend on others, pivots nearly zero, exert nothing.
+    """
+    compliance, dampers, rate = springs
+    CH, G, pivots, m, left, change, beside, rest = room
+    alpha_f = coefficients[2]
+    n0, n1, n2, h1, h0 = coefficients[7:12]
+    r, k = C.shape
+    for c in range(k):
+        known[c] *= alpha_f
+    for a in range(r):
+        x = dampers[a] * (rate[0] * e[0, a] + rate[1] * e[1, a] + rate[2] * e[2, a])
+        for c in range(k):
+            known[c] += x * C[a, c]
+    for c in range(k):
+        z[c] += known[c]
+    trace = 0.0
+    for c in range(k):
+        trace += H[c, c]
+    for a in range(r):
+        size = 0.0
+        for c in range(k):
+            size += C[a, c] ** 2
+        usual = trace / k / size if size > 0.0 else 0.0
+        beside[a] = usual / (1.0 + 2.0 * usual * compliance[a])
+        rest[a] = compliance[a] / (1.0 - beside[a] * compliance[a])
+        for c in range(k):
+            for d in range(c + 1):
+                H[c, d] += beside[a] * C[a, c] * C[a, d]
+    factor(H)
+    forward(H, z)
+    for a in range(r):
+        CH[a] = C[a]
+        forward(H, CH[a])
+        m[a] = 0.0
+    backward(H, z)
+    for a in range(r):
+        for b in range(a + 1):
+            x = 0.0
+            for c in range(k):
+                x += CH[a, c] * CH[b, c]
+            G[a, b] = x
+        G[a, a] += rest[a]
+        own = G[a, a]
+        for b in range(a):
+            if pivots[b] == 0.0:
+                G[a, b] = 0.0
+                continue
+            for c in range(b):
+                G[a, b] -= G[a, c] * G[b, c]
+            G[a, b] /= G[b, b]
+        for b in range(a):
+            G[a, a] -= G[a, b] ** 2
+        pivots[a] = 1.0 if G[a, a] > DEPENDENT * own else 0.0
+        if pivots[a] != 0.0:
+            G[a, a] = np.sqrt(G[a, a])
+    for _ in range(2):  # the second closes joints to rounding
+        for a in range(r):
+            left[a] = -rest[a] * m[a]
+            for c in range(k):
+                left[a] -= C[a, c] * z[c]
+            for b in range(a):
+                left[a] -= G[a, b] * left[b]
+            left[a] = left[a] / G[a, a] if pivots[a] != 0.0 else 0.0
+        for a in range(r - 1, -1, -1):
+            for b in range(a + 1, r):
+                left[a] -= G[b, a] * left[b]
+            left[a] = left[a] / G[a, a] if pivots[a] != 0.0 else 0.0
+            m[a] += left[a]
+        change[:] = 0.0
+        for a in range(r):
+            for c in range(k):
+                change[c] += left[a] * CH[a, c]
+        backward(H, change)
+        z += change
+    # forces at the end of the step, along the new rows alone
+    share = 1.0 / (1.0 - alpha_f)
+    known[:] = 0.0
+    for a in range(r):
+        now = 0.0
+        for c in range(k):
+            now += C[a, c] * z[c]
+        x = m[a] - beside[a] * now
+        x += dampers[a] * (rate[0] * e[0, a] + rate[1] * e[1, a] + rate[2] * e[2, a])
+        for c in range(k):
+            known[c] += share * x * C[a, c]
+        second = n0 * (now - e[0, a]) - n1 * e[1, a] - n2 * e[2, a]
+        e[1, a] += h1 * second + h0 * e[2, a]
+        e[0, a], e[2, a] = now, second
+
+
+@compiled
 def solve_definite(H, x):  # type: ignore[no-untyped-def]
     """x becomes H⁻¹ x, H symmetric positive definite and used up (Cholesky)."""
-    k = len(x)
+    factor(H)
+    forward(H, x)
+    backward(H, x)
+
+
+@compiled
+def factor(H):  # type: ignore[no-untyped-def]
+    """H becomes its Cholesky factor, below the diagonal."""
+    k = len(H)
     for i in range(k):
         for j in range(i + 1):
             total = H[i, j]
             for m in range(j):
                 total -= H[i, m] * H[j, m]
             H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
-    for i in range(k):
+
+
+@compiled
+def forward(H, x):  # type: ignore[no-untyped-def]
+    """x becomes L⁻¹ x."""
+    for i in range(len(x)):
         for j in range(i):
             x[i] -= H[i, j] * x[j]
         x[i] /= H[i, i]
+
+
+@compiled
+def backward(H, x):  # type: ignore[no-untyped-def]
+    """x becomes L⁻ᵀ x."""
+    k = len(x)
     for i in range(k - 1, -1, -1):
         for j in range(i + 1, k):
             x[i] -= H[j, i] * x[j]

@@ -14,12 +14,17 @@ from jaxtyping import Float
 from kedfem.dynamics.condensed import end_forces
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
+from kedfem.dynamics.interface import RowState, Tie
+from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import Rotation, port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
 from kedfem.dynamics.stiffening import Stiffening, with_turnings
 from kedfem.dynamics.substructure import mass_matrix
+from kedfem.dynamics.tied import Begun, stepwise_tied
 from kedfem.links.record import Link
+
+DEPENDENT = 1e-9  # rows of length one
 
 
 def rotated_stiffness(K0: sp.csr_array, R: Rotation) -> sp.csr_array:
@@ -69,6 +74,46 @@ def shared_nodes(
     return sp.csr_array(sp.hstack([sp.block_diag(blocks), sp.vstack(interface)])), dependent
 
 
+Solution = tuple[Float[np.ndarray, " n"], Float[np.ndarray, " r"]]
+
+
+def _symmetric_solution(system: sp.csc_array, f: Float[np.ndarray, " n"]) -> Solution:
+    """By one sparse LU; no rows."""
+    lu = scipy.sparse.linalg.splu(
+        system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    return np.asarray(lu.solve(f)), np.zeros(0)
+
+
+def _bordered_solution(system: sp.csc_array, f: Float[np.ndarray, " n"], tie: Tie) -> Solution:
+    """With the rows' forces m as unknowns: A x − Cᵀ m = f, C z + m / κ = target; z are the last unknowns.
+
+    Rows that depend on others (found by rank-revealing QR) are left out, their forces zero.
+    """
+    n, k = system.shape[0], tie.C.shape[1]
+    hard = np.flatnonzero(tie.compliance == 0)
+    kept = np.setdiff1d(np.arange(len(tie.C)), hard)
+    if len(hard):
+        size = np.linalg.norm(tie.C[hard], axis=1)
+        R, order = scipy.linalg.qr(
+            (tie.C[hard] / np.where(size > 0, size, 1)[:, None]).T, mode="r", pivoting=True
+        )
+        kept = np.sort(np.concatenate([kept, hard[order[: int((np.abs(np.diag(R)) > DEPENDENT).sum())]]]))
+    scale = float(np.abs(system.diagonal()).mean())
+    C = sp.hstack([sp.csr_array((len(kept), n - k)), sp.csr_array(tie.C[kept])])
+    bordered = sp.block_array(
+        [[system / scale, -C.T], [C, sp.diags_array(scale * tie.compliance[kept])]], format="csc"
+    )
+    right = np.concatenate([f / scale, tie.target[kept]])
+    right[n - k : n] += tie.force / scale
+    lu = scipy.sparse.linalg.splu(bordered)
+    x = lu.solve(right)
+    x += lu.solve(right - bordered @ x)
+    m = np.zeros(len(tie.C))
+    m[kept] = scale * x[n:]
+    return np.asarray(x[:n]), m
+
+
 class LiteralSteps:
     """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
 
@@ -83,34 +128,43 @@ class LiteralSteps:
         self.M = [mass_matrix(link) for link in links]
         self.factorisations = 0
 
-    def begin(self, states: Sequence[LinkState]) -> list[LinkState]:
+    def begin(self, states: Sequence[LinkState], rows: RowState | None = None) -> Begun:
         """The state of the first time point."""
-        return list(states)
+        return Begun(list(states), rows)
 
     def advance(
-        self, state: list[LinkState], forcing: Sequence[Forcing]
-    ) -> tuple[list[LinkHistory], list[LinkState]]:
+        self, state: Begun, forcing: Sequence[Forcing], rows: JointRows | None = None
+    ) -> tuple[list[LinkHistory], Begun]:
         """All time points of a block; see `DenseSteps.advance`."""
         if self.stiffening is not None:
             forcing = self.stiffening.stressed(forcing)
-        return stepwise(self.step, state, forcing)
+        if rows is None:
+            links, last = stepwise(self.step, state.links, forcing)
+            return links, Begun(last)
+        return stepwise_tied(self.tied_step, state, forcing, rows, self.scheme)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.step`."""
+        new = self.tied_step(states, at, None)[0]
+        return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
+
+    def tied_step(
+        self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
+    ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+        """The same where joints hold by rows, which border the system; see `CondensedSteps.tied_step`."""
         A = self._matrices(at)
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]
         system = sp.csc_array(self.T.T @ sp.csr_array(sp.block_diag(A)) @ self.T)
-        lu = scipy.sparse.linalg.splu(
-            system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        f = self.T.T @ np.concatenate([r.ravel() for r in rhs])
         self.factorisations += 1
-        u = self.T @ lu.solve(self.T.T @ np.concatenate([r.ravel() for r in rhs]))
+        free, m = _symmetric_solution(system, f) if tie is None else _bordered_solution(system, f, tie)
+        u = self.T @ free
         parts = np.split(u, np.cumsum([link.unknowns for link in self.links])[:-1])
         new = [
             self._next(k, states[k], at[k], parts[k].reshape(rhs[k].shape), A[k], rhs[k])
             for k in range(len(self.links))
         ]
-        return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
+        return new, free[len(free) - self.joints[0].B.shape[1] :], m
 
     def _matrices(self, at: Sequence[Nominal]) -> list[sp.csr_array]:
         """Effective matrices of all links, world frame; stress stiffness is assembled like the rest."""

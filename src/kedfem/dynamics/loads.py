@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import on_part, seat_of
+from kedfem.dynamics.places import on_part, seat_of
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
 from kedfem.links.recovery import point_rows

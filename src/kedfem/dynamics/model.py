@@ -7,8 +7,12 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import Attachment, SharedCut, attachments, on_part, part_seat, slider_axis
+from kedfem.dynamics.coupling import Attachment, SharedCut, joined
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
+from kedfem.dynamics.places import on_part, part_seat, slider_axis
+from kedfem.dynamics.row_joints import RowJoint, needs_rows
+from kedfem.dynamics.row_ports import Ways
+from kedfem.dynamics.slots import slot_ways
 from kedfem.dynamics.state import Rayleigh
 from kedfem.dynamics.stiff_ports import with_stiff_ports
 from kedfem.errors import MeshError, SceneError
@@ -20,6 +24,7 @@ from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
+from kedfem.motion.path import Path
 from kedfem.scene import (
     Body,
     Flywheel,
@@ -31,6 +36,7 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
+from kedfem.scene.checks import elastic_drive_faults
 
 T = TypeVar("T")
 
@@ -80,6 +86,7 @@ class Model:
     bodies : number of each link in the linkage
     joints, loads : per link
     carried : rigid links that move with the drive
+    rows : joints that hold by rows
     """
 
     links: tuple[Link, ...]
@@ -89,6 +96,7 @@ class Model:
     sliders: tuple[Slider, ...]
     damping: Rayleigh
     carried: tuple[Carried, ...] = ()
+    rows: tuple[RowJoint, ...] = ()
 
     @property
     def unknowns(self) -> int:
@@ -99,15 +107,18 @@ class Model:
     def coordinates(self) -> int:
         """Generalised coordinates once the joints share theirs."""
         held = sum(len(joint.keep) for joint in self.joints)
-        return self.unknowns - held + int(self.joints[0].B.shape[1])
+        return self.unknowns - held + int(self.joints[0].B.shape[1]) - sum(len(x.gap) for x in self.rows)
 
 
-def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None) -> Model:
+def elastic_model(
+    scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None, along: Path | None = None
+) -> Model:
     """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
 
     Parameters
     ----------
     bare : `bare_links` of the scene, if they are there already
+    along : the linkage's path over the drive's range, needed with slots
 
     Raises
     ------
@@ -116,6 +127,8 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     SceneError
         If a load or body does not fit its link.
     """
+    if faults := list(elastic_drive_faults(scene)):
+        raise SceneError(faults)
     cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
     links = {
         key: part
@@ -145,16 +158,17 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
     links = _made_rigid(scene, links)
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
-    joined = attachments(
-        scene, links, [shared for name, link in cut.items() for shared in _shared(name, link)]
-    )
+    cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
+    ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
+    held = joined(scene, links, cuts, ways)
     loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads
     return Model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
-        joints=tuple(joined[key] for key in links), loads=tuple(loads[key] for key in links),
+        joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
+        rows=held.rows,
     )  # fmt: skip
 
 
@@ -187,8 +201,10 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
 
 def moves_with_drive(scene: Scene, name: str) -> bool:
     """Whether a link is rigid and turns on the ground with the drive."""
-    driven = scene.joints[scene.driven].links if scene.driven else ()
-    return scene.links[name].fidelity == "rigid" and name in driven
+    rigid_ = scene.links[name].fidelity == "rigid"
+    return rigid_ and any(
+        name in scene.joints[x].links and not needs_rows(scene, x) for x in scene.driven_joints
+    )
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:

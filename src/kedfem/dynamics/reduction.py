@@ -14,7 +14,6 @@ from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
 from kedfem.dynamics.substructure import Substructure, coupled, factored
@@ -65,11 +64,11 @@ def excited(
     model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
 ) -> list[list[NodalOf]]:
     """Static deflection at an instant, and its shares in the modes of the frozen linkage that it excites; per link."""
-    R, static = _static(parts, instant)
+    static = _static(parts, instant)
     out = [[x] for x in static]
     if not any(x.any() for x in static):
         return out
-    vectors, images, T = _lanczos(model, parts, R, static, levels)
+    vectors, images, T = _lanczos(model, parts, instant, static, levels)
     _, Z = np.linalg.eigh(T)
     share = Z.T @ np.array([_dot(M_b, static) for M_b in images])
     for mode, amount in zip(Z.T, share, strict=True):
@@ -85,21 +84,21 @@ def frozen_frequencies(
 
     1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less.
     """
-    R, static = _static(parts, instant)
+    static = _static(parts, instant)
     if not any(x.any() for x in static):
         return np.zeros(0)
-    values = np.linalg.eigvalsh(_lanczos(model, parts, R, static, levels)[2])[::-1]
+    values = np.linalg.eigvalsh(_lanczos(model, parts, instant, static, levels)[2])[::-1]
     return np.asarray(1 / np.sqrt(values[values > REPEATED * values[0]]))
 
 
-def _static(parts: Sequence[Substructure], instant: Instant) -> tuple[list[Rotation], list[NodalOf]]:
-    """Orientations at an instant, and the linkage's static deflection under P − M R0'' there, link frames."""
+def _static(parts: Sequence[Substructure], instant: Instant) -> list[NodalOf]:
+    """The linkage's static deflection under P − M R0'' at an instant, link frames."""
     R = [now.R for now in instant.at]
-    return R, _copied(coupled(parts, R, [now.F @ now.R for now in instant.at])[0])
+    return _copied(coupled(parts, R, [now.F @ now.R for now in instant.at], instant.tie)[0])
 
 
 def _lanczos(
-    model: Model, parts: Sequence[Substructure], R: Sequence[Rotation], start: list[NodalOf], levels: int
+    model: Model, parts: Sequence[Substructure], instant: Instant, start: list[NodalOf], levels: int
 ) -> tuple[list[list[NodalOf]], list[list[NodalOf]], Float[np.ndarray, "l l"]]:
     """Mass-orthonormal deflections b of the linkage by K⁻¹ M from a first one, M b, and T = Bᵀ M K⁻¹ M B."""
     vectors: list[list[NodalOf]] = []
@@ -117,7 +116,7 @@ def _lanczos(
             break
         vectors.append([y / size for y in x])
         images.append([y / size for y in Mx])
-        x = _copied(coupled(parts, R, images[-1])[0])
+        x = _copied(coupled(parts, [now.R for now in instant.at], images[-1], instant.tie)[0])
         size = _mass_norm(model, x)[0]
         for k, M_b in enumerate(images):
             T[level, k] = T[k, level] = _dot(M_b, x)

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkMoment, Snapshot
+from kedfem.dynamics.interface import static_tie
+from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import add_port_forces
 from kedfem.dynamics.start import damping_times
@@ -41,7 +43,9 @@ def residual_deflections(
     ]
     for r, joint, state in zip(rhs, full.joints, snapshot.states, strict=True):
         add_port_forces(r, joint, state.port_forces)
-    return [x.copy() for x in coupled(parts, [state.R for state in snapshot.states], rhs)[0]]
+    rows = joint_rows(full.rows, motion)
+    tie = None if rows is None else static_tie(rows, 0)
+    return [x.copy() for x in coupled(parts, [state.R for state in snapshot.states], rhs, tie)[0]]
 
 
 def _residual(

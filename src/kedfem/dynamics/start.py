@@ -1,7 +1,7 @@
 """Initial states that satisfy the equation: at rest, or quasi-static; rates where links start to move by themselves."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -9,6 +9,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.first_rows import FirstRows, interface_values
+from kedfem.dynamics.interface import Tie
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
@@ -60,7 +62,7 @@ def rigid_rates(link: Link, v: Float[np.ndarray, "3"], omega: Float[np.ndarray, 
 
 def initial_states(
     links: Sequence[Link], joints: Sequence[Attachment], at: Sequence[Nominal], damping: Rayleigh,
-    deflected: Sequence[Deflected],
+    deflected: Sequence[Deflected], rows: FirstRows | None = None,
 ) -> list[LinkState]:  # fmt: skip
     """States with given δ, δ' and the acceleration that equation (20) then asks for, joints closed, [KED, eq. (20)].
 
@@ -68,15 +70,21 @@ def initial_states(
     ----------
     at : orientation and P − M R0'' of each link now
     deflected : joints closed
+    rows : of joints that hold by rows; rates are made to keep these closed, C z' = −C' z, accelerations too
     """
     parts = [mass_substructure(link, joint) for link, joint in zip(links, joints, strict=True)]
+    tie = None
+    if rows is not None:
+        deflected = _with_rates(links, parts, at, deflected, rows)
+        tie = rows.acceleration_tie(interface_values(joints, [x.u for x in deflected]),
+                                    interface_values(joints, [x.v for x in deflected]))  # fmt: skip
     g = [x.u @ now.R for x, now in zip(deflected, at, strict=True)]
     Kg = [_stiffness_times(link, x) for link, x in zip(links, g, strict=True)]
     Cg1 = [damping_times(link, damping, x.g_rate) for link, x in zip(links, deflected, strict=True)]
     f = [a + b + x.stressed for a, b, x in zip(Kg, Cg1, deflected, strict=True)]
     # the mass is the same in every frame, so the accelerations can be found in the link frames
     a_link, forces = coupled(
-        parts, [now.R for now in at], [now.F @ now.R - x for now, x in zip(at, f, strict=True)]
+        parts, [now.R for now in at], [now.F @ now.R - x for now, x in zip(at, f, strict=True)], tie
     )
     states = []
     for k, (link, start, now) in enumerate(zip(links, deflected, at, strict=True)):
@@ -93,16 +101,33 @@ def initial_states(
     return states
 
 
+def _with_rates(
+    links: Sequence[Link], parts: Sequence[Substructure], at: Sequence[Nominal], given: Sequence[Deflected],
+    rows: FirstRows,
+) -> list[Deflected]:  # fmt: skip
+    """Starts whose rates keep the rows closed; changed as little as can be, in kinetic energy."""
+    joints = [part.attachment for part in parts]
+    z, z1 = (interface_values(joints, x) for x in ([x.u for x in given], [x.v for x in given]))
+    none = [np.zeros((link.n, link.d)) for link in links]
+    change, _ = coupled(parts, [now.R for now in at], none, rows.rate_tie(z, z1))
+    return [
+        replace(x, v=x.v + c @ now.R.T, g_rate=x.g_rate + c)
+        for x, c, now in zip(given, change, at, strict=True)
+    ]
+
+
 @dataclass(frozen=True, slots=True)
 class Instant:
     """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×².
 
     turnings : g → k g P of the links' stress stiffness, if it counts
+    tie : of joints that hold by rows
     """
 
     at: Sequence[Nominal]
     spin: Sequence[Rotation]
     turnings: Sequence[Callable[[Nodal], Nodal]] | None = None
+    tie: Tie | None = None
 
 
 def quasi_static(
@@ -126,14 +151,14 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     R = [now.R for now in instant.at]
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
-    g, _ = coupled(parts, R, load)
+    g, _ = coupled(parts, R, load, instant.tie)
     if instant.turnings is not None:
         g = _stiffened(links, parts, R, g, spin, instant.turnings)
         return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
     before = np.inf
     for _ in range(TURNING_SWEEPS):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
-        new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)])
+        new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)], instant.tie)
         change, size = _change(new, g)
         if change > 0.5 * before:
             break

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from kedfem.dynamics.coupling import part_seat
+from kedfem.dynamics.places import part_seat
 from kedfem.links.record import Link
 from kedfem.links.stiff import with_stiff_seat
 from kedfem.scene import Scene
@@ -21,7 +21,7 @@ def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]
     out, done = dict(links), set()
     meshed = {link.name for link in links.values() if link.meshed}
     for name, joint in scene.joints.items():
-        for link in joint.links:
+        for link in joint.links[:1] if joint.kind == "slot" else joint.links:  # a slot's line is no seat
             if link not in meshed or not joint.stiff(link) or scene.links[link].fidelity == "rigid":
                 continue
             key, seat = part_seat(scene, name, out, link)

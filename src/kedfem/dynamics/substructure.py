@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.interface import Tie, solved
 from kedfem.dynamics.ports import Rotation, port_columns, port_rotation, port_values
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import Nodal, NodalOf, Rayleigh
@@ -74,7 +75,7 @@ def substructure(
 
 
 def coupled(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf]
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None = None
 ) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
     """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
 
@@ -83,27 +84,32 @@ def coupled(
     Parameters
     ----------
     parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
+    tie : what joints that hold by rows ask of z; then Σ Bᵀ R λ is what these exert
 
     Returns
     -------
     g : per link (n, d), link frame
     forces : per link (q,) λ on the link at its ports, link frame
     """
+    return tied(parts, R, rhs, tie)[:2]
+
+
+def tied(
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+    """`coupled`, and with it the interface unknowns z and the rows' forces m."""
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
     v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
     RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
-    z = np.zeros(parts[0].attachment.B.shape[1])
+    z, m = np.zeros(parts[0].attachment.B.shape[1]), np.zeros(0)
     if len(z):
         # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
         H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
         f = np.sum([b.T @ (part.S @ x) for part, b, x in zip(parts, RB, v, strict=True)], axis=0)
-        try:
-            z = scipy.linalg.solve(H, f, assume_a="pos", check_finite=False)
-        except np.linalg.LinAlgError as error:
-            raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
+        z, m = solved(H, f, tie)
     forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
-    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
+    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)], z, m
 
 
 def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:

@@ -13,10 +13,13 @@ from kedfem.dynamics.actions import actions
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
+from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import far_deflected, static_excess
 from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
+from kedfem.dynamics.interface import static_tie
+from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
@@ -33,7 +36,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
+from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
@@ -83,12 +86,11 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    law = scene.motion
     stresses = None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
-    states = first_states(scene, linkage, along, law, model, stresses)
-    start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
+    states = first_states(scene, linkage, along, model, stresses)
+    start = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
     yield Block(0, start, _first(model, solver, states))
-    state: Any = solver.begin(states)
+    state: Any = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along):
@@ -101,11 +103,34 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
                     if stuck.taken:
                         yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
                     raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
-            elif isinstance(solver, ActedSteps):
-                links, state = solver.advance(state, forcings(model, part), part)
             else:
-                links, state = solver.advance(state, forcings(model, part))
+                rows, forcing = joint_rows(model.rows, part), forcings(model, part)
+                if isinstance(solver, ActedSteps):
+                    links, state = solver.advance(state, forcing, part, rows)
+                else:
+                    links, state = solver.advance(state, forcing, rows)
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def begun(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: list[LinkState]
+) -> Any:
+    """A solver's state at the first time point."""
+    if not model.rows or isinstance(solver, FollowingSteps | FollowingDense):
+        return solver.begin(states)
+    rows = rows_at_start(scene, linkage, along, model)
+    return solver.begin(states, None if rows is None else rows.state(model.joints, states))
+
+
+def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> FirstRows | None:
+    """Rows of joints at t = 0 with their derivatives in time; None without any."""
+    if not model.rows:
+        return None
+    grid = time_grid(scene)
+    h = min(grid.step, grid.end / (INSTANTS - 1))
+    t = h * np.arange(INSTANTS)
+    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, path_parameter(scene, t)))
+    return None if rows is None else first_rows(rows, h)
 
 
 def _first(model: Model, solver: Steps, states: list[LinkState]) -> list[LinkHistory]:
@@ -120,7 +145,7 @@ def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge
     """Smaller steps for where those of the analysis do not settle."""
     return Bridge(
         time_grid(scene).step, scene.analysis.rho_inf,
-        lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
+        lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)),
         lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
     )  # fmt: skip
 
@@ -144,20 +169,23 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
 def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
     """Rigid motion at all time points after the first, block after block with the number of its first point.
 
-    A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
+    A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved.
     """
     grid, law = time_grid(scene), scene.motion
-    turn = turn_steps(scene) or 0.0
+    turn = (turn_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
     kept: list[RigidMotion] = []
     for first in range(1, grid.steps + 1, POINTS):
         steps = np.arange(first, min(first + POINTS, grid.steps + 1))
         t = grid.step * steps
-        drive = drive_angle(law, t)
+        drive = path_parameter(scene, t)
         if kept and first > round(turn):
             if len(kept) > 1:
                 kept = [joined(kept)]
-            yield first, replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0])
+            yield (
+                first,
+                replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0], drives=drive[0][:, None]),
+            )
             continue
         motion = rigid_motion(linkage, along, t, drive)
         if returns and first <= turn <= KEPT and grid.steps > turn:
@@ -179,7 +207,7 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
 
 
 def first_states(
-    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model,
+    scene: Scene, linkage: Linkage, along: Path, model: Model,
     stresses: Stiffening | None = None,
 ) -> list[LinkState]:  # fmt: skip
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
@@ -187,16 +215,17 @@ def first_states(
     grid = time_grid(scene)
     h = min(grid.step, grid.end / 2)
     t = h * np.arange(1 if at_rest else 3)
-    motion = rigid_motion(linkage, along, t, drive_angle(law, t))
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     moments = instants(model, motion, stresses)
     every = actions(scene, model)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
         forces = first_forces(every, model.links, motion, [(x.u, x.v) for x in start])
+        rows = rows_at_start(scene, linkage, along, model)
         if every and not following(scene):
             at = loaded(moments[0].at, forces)
-            return initial_states(model.links, model.joints, at, model.damping, start)
-        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+            return initial_states(model.links, model.joints, at, model.damping, start, rows)
+        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
         states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
         if not any(link.rigid and link.fit is not None for link in model.links):
@@ -208,11 +237,11 @@ def first_states(
         each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
         return rigid_start(model.links, model.joints, states, each)
     if every:
-        rows = still_forces(
+        more = still_forces(
             Forces(every, model.links, h), motion,
-            lambda k, more: quasi_static(model.links, model.joints, _acted(moments[k : k + 1], [more]))[0],
+            lambda k, x: quasi_static(model.links, model.joints, _acted(moments[k : k + 1], [x]))[0],
         )  # fmt: skip
-        moments = _acted(moments, rows)
+        moments = _acted(moments, more)
     u = quasi_static(model.links, model.joints, moments)
     if following(scene):
         u = far_deflected(model.links, model.joints, moments, u)
@@ -228,7 +257,8 @@ def first_states(
             replace(x, stressed=static_excess(link, x.u, now.R))
             for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
-    return initial_states(model.links, model.joints, moments[0].at, model.damping, start)
+    rows = rows_at_start(scene, linkage, along, model)
+    return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
 
 
 def _acted(moments: Sequence[Instant], rows: Sequence[Sequence[Nodal]]) -> list[Instant]:
@@ -243,11 +273,13 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
         forcing = stresses.stressed(forcing)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
+    rows = joint_rows(model.rows, motion)
     return [
         Instant(
             [each.at(k) for each in forcing],
             [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
             None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
+            None if rows is None else static_tie(rows, k),
         )
         for k in range(len(motion.t))
     ]
@@ -257,7 +289,7 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     """Least and greatest drive angle of the analysis [rad]."""
     grid = time_grid(scene)
     t = grid.step * np.arange(grid.steps + 1)
-    phi = drive_angle(scene.motion, t)[0]
+    phi = path_parameter(scene, t)[0]
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 

@@ -173,7 +173,8 @@ class Account:
         turns = [x.link.fit is None for x in of]
         made = [products(*each) for each in zip(of, links, turns, strict=True)]
         bodies = _bodies(of)
-        found = flow(of, fields_of(of, links, made, turns), at.of(bodies, of[0].k))
+        rows_work = bool(self.model.rows)
+        found = flow(of, fields_of(of, links, made, turns, rows_work), at.of(bodies, of[0].k))
         if not self.model.damping.present:
             return found, 0.0
         last = self._last[k] or last_of(motion.t, at, of, links, made, 0)

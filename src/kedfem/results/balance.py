@@ -23,7 +23,8 @@ class Flow:
 
     kinetic : (T,) energy of the absolute motion [J]
     momentum, angular : (3, T) [N s, N m s]; sizes: (2, T) their lengths, added up over links
-    loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum
+    loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum, but
+        for what directions that vary in time do on the elastic motion
     force, moment : (3, T) of P and the port forces together [N, N m]
     turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the nominal frame [N m]
     neglected : (T,) its power on the nominal rotation [W]
@@ -52,27 +53,29 @@ class Fields:
     rows : (4, (1 + k) k + 1, S, T) moments and couple of M δ', P − M R0'', port forces and M δ
     arms : (2, k, k, S, T) Σ δ ⊗ M δ', and Σ δ ⊗ y of P − M R0'' and the port forces
     elastic : (k, k, S, T) Σ g ⊗ K0 g, link frame; None if K turns with no link's nominal motion
-    powers : (2, S, T) δ' · M δ' and δ' · (P − M R0'')
+    powers : (3, S, T) δ' · M δ', δ' · (P − M R0'') and, where joints hold by rows, δ' · port forces
     """
 
     rows: Float[np.ndarray, "4 m S T"]
     arms: Float[np.ndarray, "2 k k S T"]
     elastic: Float[np.ndarray, "k k S T"] | None
-    powers: Float[np.ndarray, "2 S T"]
+    powers: Float[np.ndarray, "3 S T"]
 
 
 def fields_of(
-    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool]
-) -> Fields:
+    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
+    rows_work: bool = False,
+) -> Fields:  # fmt: skip
     """Of elastic links, all planar or all in space.
 
     Parameters
     ----------
     made : K0 g where K turns with the nominal motion, as `turns` says
+    rows_work : whether joints hold by rows, whose forces do work on the elastic motion
     """
     S, T, k = len(of), len(histories[0].u), of[0].k
     rows, arms = np.empty((4, len(of[0].fit), S, T)), np.empty((2, k, k, S, T))
-    powers, elastic = np.empty((2, S, T)), np.zeros((k, k, S, T)) if any(turns) else None
+    powers, elastic = np.zeros((3, S, T)), np.zeros((k, k, S, T)) if any(turns) else None
     for i, (x, history, product) in enumerate(zip(of, histories, made, strict=True)):
         u, v, F = history.u, history.v, history.F
         f = turned_vectors(x.joint, history.R, history.port_forces)
@@ -84,6 +87,10 @@ def fields_of(
         if elastic is not None and turns[i]:
             elastic[:, :, i] = paired(k, history.g, product.Kg)
         powers[0, i], powers[1, i] = dot(v, product.Mv), dot(v, F)
+        if rows_work:
+            powers[2, i] = dot(
+                x.joint.weights @ (v if len(x.joint.nodes) == x.link.n else v[:, x.joint.nodes]), f
+            )
     return Fields(rows, arms, elastic, powers)
 
 
@@ -94,7 +101,7 @@ def carried_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
     for i, (x, F) in enumerate(zip(of, forces, strict=True)):
         rows[1, :, i] = x.fit @ F.reshape(T, -1).T
     rows[2] = -rows[1]
-    return Fields(rows, np.zeros((2, k, k, S, T)), None, np.zeros((2, S, T)))
+    return Fields(rows, np.zeros((2, k, k, S, T)), None, np.zeros((3, S, T)))
 
 
 def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
@@ -110,7 +117,7 @@ def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
     kinetic = 0.5 * (_work(y[0] + Mv, at.rates[0]) + (couple[0] + couples[0]) * turns[0] + found.powers[0])
     loads = _work(y[1], at.rates[0]) + couple[1] * turns[0] + found.powers[1]
     loads += _work(Mv, at.rates[1]) + couples[0] * turns[1]
-    supports = _work(ports, at.rates[0]) + couples[2] * turns[0]
+    supports = _work(ports, at.rates[0]) + couples[2] * turns[0] + found.powers[2]
     y[1] += ports
     # Σ x ⊗ y with x = p + R X + δ
     N = np.einsum("iast,zajst->zijst", at.place, y)

@@ -13,6 +13,7 @@ from kedfem.dynamics.inertias import inertias_of_model
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Carried, Model, Slider, on_segment
 from kedfem.dynamics.ports import turned_ports
+from kedfem.dynamics.row_joints import ordered
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
@@ -24,7 +25,8 @@ from kedfem.results.audit import Account, energy_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.results.rigid import rigid_forces
-from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
+from kedfem.results.row_forces import RowForces, known, of_joint
+from kedfem.scene import GROUND, ForceLoad, Probe, Scene, TorqueLoad
 
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
@@ -48,8 +50,9 @@ def recording(
         If a probe is outside its link.
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
-    joints = [channel for name in scene.joints for channel in _joint(scene, model, name)]
-    drive = [] if scene.driven is None else _torque(scene, model, scene.driven)
+    forces = RowForces(model)
+    joints = [channel for name in scene.joints for channel in _joint(scene, model, name, forces)]
+    drive = [] if scene.driven is None else _torque(scene, model, scene.driven, forces)
     energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
     return [*probes, *joints, *drive, *_rigid(scene, model, along), *acting(scene, model), *energies]
 
@@ -120,14 +123,16 @@ def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
     return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
 
 
-def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
+def _joint(scene: Scene, model: Model, name: str, forces: RowForces) -> list[Recorded]:
     """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
+    if any(row.name == name for row in model.rows):
+        return _row_joint(scene, model, name, forces)
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
     if slider is not None:
-        return _slider_force(scene, model, slider, name)
+        return _slider_force(scene, model, slider, name, forces)
     hub = next((x for x in model.carried if x.hub == name), None)
     if hub is not None:
-        return _hub(scene, model, hub)
+        return _hub(scene, model, hub, forces)
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
@@ -138,14 +143,33 @@ def _joint(scene: Scene, model: Model, name: str) -> list[Recorded]:
     sign = -1.0 if opposite else 1.0
     label = f"of joint {name} on link {on} from {other}"
     at = np.asarray(scene.joints[name].at)
-    wrench = _wrench(model, k, name, at)
+    wrench = _wrench(model, k, name, at, forces)
     return [
         Recorded(channel, partial(_part_of, wrench, which, sign))
-        for which, (channel, known) in enumerate(
+        for which, (channel, told) in enumerate(
             zip(_force_and_moment(name, label), _determinate(model, k, name, at), strict=True)
         )
-        if known
+        if told
     ]
+
+
+def _row_joint(scene: Scene, model: Model, name: str, forces: RowForces) -> list[Recorded]:
+    """Of a joint that holds by rows, about its point on the first link, of a slot the pin."""
+    first, second = scene.joints[name].links
+    on, other = (second, first) if first == GROUND else (first, second)
+    sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
+    label = f"of joint {name} on link {on} from {other}"
+    channels = zip(_force_and_moment(name, label), known(model, name), strict=True)
+    return [
+        Recorded(channel, partial(_row_part, forces, name, which, sign))
+        for which, (channel, told) in enumerate(channels)
+        if told
+    ]
+
+
+def _row_part(forces: RowForces, name: str, which: int, sign: float, block: Block) -> Rows:
+    """Force (0) or moment (1)."""
+    return sign * forces.wrench(name, block)[which]
 
 
 Wrench = Callable[[Block], tuple[Rows, Rows]]
@@ -164,28 +188,35 @@ def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
     )
 
 
-def _hub(scene: Scene, model: Model, carried: Carried) -> list[Recorded]:
+def _hub(scene: Scene, model: Model, carried: Carried, forces: RowForces) -> list[Recorded]:
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
-    wrench, others = _hub_wrench(scene, model, carried)
-    loose = [_loose(model, *each) for each in others]
-    known = [all(_small(x[which]) for x in loose) for which in (0, 1)]
+    wrench, others = _hub_wrench(scene, model, carried, forces)
+    told = [all(_small(_loose(model, *x)[which]) for x in others) for which in (0, 1)]
+    rows = [known(model, name) for name in _row_joints_of(scene, model, carried)]
+    told = [told[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
     label = f"of joint {carried.hub} on link {carried.link.name} from ground"
     channels = enumerate(_force_and_moment(carried.hub, label))
-    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if known[k]]
+    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if told[k]]
 
 
 Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
 
 
-def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, list[Held]]:
+def _row_joints_of(scene: Scene, model: Model, carried: Carried) -> list[str]:
+    """Joints of a carried link that hold by rows."""
+    return [row.name for row in model.rows if carried.link.name in scene.joints[row.name].links]
+
+
+def _hub_wrench(scene: Scene, model: Model, carried: Carried, forces: RowForces) -> tuple[Wrench, list[Held]]:
     """What holds a carried link in balance: P − M R0'', the forces of its other joints, and the hub's; these joints."""
     link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
     held: list[Held] = []
+    sliding = _row_joints_of(scene, model, carried)
     for name, joint in scene.joints.items():
         elastic = [x.name for x in model.links if x.name in joint.links]
-        if link.name in joint.links and elastic:
+        if link.name in joint.links and elastic and name not in sliding:
             held.append((_holder(model, elastic[0], name), name, np.asarray(joint.at)))
-    others = [(_wrench(model, *each), each[2]) for each in held]
+    others = [(_wrench(model, *each, forces), each[2]) for each in held]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
         F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
@@ -196,6 +227,11 @@ def _hub_wrench(scene: Scene, model: Model, carried: Carried) -> tuple[Wrench, l
             f, m = other(block)
             force = force + f
             moment = moment + m + cross((R @ (at - hub)), f)
+        for name in sliding:
+            f, m, point = forces.wrench(name, block)
+            sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
+            centre = block.motion.p[:, carried.body] + R @ hub
+            force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
         return force, moment
 
     return wrench, held
@@ -206,18 +242,21 @@ def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
     return applied(carried.link, carried.loads, block.motion, carried.body)
 
 
-def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> Wrench:
+def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: RowForces) -> Wrench:
     """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
     attachment, link = model.joints[k], model.links[k]
     rows = _rows_of(attachment, joint)
     arms = _arms(attachment, joint, at)
     shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
+    from_rows = attachment.from_rows[rows]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
         f = np.zeros((len(block), len(rows)))
         for j, share in shares:
             history = block.links[j]
             f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
+        if from_rows.any():
+            f += forces.on_ports(block) @ from_rows.T
         R = np.tile(np.eye(3), (len(block), 1, 1))
         R[:, : link.d, : link.d] = block.links[k].R
         return _resultant(link, arms @ R.transpose(0, 2, 1), f.reshape(len(f), len(arms), link.d))
@@ -264,7 +303,7 @@ def _resultant(
     return force.sum(axis=1), cross(arms, force).sum(axis=1)
 
 
-def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list[Recorded]:
+def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces: RowForces) -> list[Recorded]:
     """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it."""
     pins = [name] if name != slider.guide else [
         j for j, joint in scene.joints.items() if slider.name in joint.links and j != name
@@ -273,7 +312,7 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     pairs = [(k, j) for k, x in enumerate(model.joints) for j in pins if j in x.joints]
     if not all(_determinate(model, k, j, zero)[0] for k, j in pairs):
         return []
-    wrenches = [_wrench(model, k, j, zero) for k, j in pairs]
+    wrenches = [_wrench(model, k, j, zero, forces) for k, j in pairs]
     if name == slider.guide:
         description = f"force of joint {name} on slider {slider.name} from ground"
 
@@ -298,20 +337,40 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str) -> list
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
 
 
-def _torque(scene: Scene, model: Model, driven: str) -> list[Recorded]:
+def _torque(scene: Scene, model: Model, driven: str, forces: RowForces) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
+    if any(row.name == driven for row in model.rows):
+        return [_row_drive(scene, model, driven, forces)]
     joint = scene.joints[driven]
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
     channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
-        wrench = _wrench(model, _holder(model, name, driven), driven, at)
+        wrench = _wrench(model, _holder(model, name, driven), driven, at, forces)
     else:
-        wrench, others = _hub_wrench(scene, model, carried)
+        wrench, others = _hub_wrench(scene, model, carried, forces)
         if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
             return []
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
+
+
+def _row_drive(scene: Scene, model: Model, driven: str, forces: RowForces) -> Recorded:
+    """Torque, of a slide force, of a drive that holds by rows, along its axis in the second link."""
+    joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
+    on = next(link for link in joint.links if link != GROUND)
+    sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
+    quantity, unit = ("force", "N") if slide else ("torque", "N m")
+    channel = Channel(
+        f"drive/{quantity}", (quantity,), unit, "world", f"{quantity} of the drive on link {on}"
+    )
+
+    def along(block: Block) -> Rows:
+        axis = block.motion.R[:, row.bodies[1]] @ row.axis
+        effort = forces.wrench(driven, block)[0 if slide else 1]
+        return np.asarray(sign * (effort * axis).sum(axis=1, keepdims=True))
+
+    return Recorded(channel, along)
 
 
 def _holder(model: Model, name: str, joint: str) -> int:

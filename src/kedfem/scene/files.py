@@ -87,9 +87,7 @@ def part_geometry(path: Path) -> PartGeometry:
     return part
 
 
-def motion_table(
-    path: Path, names: tuple[str, str] = ("time", "angle"), si: tuple[str, str] = ("s", "rad")
-) -> tuple[list[float], list[float]]:
+def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tuple[list[float], list[float]]:
     """Two columns of a CSV file, in SI units, under an optional heading with units.
 
     Parameters
@@ -114,7 +112,21 @@ def motion_table(
                 f"{path.name}, line {i}: must be two numbers, {names[0]} and {names[1]}, got {','.join(row)!r}"
             )
         pairs.append(numbers)
-    return [time * factors[0] for time, _ in pairs], [angle * factors[1] for _, angle in pairs]
+    return [at * factors[0] for at, _ in pairs], [value * factors[1] for _, value in pairs]
+
+
+def motion_table(path: Path) -> tuple[list[float], str, list[float]]:
+    """Times [s], and `angle` [rad] or `travel` [m], as the heading says, of a CSV file.
+
+    Raises
+    ------
+    SceneError
+        Not readable, or a line that is not two numbers.
+    """
+    first = next((row for row in file_text(path).splitlines() if row.strip()), "")
+    key, unit = ("travel", "m") if "travel" in first else ("angle", "rad")
+    time, values = two_columns(path, ("time", key), ("s", unit))
+    return time, key, values
 
 
 def _numbers(row: list[str]) -> tuple[float, float] | None:
@@ -144,20 +156,34 @@ def _heading_factors(
     return one, other
 
 
-def with_motion_table(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """A raw scene with the motion table of its drive read from the file that it names; and faults."""
-    drive = raw.get("drive")
+def with_motion_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with the motion tables of its drives read from the files that they name; and faults."""
+    read: dict[str, Any] = dict(raw)
+    faults: list[str] = []
+    if isinstance(raw.get("drive"), Mapping):
+        read["drive"], faults = _with_motion_table("drive", raw["drive"], folder)
+    if isinstance(raw.get("drives"), Mapping):
+        tables = {
+            name: _with_motion_table(f"drives.{name}", each, folder) for name, each in raw["drives"].items()
+        }
+        read["drives"] = {name: drive for name, (drive, _) in tables.items()}
+        faults = faults + [fault for _, found in tables.values() for fault in found]
+    return read, faults
+
+
+def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[str]]:
     motion = drive.get("motion") if isinstance(drive, Mapping) else None
-    if not isinstance(drive, Mapping) or not isinstance(motion, Mapping):
-        return dict(raw), []
+    if not isinstance(motion, Mapping):
+        return drive, []
     named = motion.get("kind") == "table" and isinstance(motion.get("file"), str)
-    if not named or "time" in motion or "angle" in motion:
-        return dict(raw), []
+    if not named or any(key in motion for key in ("time", "angle", "travel")):
+        return drive, []
     try:
-        time, angle = motion_table(folder / motion["file"])
+        time, key, values = motion_table(folder / motion["file"])
     except SceneError as error:
-        return dict(raw), [f"drive.motion.file: {fault}" for fault in error.faults]
-    return {**raw, "drive": {**drive, "motion": {"kind": "table", "time": time, "angle": angle}}}, []
+        return drive, [f"{where}.motion.file: {fault}" for fault in error.faults]
+    others = {name: value for name, value in motion.items() if name != "file"}
+    return {**drive, "motion": {**others, "time": time, key: values}}, []
 
 
 def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
@@ -174,9 +200,7 @@ def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, 
         if over not in FACTOR_UNITS or factor.keys() & {"time", "at", "value"}:
             continue
         try:
-            at, value = motion_table(
-                folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1")
-            )
+            at, value = two_columns(folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1"))
         except SceneError as error:
             faults += [f"loads.{name}.factor.file: {fault}" for fault in error.faults]
             continue

@@ -120,7 +120,7 @@ def joint_of(parts: Parts, entry: Entry) -> Entry | None:
 
 def held_joint_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]:
     """A motor or spring on a joint that the drive moves."""
-    if parts.drive.word("joint") == joint.name:
+    if joint.name in parts.driven_joints:
         yield entry.fault("joint", f"must name a joint that the drive does not move, got {joint.name!r}")
 
 
@@ -159,7 +159,7 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[str]:
         got = f"got {joint.name!r}, which is {kind}"
         message = f"must be of a revolute or prismatic joint, {got}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
-    elif parts.drive.word("joint") == joint.name:
+    elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
     elif kind in AXES and isinstance(given, str) and not in_unit(given, AXES[kind]):

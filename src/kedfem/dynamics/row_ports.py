@@ -1,0 +1,107 @@
+"""What joints that hold by rows have on their links: seats, or stations along the line of a slot."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.places import part_seat, slider_axis
+from kedfem.dynamics.row_joints import (
+    RowJoint,
+    Side,
+    bore_axis,
+    held_rows,
+    in_plane,
+    ordered,
+    seat_ports,
+    station_ports,
+)
+from kedfem.links.record import Link
+from kedfem.links.seats import port_weights
+from kedfem.links.stations import stations
+from kedfem.motion.linkage import joint_axis
+from kedfem.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """How far joints go: numbers of bodies in the linkage by name, and the way of each slot's pin along its line [m]."""
+
+    bodies: Mapping[str, int]
+    slots: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """Port points that one side of a joint has to itself.
+
+    key : of the link; slider : name of a rigid slider instead, whose one unknown is its travel
+    points, weights : (p, 3) as drawn, and (p, n)
+    selection : (dp, c) displacements there from the side's own unknowns, world components
+    """
+
+    key: str
+    slider: str
+    points: Float[np.ndarray, "p 3"]
+    weights: Float[np.ndarray, "p n"]
+    selection: Float[np.ndarray, "m c"]
+
+
+def row_joint(
+    scene: Scene, name: str, links: dict[str, Link], ways: Ways
+) -> tuple[RowJoint, list[Own | None]]:
+    """A joint that holds by rows, still without the interface unknowns, and the port points of its two sides.
+
+    Raises
+    ------
+    MeshError
+        If it finds no seat or line on one of its links.
+    """
+    joint = scene.joints[name]
+    i, j = ordered(joint)
+    found = [
+        _side(scene, name, i, links, ways, slot=False),
+        _side(scene, name, j, links, ways, joint.kind == "slot"),
+    ]
+    sides, own = zip(*found, strict=True)
+    gap, turn = held_rows(joint, name in scene.driven_joints)
+    axes = None
+    if joint.axes is not None:
+        a, b = (np.asarray(bore_axis(joint, link)) for link in (i, j))
+        axes, turn[-1] = (a, b), np.cross(a, b)
+    here = [link for link in links.values() if link.name in (i, j)]
+    kept = in_plane(gap, turn) if all(link.planar for link in here) else np.ones(len(gap), bool)
+    count = int(kept.sum())
+    return RowJoint(
+        name, np.asarray(joint.at), (ways.bodies[i], ways.bodies[j]), (sides[0], sides[1]), gap[kept], turn[kept],
+        axes, np.full(count, np.inf), np.zeros(count), joint_axis(joint),
+    ), list(own)  # fmt: skip
+
+
+def _side(
+    scene: Scene, name: str, on: str, links: dict[str, Link], ways: Ways, slot: bool
+) -> tuple[Side | None, Own | None]:
+    """What a joint has on one of its links; nothing on the ground and on what the drive carries."""
+    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
+        rigid = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
+        side = Side(
+            ways.bodies[on], np.asarray(scene.joints[name].at), rigid, np.zeros((1, 3, 0)), shared=False
+        )
+        return side, Own("", on, np.zeros((1, 3)), np.zeros((1, 0)), axis[:, None])
+    if on not in {link.name for link in links.values()}:
+        return None, None
+    where, body = f"joints.{name}", ways.bodies[on]
+    if slot:
+        key, link = next((key, link) for key, link in links.items() if link.name == on)
+        joint = scene.joints[name]
+        line = stations(link, where, np.asarray(joint.at), joint_axis(joint), ways.slots[name])
+        points, known = station_ports(line, link)
+        side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line)
+        weights = line.weights
+    else:
+        key, seat = part_seat(scene, name, links, on)
+        points, known = seat_ports(seat, links[key], where)
+        side = Side(body, seat.origin, known, np.zeros((len(points), links[key].d, 0)))
+        weights = port_weights(seat, points)
+    return side, Own(key, "", points, weights, np.eye(known.shape[2] * len(points)))

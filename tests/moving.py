@@ -1,0 +1,113 @@
+"""Mechanisms with joints between links that both move, for tests: inverted slider-cranks, a shaft of universal joints."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.dense import DenseSteps
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.results.recording import recording
+from kedfem.scene import scene_from, time_grid
+
+Solver = type[CondensedSteps | DenseSteps | LiteralSteps]
+
+
+def bar(fidelity: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:
+    """A steel bar, 30 mm by 20 mm."""
+    elements: Any = {"beam": along, "plane": [along, 2], "solid": [along, 2, 1], "rigid": [1, 1, 1]}[fidelity]
+    shape = {"kind": "bar", "between": [list(a), list(b)], "width": 0.03, "thickness": 0.02}
+    return {
+        "fidelity": fidelity,
+        "material": "steel",
+        "shape": shape,
+        "mesh": {"elements": elements},
+        **more,
+    }
+
+
+def turning(speed: str = "120 rpm") -> dict[str, Any]:
+    return {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}}
+
+
+def inverted(fidelity: str = "beam", kind: str = "prismatic", **analysis: Any) -> dict[str, Any]:
+    """A crank turns an arm about B: by a block that slides on the arm, or by its pin in a slot of the arm."""
+    end = 0.15 if fidelity == "beam" else 0.16
+    links = {"crank": bar(fidelity, (0, 0), (0.1, 0)), "arm": bar(fidelity, (-0.3, 0), (0.5, 0), 16)}
+    joints: dict[str, Any] = {
+        "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
+        "B": {"kind": "revolute", "links": ["ground", "arm"], "at": [-0.3, 0]},
+    }
+    if kind == "slot":
+        joints["S"] = {"kind": "slot", "links": ["crank", "arm"], "at": [0.1, 0], "axis": "x"}
+    else:
+        links["block"] = bar(fidelity, (0.1, 0), (end, 0), 2)
+        joints["C"] = {"kind": "revolute", "links": ["crank", "block"], "at": [0.1, 0]}
+        at = [0.15, 0] if fidelity == "beam" else [0.13, 0.015]
+        joints["S"] = {"kind": "prismatic", "links": ["block", "arm"], "at": at, "axis": "x"}
+    steps = {"turns": 0.25, "steps_per_turn": 720, "initial": "quasi-static", **analysis}
+    given = {key: value for key, value in steps.items() if value is not None}
+    return {"links": links, "joints": joints, "drive": turning(), "analysis": given}
+
+
+def ran(raw: dict[str, Any], solver: Solver | None = None) -> tuple[Prepared, list[Block]]:
+    """A scene with all its blocks, by its own solver or a given one."""
+    scene = scene_from(raw)
+    ready = meshed(scene)
+    links, joints = ready.model.links, ready.model.joints
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    steps = solver(links, joints, scheme, ready.model.damping) if solver else steps_of(scene, ready.model)
+    return ready, list(transient(scene, ready.linkage, ready.path, ready.model, steps))
+
+
+def state(blocks: list[Block], k: int, name: str) -> np.ndarray:
+    """u, v, a, g, port_forces … of link k over time."""
+    return np.concatenate([getattr(block.links[k], name) for block in blocks])
+
+
+def channels(ready: Prepared, blocks: list[Block]) -> dict[str, np.ndarray]:
+    """All channels over time."""
+    every = recording(ready.scene, ready.model)
+    return {each.channel.name: np.concatenate([each.rows(block) for block in blocks]) for each in every}
+
+
+def beam_in_space(
+    a: Sequence[float], b: Sequence[float], along: int = 4, up: Any = (0, 0, 1)
+) -> dict[str, Any]:
+    """A steel rod of round section."""
+    section = {"kind": "round", "diameter": 0.02}
+    shape = {"kind": "polyline", "points": [list(a), list(b)], "section": section, "up": list(up)}
+    return {
+        "fidelity": "beam",
+        "beam": "spatial",
+        "material": "steel",
+        "shape": shape,
+        "mesh": {"elements": along},
+    }
+
+
+def cardan(kind: str = "cylindrical", bend: float = 0.4, **analysis: Any) -> dict[str, Any]:
+    """Two shafts with a universal joint between them; the second, heavy on one side, turns in a bearing on the ground."""
+    d = np.array([np.cos(bend), np.sin(bend), 0])
+    n = np.array([-np.sin(bend), np.cos(bend), 0])
+    end, off = 0.25 * d, 0.25 * d + 0.05 * n
+    links = {"first": beam_in_space((-0.3, 0, 0), (0, 0, 0)), "second": beam_in_space((0, 0, 0), end)}
+    links["arm"] = beam_in_space(end, off, 2)
+    joints: dict[str, Any] = {
+        "A": {"kind": "revolute", "links": ["ground", "first"], "at": [-0.3, 0, 0], "axis": [1, 0, 0]},
+        "U": {
+            "kind": "universal",
+            "links": ["first", "second"],
+            "at": [0, 0, 0],
+            "axes": [[0, 0, 1], list(n)],
+        },
+        "B": {"kind": kind, "links": ["second", "ground"], "at": end.tolist(), "axis": d.tolist()},
+        "W": {"kind": "weld", "links": ["second", "arm"], "at": end.tolist()},
+    }
+    steps = {"turns": 0.5, "steps_per_turn": 360, "initial": "quasi-static", "rho_inf": 0.9, **analysis}
+    return {"links": links, "joints": joints, "drive": turning("300 rpm"), "analysis": steps}
