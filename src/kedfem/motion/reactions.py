@@ -76,12 +76,10 @@ class Reactions:
 
         Returns
         -------
-        Σ D Dᵀ and Σ A Aᵀ over the times, D being A on the null space of Jᵀ; as shares of the largest entry of the latter
+        Σ D Dᵀ and Σ A Aᵀ over the times, D being A on the null space of Jᵀ
         """
         D = A - self.Q @ (np.swapaxes(self.Q, 1, 2) @ A)
-        open_, borne = (np.einsum("tmx,tmy->xy", x, x) for x in (D, A))
-        size = max(float(np.abs(borne).max()), np.finfo(float).tiny)
-        return open_ / size, borne / size
+        return np.einsum("tmx,tmy->xy", D, D), np.einsum("tmx,tmy->xy", A, A)
 
 
 def rows_of(linkage: Linkage, joint: str) -> Bool[np.ndarray, " m"]:

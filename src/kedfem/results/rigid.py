@@ -148,9 +148,13 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[
     body, at = linkage.bodies.index(link), np.asarray(joint.at)
     label = f"of joint {name} on link {link} from {other} were all links rigid"
     about = f"moment {label}, about the joint's nominal point"
-    out, on = [], found.on(name, body, at)
+    sums = [found.open_directions(each) for each in found.on(name, body, at)]
+    squares = (linkage.size**2, 1.0)  # forces count by the moments that they may make
+    shares = [[x * square for x in each] for each, square in zip(sums, squares, strict=True)]
+    largest = max(*(float(np.trace(borne)) for _, borne in shares), np.finfo(float).tiny)
+    out = []
     for which, (what, text, unit) in enumerate((("force", f"force {label}", "N"), ("moment", about, "N m"))):
-        columns, project, left = told(*found.open_directions(on[which]))
+        columns, project, left = told(*(x / largest for x in shares[which]))
         if columns:
             channel = Channel(f"joints/{name}/rigid_{what}", columns, unit, "world", text + left)
             out.append(Borne(channel, name, which, body, at, project))
@@ -164,7 +168,7 @@ def told(
 
     Parameters
     ----------
-    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `open_directions`
+    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `Reactions.open_directions`, as parts of what the joint bears in all
     """
     size, axes = np.linalg.eigh(loose)
     lost = axes[:, size > OPEN]

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from kedfem.scene.faults import either, line
+from kedfem.scene.files import sketched
 from kedfem.scene.links import DIRECTED, GROUND, SQUARE
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
@@ -103,7 +104,7 @@ def elastic_faults(link: Entry) -> Iterator[str]:
     """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = fidelity(link), link.word("shape", "kind"), link.word("element")
     noun = NOUNS[kind]
-    for key in ("shape", "material"):
+    for key in () if sketched.get() else ("shape", "material"):
         if not link.has(key):
             yield link.fault(key, f"is required for a {noun}, got nothing")
     every_shape = {name for names in SHAPES.values() for name in names}
