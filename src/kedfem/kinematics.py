@@ -25,7 +25,7 @@ from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, read_results, ready_folder, write_csv
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.rigid import RigidForces, rigid_forces
-from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, drive_angle, time_grid
+from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +137,7 @@ def _stepped(
 def _blocks(scene: Scene, linked: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
     """The rigid motion at all time points, with the number of the first of each block."""
     start = np.zeros(1)
-    yield 0, rigid_motion(linked, along, start, drive_angle(scene.motion, start))
+    yield 0, rigid_motion(linked, along, start, path_parameter(scene, start))
     yield from motions(scene, linked, along)
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.motion.linkage import GROUND, Linkage, unit
+from kedfem.motion.linkage import Linkage, moving_pair, unit
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
@@ -67,9 +67,7 @@ def counted_on(
 
 
 def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
-    one, other = joint.links
-    if one == GROUND:
-        one, other = other, one
+    one, other = moving_pair(joint)
     body, against = linkage.bodies.index(one), linkage.bodies.index(other)
     at, none = np.asarray(joint.at), np.zeros(3)
     if joint.axes is not None:
