@@ -4,15 +4,12 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
 
 from kedfem.errors import KedfemError, SceneError
-
-if TYPE_CHECKING:
-    from kedfem.analysis import Run
 
 USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
 KINDS = ("four-bar", "slider-crank", "single-arm")
@@ -61,7 +58,7 @@ def run(scene: ScenePath) -> None:
         out.print(table)
     for warning in done.warnings:
         err.print(f"warning: {warning}", style="yellow", markup=False)
-    _say_where(done)
+    _say_where(done.folder)
 
 
 @app.command()
@@ -82,6 +79,28 @@ def check(scene: ScenePath) -> None:
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
     for table in check_tables(ready, reduction, plan):
         out.print(table)
+
+
+@app.command()
+def kinematics(
+    scene: ScenePath,
+    folder: Annotated[
+        Path | None, typer.Option(help="Where all goes; default: SCENE-kinematics beside the scene.")
+    ] = None,
+) -> None:
+    """Move a scene's links as rigid bodies: motion, transmission, forces."""
+    from kedfem.kinematics import kinematics as moved_by
+    from kedfem.report import kinematics_tables
+    from kedfem.scene import read_scene
+
+    loaded = read_scene(scene, sketch=True)
+    with _progress() as watch:
+        done = moved_by(loaded, folder, watch)
+    for table in kinematics_tables(loaded, done):
+        out.print(table)
+    for warning in done.warnings:
+        err.print(f"warning: {warning}", style="yellow", markup=False)
+    _say_where(done.folder)
 
 
 @app.command()
@@ -273,7 +292,7 @@ def _interrupted(file: Path, begun: bool) -> NoReturn:
     raise typer.Exit(INTERRUPTED)
 
 
-def _say_where(done: "Run") -> None:
+def _say_where(folder: Path) -> None:
     for name, what in (
         ("results.h5", "time series"),
         ("results.csv", "the same as a table"),
@@ -281,8 +300,8 @@ def _say_where(done: "Run") -> None:
         ("plots", "plots"),
         ("worst.png", "picture of the highest stress"),
     ):
-        if (done.folder / name).exists():
-            out.print(f"{done.folder / name}  {what}", markup=False, soft_wrap=True)
+        if (folder / name).exists():
+            out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ from kedfem.motion.reactions import Reactions, reactions
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
 from kedfem.results.rigid import RigidForces, rigid_forces, told
-from kedfem.scene import Scene, drive_angle, scene_from, time_grid
+from kedfem.scene import Scene, drive_angle, path_parameter, scene_from, time_grid
 
 from ..linkages import linkage_scene
 from .test_dynamics import four_bar
@@ -41,7 +41,7 @@ def forces_of(raw: dict[str, Any], t: Array) -> tuple[dict[str, Array], RigidMot
     scene = scene_from(raw)
     linked, along = moving(scene)
     masses = inertias_of_links(scene, linked, bare_links(scene))
-    motion = rigid_motion(linked, along, t, drive_angle(scene.motion, t))
+    motion = rigid_motion(linked, along, t, path_parameter(scene, t))
     found = rigid_forces(scene, linked, masses, along)
     return found.rows(motion), motion, masses, found
 
@@ -306,7 +306,7 @@ def drawn(raw: Any) -> tuple[Scene, Linkage, Reactions, RigidForces]:
     scene = raw if isinstance(raw, Scene) else scene_from(raw)
     linked, along = moving(scene)
     t = np.linspace(0.0, time_grid(scene).end, 4)
-    motion = rigid_motion(linked, along, t, drive_angle(scene.motion, t))
+    motion = rigid_motion(linked, along, t, path_parameter(scene, t))
     masses = inertias_of_links(scene, linked, bare_links(scene))
     return scene, linked, reactions(linked, motion), rigid_forces(scene, linked, masses, along)
 
@@ -429,3 +429,62 @@ def test_motions_that_are_free_have_no_rigid_joint_forces() -> None:
     }
     *_, forces = drawn(linkage_scene(table, frames="following"))
     assert list(columns(forces)) == ["drive/rigid_torque"]
+
+
+def five_bar() -> dict[str, Any]:
+    """Two cranks with drives of their own and two links between, of beams."""
+    points = {"A": [0, 0], "B": [-0.1, 0.2], "C": [0.1, 0.45], "D": [0.3, 0.2], "E": [0.2, 0]}
+    pairs = {"one": "AB", "two": "BC", "three": "CD", "four": "DE"}
+    shape = {"kind": "bar", "width": 0.01, "thickness": 0.02}
+    joints = {"A": ("ground", "one"), "B": ("one", "two"), "C": ("two", "three"), "D": ("three", "four"),
+              "E": ("four", "ground")}  # fmt: skip
+    law = {"kind": "cycloidal", "rise": 1.0}
+    return {
+        "points": points,
+        "gravity": [0, -9.81, 0],
+        "links": {
+            name: {"material": "steel", "fidelity": "beam", "shape": {**shape, "between": list(ends)}}
+            for name, ends in pairs.items()
+        },
+        "joints": {name: {"kind": "revolute", "links": list(x), "at": name} for name, x in joints.items()},
+        "drives": {
+            "left": {"joint": "A", "motion": {**law, "angle": 0.4}},
+            "right": {"joint": "E", "motion": {**law, "angle": -0.3}},
+        },
+        "analysis": {"end_time": 1.0, "step": 0.01},
+    }
+
+
+def slide_driven() -> dict[str, Any]:
+    """A crank that is turned by its slider."""
+    raw = {key: x for key, x in mechanisms()["slider-crank"].items() if key != "output"}
+    raw["drive"] = {"joint": "guide", "motion": {"kind": "cycloidal", "travel": -0.05, "rise": 1.0}}
+    return {**raw, "points": {**raw["points"], "B": {"from": "A", "distance": 0.08, "angle": "60 deg"}},
+            "analysis": {"end_time": 1.0, "step": 0.01}}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("raw", "channels"),
+    [
+        (five_bar(), ("drive/A/rigid_torque", "drive/E/rigid_torque")),
+        (slide_driven(), ("drive/rigid_force",)),
+    ],
+)
+def test_all_drives_together_give_the_power(raw: dict[str, Any], channels: tuple[str, ...]) -> None:
+    scene = scene_from(raw)
+    h = 1e-3
+    t = 0.2 + h * np.arange(401)
+    linked, along = moving(scene)
+    masses = inertias_of_links(scene, linked, bare_links(scene))
+    motion = rigid_motion(linked, along, t, path_parameter(scene, t))
+    found = rigid_forces(scene, linked, masses, along).rows(motion)
+    speeds = [drive_angle(each.motion, t)[1] for each in scene.driven_joints.values()]
+    T = kinetic_energy(masses, motion)
+    growth = np.gradient(T, h, edge_order=2)
+    power = load_power(masses, motion)
+    for name, speed in zip(channels, speeds, strict=True):
+        power = power + found[name][:, 0] * speed
+    inner = slice(1, -1)
+    # second-order differences of a motion within one second
+    assert_allclose(growth[inner], power[inner], rtol=0, atol=2e-5 * np.abs(power).max() + 1e-9)
+    assert np.abs(growth).max() > 1e-3

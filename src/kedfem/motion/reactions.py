@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from kedfem.motion.linkage import Linkage, scaled
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross, features, jacobian
+from kedfem.motion.rows import cross
+from kedfem.motion.values import features, jacobian
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,20 +47,11 @@ class Reactions:
         out[1][:, rows] = own[..., 3:] - cross(arm, own[..., :3])
         return out
 
-    def effort(
-        self, joint: str, body: int, axis: Float[np.ndarray, "T 3"], turns: bool
-    ) -> Float[np.ndarray, "T m 1"]:
-        """Torque of the drive of a hinge, or force of that of a slide, on a body, from scaled λ.
-
-        Parameters
-        ----------
-        axis : that it is about, or along, in the world
-        """
-        rows = rows_of(self.linkage, joint) & self.linkage.rows.driven
-        own = self.each[:, rows, body - 1, 3:] if turns else self.each[:, rows, body - 1, :3]
-        out = np.zeros((*self.Q.shape[:2], 1))
-        out[:, rows] = own @ axis[..., None]
-        return out
+    def effort(self, drive: int) -> Float[np.ndarray, "T m 1"]:
+        """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
+        rows = self.linkage.rows
+        out = np.where(rows.drive == drive, rows.scale(self.linkage.size)[: rows.count], 0.0)
+        return np.broadcast_to(out[:, None], (*self.Q.shape[:2], 1))
 
     def responses(self, A: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T c k"]:
         """What is A λ of forces and moments on all bodies but the ground, with the least λ that balances them.
@@ -76,12 +68,10 @@ class Reactions:
 
         Returns
         -------
-        Σ D Dᵀ and Σ A Aᵀ over the times, D being A on the null space of Jᵀ; as shares of the largest entry of the latter
+        Σ D Dᵀ and Σ A Aᵀ over the times, D being A on the null space of Jᵀ
         """
         D = A - self.Q @ (np.swapaxes(self.Q, 1, 2) @ A)
-        open_, borne = (np.einsum("tmx,tmy->xy", x, x) for x in (D, A))
-        size = max(float(np.abs(borne).max()), np.finfo(float).tiny)
-        return open_ / size, borne / size
+        return np.einsum("tmx,tmy->xy", D, D), np.einsum("tmx,tmy->xy", A, A)
 
 
 def rows_of(linkage: Linkage, joint: str) -> Bool[np.ndarray, " m"]:
@@ -93,8 +83,8 @@ def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions:
     """How all joints and drives bear on the bodies at the times of a motion."""
     bodies, c = len(linkage.bodies), linkage.centre
     poses = (motion.R, motion.p + motion.R @ c - c)
-    f = features(linkage.rows, poses, motion.phi)
-    J = scaled(jacobian(linkage.rows, f, bodies), linkage.rows, linkage.size)
+    f = features(linkage.rows, poses, np.zeros((len(motion.t), len(linkage.rows.angles))))
+    J = jacobian(linkage.rows, f, bodies, linkage.size)
     column = np.tile(np.repeat([linkage.size, 1.0], 3), bodies - 1)
     Q, U = np.linalg.qr(J)
     return Reactions(linkage, motion, (J / column).reshape(*J.shape[:2], -1, 6), Q, U, column)

@@ -1,8 +1,8 @@
-"""Curves over the drive angle: one PNG per channel, one of all energies and one of all joint forces."""
+"""Curves over the drive angle, as PNG: how pictures are drawn; `plot_groups` says which there are."""
 
 import textwrap
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import cycle
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.output.abscissa import Abscissa, abscissa, draw_abscissa
+from kedfem.output.plot_groups import STIFF, Curves, Panel, pictures
 from kedfem.output.units import prefixed
 from kedfem.results import Channel, Results, ready_folder, replacing
 
@@ -29,16 +30,11 @@ NEGLIGIBLE = 1e-9
 MARK = "kedfem plot"
 """What a PNG of this room says of itself, so that stale ones are told from a user's own."""
 
-ENERGY = "energy/"
-"""Channels of this kind are drawn together."""
-
-VECTOR = ("x", "y", "z")
-
-Curves = Mapping[str, Float[np.ndarray, " n"]]
-
 
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Plot every channel: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and ``joint_forces.png`` for all joints.
+
+    What there is of rigid links too is drawn with it, dashed. Angles are in degrees.
 
     Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
     with the drive angle below. Plots that an earlier run left in the folder are removed.
@@ -64,24 +60,10 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         return []
     along = abscissa(results.time, results.angle)
     written = []
-    energies = _energies(results)
-    for channel, values in results.channels.values():
-        if energies and channel.name.startswith(ENERGY):
-            continue
-        path = Path(folder) / f"{channel.name.replace('/', '-')}.png"
-        with _saved(path, _title(channel.description or channel.name, channel, results)) as figure:
-            _draw_panels(figure, along, _panels(channel, values))
-        written.append(path)
-    if energies:
-        path = Path(folder) / "energies.png"
-        with _saved(path, _title("Energies of all links, and what is left over", None, results)) as figure:
-            _draw_panels(figure, along, [("energy", "J", energies)])
-        written.append(path)
-    forces = _force_magnitudes(results)
-    if len(forces) > 1:
-        path = Path(folder) / "joint_forces.png"
-        with _saved(path, _title("Magnitude of the joint forces", None, results)) as figure:
-            _draw_panels(figure, along, [("force", "N", forces)])
+    for picture in pictures(results):
+        path = Path(folder) / f"{picture.name}.png"
+        with _saved(path, _title(picture.title, picture.channel, results)) as figure:
+            _draw_panels(figure, along, picture.panels)
         written.append(path)
     return written
 
@@ -114,44 +96,13 @@ def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarra
     return np.union1d(np.minimum(kept, n - 1), [n - 1])
 
 
-def _panels(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[tuple[str, str, Curves]]:
-    """What is drawn above each other: (quantity, unit, curves)."""
-    curves = dict(zip(channel.columns, values.T, strict=True))
-    quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
-    if channel.columns == VECTOR:
-        return [(quantity, channel.unit, curves | {"magnitude": np.linalg.norm(values, axis=1)})]
-    if "von_mises" in curves:
-        equivalent = {"von Mises": curves.pop("von_mises")}
-        return [(quantity, channel.unit, curves), ("von Mises stress", channel.unit, equivalent)]
-    return [(quantity, channel.unit, curves)]
-
-
-def _energies(results: Results) -> Curves:
-    """All energies by name, if there are several."""
-    found = {
-        f"{name.removeprefix(ENERGY)}{'' if len(channel.columns) == 1 else f' ({column})'}": curve
-        for name, (channel, values) in results.channels.items() if name.startswith(ENERGY)
-        for column, curve in zip(channel.columns, values.T, strict=True)
-    }  # fmt: skip
-    return found if len(found) > 1 else {}
-
-
-def _force_magnitudes(results: Results) -> Curves:
-    """Joint → magnitude of its force [N]."""
-    return {
-        channel.name.removeprefix("joints/").removesuffix("/force"): np.linalg.norm(values, axis=1)
-        for channel, values in results.channels.values()
-        if channel.name.startswith("joints/") and channel.name.endswith("/force")
-    }
-
-
-def _draw_panels(figure: Any, along: Abscissa, panels: list[tuple[str, str, Curves]]) -> None:
+def _draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> None:
     """The panels one above the other on one abscissa; below, where needed, the drive angle over time."""
     strip = 0 if along.degrees is None else 1
     ratios = [3, 2, 2][: len(panels)] + [1] * strip
     axes = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
     for ax, (quantity, unit, curves) in zip(axes, panels, strict=False):
-        _draw_curves(ax, along, curves, quantity, unit)
+        _draw_curves(ax, along, curves, quantity if len(panels) < 3 else quantity.replace(" ", "\n"), unit)
     if along.degrees is not None:
         axes[-1].plot(along.values, along.degrees, color="0.35", linewidth=1.2)
         axes[-1].set_ylabel("drive (°)")
@@ -165,9 +116,13 @@ def _draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: 
     largest = max(peaks.values(), default=0.0)
     divisor, label = prefixed(largest, unit)
     zero = [name for name in curves if peaks[name] <= NEGLIGIBLE * largest] if len(curves) > 1 else []
-    looks = cycle([(f"C{c}", style) for style in ("-", "--", ":") for c in range(10) if c != 7])
+    styles = ("-", ":") if any(name.endswith(STIFF) for name in curves) else ("-", "--", ":")
+    every = cycle([(f"C{c}", style) for style in styles for c in range(10) if c != 7])
+    looks = dict(zip(dict.fromkeys(name.removesuffix(STIFF) for name in curves), every, strict=False))
     marker = "o" if len(along.values) == 1 else ""
-    for (name, y), (color, style) in zip(curves.items(), looks, strict=False):
+    for name, y in curves.items():
+        color, style = looks[name.removesuffix(STIFF)]
+        style = "--" if name.endswith(STIFF) else style
         if name in zero:
             continue
         kept = envelope(y)

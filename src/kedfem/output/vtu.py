@@ -47,6 +47,29 @@ class LinkField:
     von_mises: Float[np.ndarray, " n"]
 
 
+@dataclass(frozen=True, slots=True)
+class RigidField:
+    """One rigid link in one frame of the animation.
+
+    Parameters
+    ----------
+    name, cell_type, cells, points
+        As of :class:`LinkField`; cells are surfaces, lines or a vertex.
+    velocity, acceleration : (n, 3) [m/s, m/s²]
+        World components.
+    """
+
+    name: str
+    cell_type: str
+    cells: Int[np.ndarray, "e k"]
+    points: Float[np.ndarray, "n 3"]
+    velocity: Float[np.ndarray, "n 3"]
+    acceleration: Float[np.ndarray, "n 3"]
+
+
+Fields = Sequence[LinkField | RigidField]
+
+
 class AnimationWriter:
     """Writes frames as they are made; each is whole, and so is the list of them, at any moment.
 
@@ -70,7 +93,7 @@ class AnimationWriter:
         self.stem = stem
         self.times: list[float] = []
 
-    def add(self, time: float, fields: Sequence[LinkField]) -> Path:
+    def add(self, time: float, fields: Fields) -> Path:
         """Write the next frame.
 
         Parameters
@@ -146,7 +169,7 @@ def _collection(stem: str, times: Sequence[float]) -> str:
     return head + frames + "  </Collection>\n</VTKFile>\n"
 
 
-def _write_vtu(path: Path, time: float, fields: Sequence[LinkField]) -> None:
+def _write_vtu(path: Path, time: float, fields: Fields) -> None:
     """One frame: zlib-compressed binary through meshio, with the field data that meshio leaves out."""
     from meshio import vtu
 
@@ -158,7 +181,7 @@ def _write_vtu(path: Path, time: float, fields: Sequence[LinkField]) -> None:
     path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
 
 
-def _merged(fields: Sequence[LinkField]) -> Any:
+def _merged(fields: Fields) -> Any:
     """All links as one mesh of meshio."""
     import meshio
 
@@ -171,13 +194,17 @@ def _merged(fields: Sequence[LinkField]) -> Any:
         ],
         point_data={
             name: np.ascontiguousarray(np.concatenate([getattr(field, name) for field in fields]))
-            for name in ("displacement", "von_mises", "stress")
+            for name in (
+                ("velocity", "acceleration")
+                if isinstance(fields[0], RigidField)
+                else ("displacement", "von_mises", "stress")
+            )
         },
         cell_data={"link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields)]},
     )
 
 
-def _field_data(time: float, fields: Sequence[LinkField]) -> str:
+def _field_data(time: float, fields: Fields) -> str:
     """The frame's time, and which number in the cell data is which link."""
     numbers = "".join(
         f'<DataArray type="Int32" Name={quoteattr("link " + field.name)} NumberOfTuples="1" format="ascii">'

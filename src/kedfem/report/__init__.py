@@ -1,9 +1,18 @@
 """Summary tables of what the commands find, for the terminal."""
 
 from kedfem.report.check import check_tables
+from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import face_kind, mesh_tables
 from kedfem.report.run import run_tables
 from kedfem.report.study import study_tables
 from kedfem.report.words import moment
 
-__all__ = ["check_tables", "face_kind", "mesh_tables", "moment", "run_tables", "study_tables"]
+__all__ = [
+    "check_tables",
+    "face_kind",
+    "kinematics_tables",
+    "mesh_tables",
+    "moment",
+    "run_tables",
+    "study_tables",
+]

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.coupling import slider_axis
 from kedfem.dynamics.inertias import Inertias, acting
-from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
@@ -19,7 +19,6 @@ Responses = Float[np.ndarray, "T c k"]
 XYZ = ("x", "y", "z")
 OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
-SLIDES = ("prismatic", "cylindrical")
 KEPT = 4000  # time points of a turn whose responses are kept, some kilobytes each
 
 
@@ -95,10 +94,7 @@ class RigidForces:
         """A channel from scaled λ."""
         if each.which < 2:
             return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
-        joint, bodies = self.scene.joints[each.joint], self.linkage.bodies
-        other = next(bodies.index(name) for name in joint.links if bodies.index(name) != each.body)
-        axis = found.motion.R[:, other] @ joint_axis(joint)
-        return found.effort(each.joint, each.body, axis, joint.kind not in SLIDES)
+        return found.effort(self.linkage.drives.joints.index(each.joint))
 
 
 def rigid_forces(
@@ -113,11 +109,11 @@ def rigid_forces(
 
 
 def returning(scene: Scene, along: Path | None) -> int:
-    """Time steps in a turn after which all poses return; 0 if they do not, or are too many to be kept."""
-    turn = turn_steps(scene) or 0.0
-    whole = abs(turn - round(turn)) < 1e-9 * turn
-    returns = isinstance(scene.motion, ConstantSpeed) and along is not None and along.periodic and whole
-    return round(turn) if returns and turn <= KEPT else 0
+    """Time steps of a turn, or a few, after which all poses return; 0 if they do not, or are too many to be kept."""
+    if along is None or not along.periodic or not isinstance(scene.motion, ConstantSpeed):
+        return 0
+    turn = (turn_steps(scene) or 0.0) * along.period / (2 * np.pi)
+    return round(turn) if abs(turn - round(turn)) < 1e-9 * turn and turn <= KEPT else 0
 
 
 def stated_link(scene: Scene, joint: Joint) -> str:
@@ -126,15 +122,10 @@ def stated_link(scene: Scene, joint: Joint) -> str:
     return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
 
 
-def moving_link(joint: Joint) -> str:
-    """The link that a joint's coordinate is of: the first that is not the ground."""
-    return next(name for name in joint.links if name != GROUND)
-
-
 def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
     joint = scene.joints[name]
-    link = moving_link(joint)
-    what, unit = ("force", "N") if joint.kind in SLIDES else ("torque", "N m")
+    link = moving_pair(joint)[0]
+    what, unit = ("force", "N") if joint.kind == "prismatic" else ("torque", "N m")
     text = f"{what} of the drive on link {link} were all links rigid"
     several = f"{name}/" if len(scene.driven_joints) > 1 else ""
     channel = Channel(f"drive/{several}rigid_{what}", (what,), unit, "world", text)
@@ -148,9 +139,13 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[
     body, at = linkage.bodies.index(link), np.asarray(joint.at)
     label = f"of joint {name} on link {link} from {other} were all links rigid"
     about = f"moment {label}, about the joint's nominal point"
-    out, on = [], found.on(name, body, at)
+    sums = [found.open_directions(each) for each in found.on(name, body, at)]
+    squares = (linkage.size**2, 1.0)  # forces count by the moments that they may make
+    shares = [[x * square for x in each] for each, square in zip(sums, squares, strict=True)]
+    largest = max(*(float(np.trace(borne)) for _, borne in shares), np.finfo(float).tiny)
+    out = []
     for which, (what, text, unit) in enumerate((("force", f"force {label}", "N"), ("moment", about, "N m"))):
-        columns, project, left = told(*found.open_directions(on[which]))
+        columns, project, left = told(*(x / largest for x in shares[which]))
         if columns:
             channel = Channel(f"joints/{name}/rigid_{what}", columns, unit, "world", text + left)
             out.append(Borne(channel, name, which, body, at, project))
@@ -164,7 +159,7 @@ def told(
 
     Parameters
     ----------
-    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `open_directions`
+    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `Reactions.open_directions`, as parts of what the joint bears in all
     """
     size, axes = np.linalg.eigh(loose)
     lost = axes[:, size > OPEN]
@@ -185,6 +180,8 @@ def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
     c, zero = linkage.centre, np.zeros_like(along.p)
     p = along.p + c - along.R @ c
     still = np.zeros_like(along.R)
+    T, B = along.p.shape[:2]
+    none = np.zeros((T, 0, B, 3))
     return RigidMotion(
-        np.zeros(len(along.phi)), along.phi, along.R, p, zero, zero, zero, still, zero, zero, zero
+        np.zeros(T), along.phi, along.R, p, zero, zero, zero, still, zero, none[:, :, 0, 0], none, none
     )

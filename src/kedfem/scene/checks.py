@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.faults import either, line, place
+from kedfem.scene.files import sketched
 from kedfem.scene.links import DIRECTED, GROUND, SQUARE, JointKind
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
@@ -111,7 +112,7 @@ def elastic_faults(link: Entry) -> Iterator[str]:
     """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = fidelity(link), link.word("shape", "kind"), link.word("element")
     noun = NOUNS[kind]
-    for key in ("shape", "material"):
+    for key in () if sketched.get() else ("shape", "material"):
         if not link.has(key):
             yield link.fault(key, f"is required for a {noun}, got nothing")
     every_shape = {name for names in SHAPES.values() for name in names}

@@ -20,6 +20,8 @@ from kedfem.scene.shapes import PartGeometry
 from kedfem.scene.units import si_number
 
 scene_folder: ContextVar[Path] = ContextVar("scene_folder", default=Path())
+sketched: ContextVar[bool] = ContextVar("sketched", default=False)
+"""Whether elastic links of the scene under validation may lack shape and material."""
 
 
 def file_text(path: Path) -> str:

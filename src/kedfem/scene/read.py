@@ -11,18 +11,19 @@ from pydantic import ValidationError
 from kedfem.errors import SceneError
 from kedfem.scene.checks import meshing_faults
 from kedfem.scene.faults import fault_lines
-from kedfem.scene.files import scene_folder, toml_table
+from kedfem.scene.files import scene_folder, sketched, toml_table
 from kedfem.scene.links import LinkScene, spelt_out
 from kedfem.scene.parts import Entry
 from kedfem.scene.scene import Scene
 
 
-def read_scene(path: str | Path) -> Scene:
+def read_scene(path: str | Path, *, sketch: bool = False) -> Scene:
     """A scene from its TOML file.
 
     Parameters
     ----------
     path : the scene file; file names in it are relative to its folder.
+    sketch : elastic links may lack shape and material: enough for their rigid motion, not for an analysis.
 
     Raises
     ------
@@ -31,7 +32,11 @@ def read_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     raw, text = toml_table(path)
-    return scene_from(raw, path.parent, source=text, stem=path.stem)
+    token = sketched.set(sketch)
+    try:
+        return scene_from(raw, path.parent, source=text, stem=path.stem)
+    finally:
+        sketched.reset(token)
 
 
 def link_from(raw: Mapping[str, Any]) -> LinkScene:

@@ -1,0 +1,176 @@
+"""The rigid mechanism on its own: motion, coordinates of joints, transmission angles, rigid inverse dynamics."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.prepared import moving
+from kedfem.analysis import PLOTS, STEM, TABLE, Clock, Watch, frame_steps
+from kedfem.dynamics.coupling import slider_axis
+from kedfem.dynamics.inertias import Inertias, inertias_of_links
+from kedfem.dynamics.transient import motions
+from kedfem.errors import MeshError, MotionError
+from kedfem.links.build import bare_link
+from kedfem.links.record import Link
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.motion.transmission import LEAST
+from kedfem.output.plots import write_plots
+from kedfem.output.rigid_frames import rigid_fields, sights
+from kedfem.output.vtu import AnimationWriter, remove_animation
+from kedfem.results import Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
+from kedfem.results.rigid import RigidForces, rigid_forces
+from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What the kinematics of a scene leave: results, files, what was recorded, seconds per stage, warnings."""
+
+    folder: FilePath
+    results: Results
+    recorded: Kinematics
+    seconds: dict[str, float]
+    warnings: tuple[str, ...]
+
+
+def kinematics_folder(scene: Scene) -> FilePath:
+    """Where they go: beside the results of a run, which they leave alone."""
+    folder = scene.results_folder
+    return folder.with_name(f"{folder.name.removesuffix('-results')}-kinematics")
+
+
+def kinematics(
+    scene: Scene, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
+) -> Moved:
+    """Move a scene's links as rigid bodies and write positions, velocities, accelerations, forces, an animation, plots.
+
+    Parameters
+    ----------
+    scene : it may be a sketch, with links that have no shape or no material
+    folder : where all goes; `kinematics_folder` if not given
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user.
+    """
+    if scene.driven is None:
+        raise MotionError(
+            "drive: is required for kinematics, got none: without one the linkage rests as drawn "
+            "(kedfem run moves it by its forces)"
+        )
+    clock = Clock(watch)
+    linked, along = clock.timed("motion", lambda: moving(scene))
+    links = clock.timed("masses", lambda: rigid_links(scene))
+    masses = inertias_of_links(scene, linked, links)
+    forces = rigid_forces(scene, linked, masses, along)
+    recorded = kinematics_of(scene, linked, along, masses)
+    target = ready_folder(folder or kinematics_folder(scene))
+    clock.timed("steps", lambda: _stepped(scene, linked, along, (recorded, forces, links), target))
+    results = read_results(target / "results.h5")
+    clock.timed("table", lambda: write_csv(results, target / TABLE))
+    if scene.output.plots:
+        clock.timed("plots", lambda: write_plots(results, target / PLOTS))
+    warnings = (*_missing(scene, linked, masses), *_transmission(results, recorded))
+    return Moved(target, results, recorded, clock.seconds, warnings)
+
+
+def rigid_links(scene: Scene) -> dict[str, Link]:
+    """Records of the links that have shape and material, meshed as coarsely as their mass allows; of CAD as given.
+
+    Raises
+    ------
+    MeshError
+        If a link cannot be meshed.
+    """
+    out = {}
+    for name, link in scene.links.items():
+        if link.shape is None or link.material is None:
+            continue
+        simple = scene.model_copy(update={"links": {name: coarse(link)}})
+        try:
+            out[name] = bare_link(simple, name)
+        except MeshError:
+            out[name] = bare_link(scene, name)
+    return out
+
+
+def coarse(link: LinkScene) -> LinkScene:
+    """A link with the fewest elements that hold its mass: bars, and beams, are exact with one."""
+    if link.family == "beam" or isinstance(link.shape, Cad | MeshFile):
+        return link
+    if isinstance(link.shape, Bar):
+        mesh = Meshing(elements=(1, 1) if link.family == "plane" else (1, 1, 1))
+    else:
+        mesh = Meshing(elements_across=1)
+    return link.model_copy(update={"mesh": mesh})
+
+
+def _stepped(
+    scene: Scene, linked: Linkage, along: Path, what: tuple[Kinematics, RigidForces, dict[str, Link]],
+    folder: FilePath,
+) -> None:  # fmt: skip
+    """All time points to the results file, frames to the animation."""
+    recorded, forces, links = what
+    channels = [channel for channel, _ in recorded.every] + [each.channel for each in forces.every]
+    wanted, frames = set(frame_steps(scene).tolist()), AnimationWriter(folder, STEM)
+    seen = sights(scene, linked, links)
+    notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
+    if not wanted:
+        remove_animation(folder, STEM)
+    with ResultsWriter(
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
+    ) as writer:
+        for first, motion in _blocks(scene, linked, along):
+            rows = recorded.rows(motion) | forces.rows(motion, first)
+            writer.append(motion.t, motion.phi, rows)
+            for k in sorted(wanted & set(range(first, first + len(motion.t)))):
+                frames.add(float(motion.t[k - first]), rigid_fields(seen, motion, k - first))
+
+
+def _blocks(scene: Scene, linked: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
+    """The rigid motion at all time points, with the number of the first of each block."""
+    start = np.zeros(1)
+    yield 0, rigid_motion(linked, along, start, path_parameter(scene, start))
+    yield from motions(scene, linked, along)
+
+
+def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
+    """What rigid forces do not hold."""
+    bare = [name for name in scene.links if not masses.mass[linked.bodies.index(name)] > 0]
+    if bare:
+        sliders = [name for name in bare if slider_axis(scene, name) is not None]
+        got = ", ".join(f"{name} (a slider without mass)" if name in sliders else name for name in bare)
+        yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
+    if linked.mobility:
+        yield f"free motions ({linked.mobility}) are held as drawn; forces of joints are left out"
+    if scene.motors or scene.springs:
+        yield "rigid forces: motors and springs are not in them"
+
+
+def _transmission(results: Results, recorded: Kinematics) -> Iterator[str]:
+    """Couplers that come too near to where they jam."""
+    for each in recorded.transmissions:
+        angle, at = worst_angle(results.channels[transmission_key(each.coupler)][1][:, 0], results.angle)
+        if min(angle, np.pi - angle) < LEAST:
+            yield (
+                f"links.{each.coupler}: transmission angle {np.degrees(angle):.1f}° at drive angle "
+                f"{np.degrees(at):.1f}°, beyond the usual 40° to 140°: {each.driven} may jam or be driven roughly there"
+            )
+
+
+def worst_angle(angle: Float[np.ndarray, " T"], drive: Float[np.ndarray, " T"]) -> tuple[float, float]:
+    """The transmission angle furthest from a right angle, and the drive angle where it is first so [rad]."""
+    k = first_largest(np.abs(angle - np.pi / 2))
+    return float(angle[k]), float(drive[k])
+
+
+def first_largest(size: Float[np.ndarray, " T"]) -> int:
+    """Number of the first of the largest values, up to rounding: each turn has them again."""
+    return int(np.argmax(size >= (1 - 1e-9) * size.max()))

@@ -1,0 +1,96 @@
+"""Coordinates of joints: how far a hinge has turned and a slide has travelled, from the drawn position.
+
+They are of the joint's first link that is not the ground, against the other, about or along the joint's axis; of a slot,
+of the link with the pin along the line of the other.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.motion.linkage import Linkage, moving_pair, unit
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import perpendiculars
+from kedfem.scene import Joint, Scene
+
+Vector = Float[np.ndarray, "3"]
+TURNS = ("revolute", "cylindrical", "screw", "planar")
+TRAVELS = ("prismatic", "cylindrical", "screw", "slot")
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """One coordinate of a joint.
+
+    joint, name : e.g. ``angle``, ``travel``
+    kind : whether it is an angle [rad] or a length [m]
+    body, other : numbers of the body that moves and the one that it moves against
+    at : the joint's point as drawn [m]
+    axis : unit vector in the other body, as drawn, that it is about or along
+    mark : of an angle, the direction in the moving body, as drawn, whose turn is measured
+    """
+
+    joint: str
+    name: str
+    kind: Literal["angle", "length"]
+    body: int
+    other: int
+    at: Vector
+    axis: Vector
+    mark: Vector
+
+    def values(self, motion: RigidMotion) -> Float[np.ndarray, " T"]:
+        """Over time; angles within ±π."""
+        back = np.swapaxes(motion.R[:, self.other], 1, 2)
+        if self.kind == "length":
+            gap = motion.p[:, self.body] - motion.p[:, self.other]
+            gap += (motion.R[:, self.body] - motion.R[:, self.other]) @ self.at
+            return np.asarray((back @ gap[..., None])[..., 0] @ self.axis)
+        seen = (back @ motion.R[:, self.body]) @ self.mark
+        return np.asarray(np.arctan2(seen @ np.cross(self.axis, self.mark), seen @ self.mark))
+
+
+def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:
+    """Of all joints that have any; of a ball none, of a cross the turns of its two hinges."""
+    return [each for name, joint in scene.joints.items() for each in _of(name, joint, linkage)]
+
+
+def counted_on(
+    angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None
+) -> Float[np.ndarray, "T c"]:
+    """Angles beyond ±π, from the last ones of the time before on [rad]."""
+    if before is None:
+        return np.asarray(np.unwrap(angle, axis=0))
+    return np.asarray(np.unwrap(np.vstack([before, angle]), axis=0)[1:])
+
+
+def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
+    one, other = moving_pair(joint)
+    body, against = linkage.bodies.index(one), linkage.bodies.index(other)
+    at, none = np.asarray(joint.at), np.zeros(3)
+    if joint.axes is not None:
+        first = unit(joint.axes[joint.links.index(one)])
+        second = unit(joint.axes[joint.links.index(other)])
+        return [  # the cross bears both axes: one's arm is seen to turn about the other's
+            Coordinate(name, f"angle_about_{other}", "angle", body, against, at, second, first),
+            Coordinate(name, f"angle_about_{one}", "angle", against, body, at, first, second),
+        ]
+    if joint.axis is None or joint.kind in {"spherical", "weld"}:
+        return []
+    axis = unit(joint.axis)
+    e1, e2 = perpendiculars(axis)
+    out = []
+    if joint.kind in TURNS:
+        out.append(Coordinate(name, "angle", "angle", body, against, at, axis, e1))
+    if joint.kind in TRAVELS:
+        back = joint.kind == "slot" and one != joint.links[0]
+        line = (against, body) if back else (body, against)
+        out.append(Coordinate(name, "travel", "length", *line, at, axis, none))
+    if joint.kind == "planar":
+        out += [
+            Coordinate(name, f"travel_{k}", "length", body, against, at, e, none)
+            for k, e in ((1, e1), (2, e2))
+        ]
+    return out

@@ -1,0 +1,92 @@
+"""Animation frames of rigid links: their surfaces, or sticks between joints where there is no shape."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.links.record import Link
+from kedfem.links.spatial_recovery import drawn
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
+from kedfem.output.vtu import RigidField
+from kedfem.scene import Scene
+
+SIDES = (
+    (0, 3, 2, 1),
+    (4, 5, 6, 7),
+    (0, 1, 5, 4),
+    (1, 2, 6, 5),
+    (2, 3, 7, 6),
+    (3, 0, 4, 7),
+)  # of a hexahedron
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What is seen of a link.
+
+    body : its number
+    points : (n, 3) as drawn [m]
+    cells : (e, k) and meshio's name of them
+    """
+
+    name: str
+    body: int
+    points: Float[np.ndarray, "n 3"]
+    cells: Int[np.ndarray, "e k"]
+    cell_type: str
+
+
+def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Sight]:
+    """Of all links; those without a record are sticks between their joints."""
+    out = []
+    for name in scene.links:
+        link = links.get(name)
+        points, cells, kind = _sticks(scene, name) if link is None else _seen(link)
+        used, numbers = np.unique(cells, return_inverse=True)
+        body = linkage.bodies.index(name)
+        out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
+    return out
+
+
+def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[RigidField]:
+    """All links at one time point, with velocities and accelerations."""
+    out = []
+    for each in every:
+        b = each.body
+        arms = each.points @ motion.R[k, b].T
+        velocity = motion.v[k, b] + cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
+        acceleration = motion.p2[k, b] + each.points @ motion.R2[k, b].T
+        points = motion.p[k, b] + arms
+        out.append(RigidField(each.name, each.cell_type, each.cells, points, velocity, acceleration))
+    return out
+
+
+def _seen(link: Link) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
+    if link.kind == "spatial_beam":
+        values, _, cells = drawn(link)
+        return np.asarray(values @ link.X), outer_sides(cells), "quad"
+    if link.kind == "beam":
+        return link.X, link.cells, link.cell_type
+    cells = outer_sides(link.cells[:, :8]) if link.kind == "solid" else link.cells[:, :4]
+    return link.X, cells, "quad"
+
+
+def outer_sides(cells: Int[np.ndarray, "e 8"]) -> Int[np.ndarray, "f 4"]:
+    """The sides of hexahedra, in VTK's order, that only one of them has."""
+    sides = cells[:, SIDES].reshape(-1, 4)
+    _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    return np.asarray(sides[np.sort(first[count == 1])])
+
+
+def _sticks(scene: Scene, name: str) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
+    """Lines between all joints of a link; a dot where all are at one place."""
+    at = [joint.at for joint in scene.joints.values() if name in joint.links]
+    points = np.array(list(dict.fromkeys(at)))
+    if len(points) == 1:
+        return points, np.zeros((1, 1), int), "vertex"
+    return points, np.array(list(combinations(range(len(points)), 2))), "line"

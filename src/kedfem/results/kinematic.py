@@ -1,0 +1,172 @@
+"""Channels of the rigid motion: links, points, coordinates of joints, transmission angles."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.inertias import Inertias
+from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
+from kedfem.motion.linkage import GROUND, Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
+from kedfem.motion.transmission import Transmission, transmissions
+from kedfem.results.records import Channel
+from kedfem.results.rigid import stated_link
+from kedfem.scene import Scene
+
+Rows = Float[np.ndarray, "T c"]
+XYZ = ("x", "y", "z")
+FLAT = 1e-9  # of the fastest turn: what leaves the common plane is rounding
+RATES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"))
+TRANSMISSION = "/transmission_angle"
+TURNS = (("angular_velocity", "rad/s"), ("angular_acceleration", "rad/s^2"))
+
+
+@dataclass(slots=True)
+class Kinematics:
+    """All channels of a rigid motion, block after block; angles are counted on from block to block."""
+
+    every: list[tuple[Channel, Callable[[RigidMotion], Rows]]]
+    coordinates: list[Coordinate]
+    transmissions: list[Transmission]
+    _turning: list[str] = field(default_factory=list)
+    _last: dict[str, Float[np.ndarray, " c"]] = field(default_factory=dict)
+
+    def rows(self, motion: RigidMotion) -> dict[str, Rows]:
+        """The rows of all channels; blocks in the order of time."""
+        out = {}
+        for channel, values in self.every:
+            x = values(motion)
+            if channel.name in self._turning:
+                x = counted_on(x, self._last.get(channel.name))
+                self._last[channel.name] = x[-1]
+            out[channel.name] = x
+        return out
+
+
+def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertias) -> Kinematics:
+    """What a scene's rigid motion is recorded as."""
+    normal = plane_normal(along)
+    every: list[tuple[Channel, Callable[[RigidMotion], Rows]]] = []
+    for name in scene.links:
+        body = linkage.bodies.index(name)
+        centre = inertias.centre_of(body)
+        first = next(joint.at for joint in scene.joints.values() if name in joint.links)
+        at = np.asarray(first if centre is None else centre)
+        what = "joint" if centre is None else "centre of mass"
+        every += _point(f"links/{name}", body, at, f"of the {what} of link {name}")
+        every += _turn(name, body, normal)
+    for name, joint in scene.joints.items():
+        if GROUND not in joint.links:
+            link = stated_link(scene, joint)
+            text = f"of joint {name} on link {link}"
+            every += _point(f"joints/{name}", linkage.bodies.index(link), np.asarray(joint.at), text)
+    for name, probe in scene.output.probes.items():
+        text = f"of probe {name} on link {probe.link}"
+        every += _point(f"probes/{name}", linkage.bodies.index(probe.link), np.asarray(probe.at), text)
+    joints, couplers = coordinates(scene, linkage), transmissions(scene, linkage)
+    every += [_coordinate(each, linkage) for each in joints]
+    every += [_transmission(each) for each in couplers]
+    turning = [
+        channel.name for channel, _ in every
+        if channel.columns == ("angle",) and channel.unit == "rad" and not channel.name.endswith(TRANSMISSION)
+    ]  # fmt: skip
+    return Kinematics(every, joints, couplers, turning)
+
+
+def plane_normal(along: Path) -> Float[np.ndarray, "3"] | None:
+    """The direction that all links turn about, and none moves along; None if they move in space."""
+    v, omega = along.first
+    flat = omega.reshape(-1, 3)
+    size = np.linalg.norm(flat, axis=1)
+    if not size.max(initial=0.0) > 0:
+        return None
+    n = flat[size.argmax()] / size.max()
+    n = n * np.sign(n[np.abs(n).argmax()])
+    turns = np.abs(flat - np.outer(flat @ n, n)).max() <= FLAT * size.max()
+    return n if turns and np.abs(v @ n).max() <= FLAT * max(np.abs(v).max(), 1e-300) else None
+
+
+def rotation_vector(R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3"]:
+    """θ of R = exp([θ]×), of the size 0 to π [rad]."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+
+
+def _point(
+    key: str, body: int, at: Float[np.ndarray, "3"], text: str
+) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
+    """Position, velocity and acceleration of a point of a body, as drawn."""
+
+    def position(motion: RigidMotion) -> Rows:
+        return np.asarray(motion.p[:, body] + motion.R[:, body] @ at)
+
+    def velocity(motion: RigidMotion) -> Rows:
+        return np.asarray(motion.v[:, body] + cross(motion.omega[:, body], motion.R[:, body] @ at))
+
+    def acceleration(motion: RigidMotion) -> Rows:
+        return np.asarray(motion.p2[:, body] + motion.R2[:, body] @ at)
+
+    return [
+        (Channel(f"{key}/{name}", XYZ, unit, "world", f"{name} {text}"), values)
+        for (name, unit), values in zip(RATES, (position, velocity, acceleration), strict=True)
+    ]
+
+
+def _turn(
+    name: str, body: int, normal: Float[np.ndarray, "3"] | None
+) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
+    """Orientation of a link and its rates: about the normal of the plane of motion, or in space."""
+    text, key = f"of link {name}", f"links/{name}"
+    rates = [lambda motion: motion.omega[:, body], lambda motion: motion.alpha[:, body]]
+    if normal is None:
+        vector = Channel(
+            f"{key}/rotation", XYZ, "rad", "world", f"rotation vector {text} from the drawn position"
+        )
+        out = [(vector, lambda motion: rotation_vector(motion.R[:, body]))]
+        return out + [
+            (Channel(f"{key}/{what}", XYZ, unit, "world", f"{what.replace('_', ' ')} {text}"), rate)
+            for (what, unit), rate in zip(TURNS, rates, strict=True)
+        ]
+    mark = np.eye(3)[np.abs(normal).argmin()]
+    turn = Coordinate("", "angle", "angle", body, 0, np.zeros(3), normal, mark - (mark @ normal) * normal)
+    about = "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(normal, 9)) + ")"
+    angle = Channel(
+        f"{key}/rotation", ("angle",), "rad", "", f"turn {text} about {about} from the drawn position"
+    )
+    return [
+        (angle, lambda motion: turn.values(motion)[:, None]),
+        *(
+            (
+                Channel(
+                    f"{key}/{what}", ("rate",), unit, "", f"{what.replace('_', ' ')} {text} about {about}"
+                ),
+                lambda motion, rate=rate: (rate(motion) @ normal)[:, None],
+            )
+            for (what, unit), rate in zip(TURNS, rates, strict=True)
+        ),
+    ]
+
+
+def _coordinate(each: Coordinate, linkage: Linkage) -> tuple[Channel, Callable[[RigidMotion], Rows]]:
+    one, other = linkage.bodies[each.body], linkage.bodies[each.other]
+    column, unit = ("angle", "rad") if each.kind == "angle" else ("travel", "m")
+    verb = "turn" if each.kind == "angle" else "travel"
+    text = f"{verb} of joint {each.joint}: link {one} against {other}, from the drawn position"
+    channel = Channel(f"joints/{each.joint}/{each.name}", (column,), unit, "", text)
+    return channel, lambda motion: each.values(motion)[:, None]
+
+
+def transmission_key(coupler: str) -> str:
+    """Name of the channel of a coupler's transmission angle."""
+    return f"links/{coupler}{TRANSMISSION}"
+
+
+def _transmission(each: Transmission) -> tuple[Channel, Callable[[RigidMotion], Rows]]:
+    text = f"transmission angle of link {each.coupler} on {each.driven}"
+    channel = Channel(transmission_key(each.coupler), ("angle",), "rad", "", text)
+    return channel, lambda motion: each.angle(motion)[:, None]
