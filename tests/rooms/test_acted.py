@@ -1,4 +1,4 @@
-"""Springs, dampers and motors on links with nominal frames: the same answer as with frames that follow, for small forces."""
+"""Springs, dampers and motors on links with nominal frames: for small forces the answer of frames that follow."""
 
 from typing import Any
 
