@@ -15,7 +15,8 @@ from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import Scene, drive_angle, load_factor, scene_from
+from kedfem.results.recording import recording
+from kedfem.scene import drive_angle, factor_table, load_factor, scene_from
 
 L, W, T, E, NU = 0.2, 0.02, 0.01, 2.0e11, 0.3
 BAR = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": W, "thickness": T}
@@ -50,12 +51,6 @@ def arm(kind: str, loads: dict[str, Any], speed: float = 1e-6, **analysis: Any) 
         "loads": loads,
         "analysis": {"end_time": 1e-4, "step": 1e-5, "initial": "quasi-static", **analysis},
     }
-
-
-def pattern_links(scene: Scene) -> dict[str, Link]:
-    """The links of a scene, those that the drive would carry too."""
-    ready, _ = prepared(scene)
-    return {link.name: link for link in ready.model.links}
 
 
 def wrench(link: Link, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -282,3 +277,69 @@ def test_a_factor_comes_from_a_file(tmp_path: Path) -> None:
         SceneError, match=r"loads.f.factor.file: cut.csv, line 2: must be two numbers, angle and factor"
     ):
         scene_from(arm("beam", {"f": load}), tmp_path)
+
+
+# -- without a drive ----------------------------------------------------------------------------------------
+
+SPUN: dict[str, tuple[str, dict[str, Any], float]] = {
+    "force on a beam": ("beam", {"kind": "force", "at": [L, 0], "vector": [0, 50.0], "frame": "link"}, 50 * L),
+    "force on a solid": ("bar", {"kind": "force", "at": [L, 0], "vector": [0, 50.0], "frame": "link"}, 50 * L),
+    "force on a spatial beam": ("spatial", {"kind": "force", "at": [L, 0], "vector": [0, 50.0], "frame": "link"}, 50 * L),
+    "pressure on a solid": ("bar", {"kind": "pressure", "at": [0.19, -W / 2], "pressure": 5e4}, 5e4 * L * T * L / 2),
+    "pressure on a plane": ("edge", {"kind": "pressure", "at": [0.19, -W / 2], "pressure": 5e4}, 5e4 * L * T * L / 2),
+    "torque on a beam": ("beam", {"kind": "torque", "at": [L, 0], "vector": [0, 0, 10.0]}, 10.0),
+    "torque on a plane": ("plane", {"kind": "torque", "at": [L, 0], "vector": [0, 0, 10.0]}, 10.0),
+    "torque on a solid": ("bar", {"kind": "torque", "at": [L, 0], "vector": [0, 0, 10.0], "frame": "link"}, 10.0),
+}  # fmt: skip
+
+
+def spun(kind: str, load: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Channels of a link on a hinge that a load turns from rest, by about half a turn."""
+    raw = arm(
+        kind, {"load": {"link": "arm", **load}}, end_time=0.05, step=2.5e-4, initial="rest", rho_inf=0.8
+    )
+    del raw["drive"]
+    raw["joints"]["A"]["links"] = ["arm", "ground"]
+    ready, _ = prepared(scene_from(raw))
+    solver = steps_of(ready.scene, ready.model)
+    blocks = list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver))
+    return {
+        x.channel.name: np.concatenate([x.rows(block)[:, 0] for block in blocks])
+        for x in recording(ready.scene, ready.model)
+    }
+
+
+@pytest.mark.parametrize("name", SPUN)
+def test_a_load_turns_with_a_link_that_nothing_leads(name: str) -> None:
+    """Its moment about the hinge does not change as the link turns: work M φ, all of it kinetic energy at last."""
+    kind, load, moment = SPUN[name]
+    found = spun(kind, load)
+    angle, work = found["joints/A/angle"], found["energy/work"]
+    assert angle[-1] > 1.0
+    assert_allclose(work[-1], moment * angle[-1], rtol=5e-3)  # the angle is that of the hub, before the bend
+    assert_allclose(found["energy/kinetic"][-1], moment * angle[-1], rtol=2e-2)
+
+
+def test_both_solvers_of_frames_that_follow_turn_a_load_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    kind, load, _ = SPUN["torque on a solid"]
+    small = spun(kind, load)["joints/A/angle"]
+    monkeypatch.setattr("kedfem.dynamics.transient.SMALL", 0)
+    assert_allclose(spun(kind, load)["joints/A/angle"], small, atol=1e-5)
+
+
+def test_a_torque_that_keeps_its_direction_in_space_needs_a_drive() -> None:
+    raw = arm(
+        "bar", {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, 1]}}, initial="rest"
+    )
+    del raw["drive"]
+    with pytest.raises(
+        SceneError, match=r"loads.t.frame: must be 'link' for a torque in a scene without a drive"
+    ):
+        prepared(scene_from(raw))
+
+
+def test_a_table_over_time_is_written_out_period_by_period() -> None:
+    factor = factor_of(at=[0.1, 0.2, 0.5], value=[0.0, 1.0, -1.0], period=0.6)
+    at, value = factor_table(factor, 2.0)
+    t = np.linspace(0, 2, 997)
+    assert_allclose(np.interp(t, at, value), load_factor(factor, t), atol=1e-12)

@@ -132,7 +132,7 @@ def solved(
 
     Parameters
     ----------
-    answer : forces on the rows → δ and δ' of all links
+    answer : forces on the rows → δ and δ' of all links; asked last for the forces that are found
     begin : forces to begin with
     least : changes that are settled
     """
@@ -146,6 +146,7 @@ def solved(
             return None
         if slope is None or sweep % ANEW == ANEW - 1:
             slope = forces.slope(law, now, partial(_beside, answer, rows), state)
+            answer(rows)
         elif step is not None and before is not None and step.any():
             slope = slope + np.outer(left - before - (slope @ step - step), step) / (step @ step)
         A = np.eye(len(Q)) - slope

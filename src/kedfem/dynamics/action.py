@@ -14,7 +14,7 @@ from kedfem.dynamics.history import Block
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross, perpendiculars
 
-TURN, SLIDE, DISTANCE = 0, 1, 2
+TURN, SLIDE, DISTANCE, FOLLOW = 0, 1, 2, 3
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
 TIME, SPEED, POSITION = 0, 1, 2
 OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION}
@@ -51,10 +51,10 @@ class Action:
     """A force law on one coordinate: the turn of a hinge, the travel of a slide, the distance of two points.
 
     name : ``motors/NAME``, ``springs/NAME`` or ``joints/NAME``
-    kind : TURN, SLIDE, DISTANCE
+    kind : TURN, SLIDE, DISTANCE; FOLLOW: a force on the second end that turns with the first
     ends : the coordinate is that of the first against the second
     stiffness, damping, free : of a spring, free where it has no force
-    axis : of a hinge or slide, as drawn
+    axis : of a hinge or slide, as drawn; of a force its vector
     over, at, value : of a motor, its curve; none: no points
     """
 

@@ -4,10 +4,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.action import (
     ANGLE,
     DISTANCE,
+    FOLLOW,
     IN_SPACE,
     OVER,
     PAIR,
@@ -49,6 +51,43 @@ def hinges(scene: Scene, model: Model) -> tuple[Action, ...]:
     find = _Ends(scene, model)
     names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
+
+
+def followers(model: Model) -> tuple[Action, ...]:
+    """Loads that turn with links that no drive leads, one for each component in the link."""
+    return tuple(
+        Action(
+            f"loads/{k}",
+            FOLLOW,
+            (_shown(model, k, w), _bearing(model, k, w)),
+            axis=axis,
+            at=table[0],
+            value=table[1],
+        )
+        for k, (link, loads) in enumerate(zip(model.links, model.loads, strict=True))
+        for load in loads
+        if (table := load.table) is not None
+        for axis, w in zip(np.eye(3), load.forces.T[: 2 if link.planar else 3], strict=False)
+        if w.any()
+    )
+
+
+def _bearing(model: Model, k: int, weights: Float[np.ndarray, " n"]) -> End:
+    """What takes a force with its share on each function."""
+    return End(k, model.bodies[k], POINT, weights[None], np.zeros((1, 3)), _plane(model.links[k]))
+
+
+def _shown(model: Model, k: int, weights: Float[np.ndarray, " n"]) -> End:
+    """How a segment has turned: of a planar beam ψ where a load is, of others two directions of its affine fit."""
+    link, body = model.links[k], model.bodies[k]
+    if link.kind == "beam":
+        share = np.abs(weights) / np.abs(weights).sum()
+        return End(k, body, ANGLE, share[None], np.zeros((1, 3)), (0.0, 0.0, 1.0))
+    if link.fit is None:
+        raise ValueError(f"link {link.name} must have a frame that follows it")
+    s = 2 if link.planar else 3
+    fit = np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])
+    return End(k, body, PAIR, fit[:2], np.eye(3)[:2], _plane(link))
 
 
 @dataclass(frozen=True, slots=True)

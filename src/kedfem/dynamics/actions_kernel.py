@@ -11,7 +11,7 @@ A : actions; every array has a row per action
     forces : (A, 2, 2, 3) out
     values : (A, 4) out: q, q', Q, energy stored
 
-    kinds : (A,) TURN, SLIDE, DISTANCE
+    kinds : (A,) TURN, SLIDE, DISTANCE, FOLLOW
     forms : (A, 2) POINT, PAIR, SINGLE, ANGLE: what the vectors of an end are
     numbers : (A, 14) stiffness, damping, free q; axis, e1, e2 as drawn; of each pair of directions its angle as drawn
     over : (A,) TIME, SPEED, POSITION: what the curve is over
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from kedfem.dynamics.action import PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
+from kedfem.dynamics.action import ANGLE, FOLLOW, PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
 
 compiled: Any = njit(cache=True, error_model="numpy")
 
@@ -42,6 +42,9 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
             q = turn(x[i], forms[i], numbers[i], before[i], gradient)
         elif kinds[i] == SLIDE:
             q = travel(x[i], numbers[i], gradient)
+        elif kinds[i] == FOLLOW:
+            q = 0.0
+            followed(x[i], forms[i], numbers[i], gradient)
         else:
             q = distance(x[i], gradient)
         rate = 0.0
@@ -140,6 +143,22 @@ def distance(x, gradient):  # type: ignore[no-untyped-def]
         gradient[0, 0] = d / q
         gradient[1, 0] = -d / q
     return q
+
+
+@compiled
+def followed(x, forms, numbers, gradient):  # type: ignore[no-untyped-def]
+    """A vector, as drawn, turned with the first end, on the second: no coordinate's gradient, Q is its factor."""
+    d = numbers[AXIS : AXIS + 3]
+    if forms[0] == ANGLE:
+        c, s = np.cos(x[0, 0, 2]), np.sin(x[0, 0, 2])
+        gradient[1, 0, 0] = c * d[0] - s * d[1]
+        gradient[1, 0, 1] = s * d[0] + c * d[1]
+        gradient[1, 0, 2] = d[2]
+        return
+    a = x[0, 0] / np.sqrt(dot(x[0, 0], x[0, 0]))
+    n = cross(a, x[0, 1])
+    n /= np.sqrt(dot(n, n))
+    gradient[1, 0] = d[0] * a + d[1] * cross(n, a) + d[2] * n
 
 
 @compiled

@@ -13,8 +13,8 @@ near the diagonal: from column `first` of each row on.
     kinds : (L,) 0: rows (u, v, w), 1: (u, v), 2: (u, v, ψ)
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components; Q (L, 3, 3), angle (L,) of the
         frame; g (3, L, N) seen from it, and rates; strain, direction, turn of `beams`; turned (A,) coordinates of actions
-    acting : of `dynamics.acting.over_block`, whose forces are added to F; None without motors and springs, whose code is
-        then not compiled
+    acting : of `dynamics.acting.over_block`, whose forces are added to F; None without motors, springs and loads that
+        turn with links, whose code is then not compiled
     history : u, v, a, g (T, L, D, S), strain (T, b, 3, E), R (T, L, D, D), port forces (T, L, Q) in that frame, strain
         energy (T, L)
     memory : of `dynamics.mixing_kernel`

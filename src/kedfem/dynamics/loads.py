@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -33,7 +33,9 @@ from kedfem.scene import (
     Scene,
     SurfaceLoad,
     TorqueLoad,
+    factor_table,
     load_factor,
+    time_grid,
 )
 
 Times = Float[np.ndarray, " t"]
@@ -48,12 +50,14 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
+    table : times and factors, of a load that turns with a link that no drive leads: an action (`actions.followers`)
     """
 
     forces: Float[np.ndarray, "n d"]
     follows: bool
     factor: Callable[[Times, Times], Times]
     share: tuple[Vector, Vector] | None = None
+    table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
 
 def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern, ...]]:
@@ -70,8 +74,20 @@ def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern
             out[key].append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, _always))
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
-            out[key] += found
+            out[key] += found if scene.driven else [_led(scene, f"loads.{name}", load, x) for x in found]
     return {key: tuple(found) for key, found in out.items()}
+
+
+def _led(scene: Scene, where: str, load: Load, pattern: Pattern) -> Pattern:
+    """A load of a link that goes where its own motion takes it: no nominal orientation tells its direction."""
+    if pattern.share is not None:
+        raise SceneError(
+            f"{where}.frame: must be 'link' for a torque in a scene without a drive, got 'world'"
+        )
+    turns = (
+        pattern.follows and pattern.forces[:, :2].any()
+    )  # ψ of a planar beam takes a torque however it has turned
+    return replace(pattern, table=factor_table(load.factor, time_grid(scene).end)) if turns else pattern
 
 
 def _always(t: Times, phi: Times) -> Times:
@@ -213,6 +229,8 @@ def applied(
     F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
     R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
     for load in loads:
+        if load.table is not None:
+            continue
         factor = amounts(load, motion, body)
         if factor.any():
             F += factor[:, None, None] * (load.forces @ R if load.follows else load.forces)

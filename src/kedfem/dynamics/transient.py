@@ -9,7 +9,7 @@ import numpy as np
 
 from kedfem.dynamics.acted import ActedSteps, Forces, loaded, still_forces
 from kedfem.dynamics.acting import first_forces
-from kedfem.dynamics.actions import actions
+from kedfem.dynamics.actions import actions, followers
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
@@ -62,7 +62,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
         follower = FollowingDense if dense else FollowingSteps
         tolerance = FREE if scene.driven is None else CONVERGED
-        return follower(model.links, model.joints, scheme, model.damping, actions(scene, model), tolerance)
+        every = (*actions(scene, model), *followers(model))
+        return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
     every = actions(scene, model)
     small = all(map(_is_small, model.links)) and find_spec("numba") and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
@@ -220,7 +221,7 @@ def first_states(
     every = actions(scene, model)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        forces = first_forces(every, model.links, motion, [(x.u, x.v) for x in start])
+        forces = first_forces((*every, *followers(model)), model.links, motion, [(x.u, x.v) for x in start])
         rows = rows_at_start(scene, linkage, along, model)
         if every and not following(scene):
             at = loaded(moments[0].at, forces)

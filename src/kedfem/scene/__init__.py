@@ -6,7 +6,7 @@ from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, Gear, MotionLaw
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import following, following_links, link_frames
 from kedfem.scene.initial import InitialMotion
-from kedfem.scene.laws import drive_angle, load_factor, path_parameter
+from kedfem.scene.laws import drive_angle, factor_table, load_factor, path_parameter
 from kedfem.scene.links import GROUND, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
     Body,
@@ -90,6 +90,7 @@ __all__ = [
     "TorsionSpring",
     "TubeSection",
     "drive_angle",
+    "factor_table",
     "following",
     "following_links",
     "inertia_tensor",

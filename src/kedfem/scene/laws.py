@@ -182,3 +182,14 @@ def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
         x = at[0] + np.mod(x - at[0], factor.period)
         at, value = np.append(at, at[0] + factor.period), np.append(value, value[0])
     return np.asarray(np.interp(x, at, value))
+
+
+def factor_table(factor: Factor, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times from 0 to an end, and the factors there of one over time, linear between, its periods written out."""
+    at, value = np.array(factor.at), np.array(factor.value)
+    if factor.period is None:
+        return factor.at, factor.value
+    whole = np.arange(np.floor(-at[0] / factor.period) - 1, np.ceil((end - at[0]) / factor.period) + 1)
+    times = (at + factor.period * whole[:, None]).ravel()
+    new = np.concatenate([[True], np.diff(times) > 1e-12 * factor.period])
+    return tuple(times[new].tolist()), tuple(np.tile(value, len(whole))[new].tolist())
