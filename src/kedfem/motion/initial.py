@@ -8,7 +8,8 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.motion.linkage import RANK_TOLERANCE, Linkage, drawn_jacobian, joint_axis, joint_free_rows, scaled
+from kedfem.motion.freedom import RANK_TOLERANCE
+from kedfem.motion.linkage import Linkage, drawn_jacobian, joint_axis, joint_free_rows, scaled
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rows import cross, features, jacobian
 from kedfem.scene import Scene

@@ -11,11 +11,13 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.motion.freedom import RANK_TOLERANCE, Drawn, free_motions, listed, rank
+from kedfem.motion.freedom import remedy as held_by
+from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.rows import Row, Rows, drive_row, features, free_rows, jacobian, joint_rows, stacked
 from kedfem.scene import Joint, Scene, following_links
 
 GROUND = "ground"
-RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,29 +52,53 @@ def linkage(scene: Scene) -> Linkage:
     MotionError
         If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
     """
-    bodies = (GROUND, *scene.links)
-    points, centre = joint_points(scene), scene_centre(scene)
-    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
-    driven = scene.driven
-    if driven is not None:
-        rows.append(drive_row(driven, *_pair(scene.joints[driven], bodies), joint_axis(scene.joints[driven])))
-    size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
-    J = drawn_jacobian(rows, len(bodies), size)
+    rows, drawn = _drawn(scene)
+    J, bodies, size = drawn.J, (GROUND, *drawn.links), drawn.size
     free = 0
-    if driven is not None:
-        free = _check_mobility(J, rows, bodies, driven, following_links(scene))
+    if scene.driven is not None:
+        free = _check_mobility(scene, drawn)
         held = _holding(scene, J, bodies, size, free)
         J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
     else:
-        free = J.shape[1] - _rank(J)
+        free = J.shape[1] - rank(J)
     names = tuple(row.joint for row in rows)
-    return Linkage(bodies, stacked(rows), names, size, centre, _redundant(J, names), driven, free)
+    return Linkage(bodies, stacked(rows), names, size, drawn.centre, _redundant(J, names), scene.driven, free)
 
 
-def _rank(J: Float[np.ndarray, "m k"]) -> int:
-    """Number of independent rows."""
-    s = scipy.linalg.svdvals(J) if len(J) else np.zeros(0)
-    return int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
+def _drawn(scene: Scene) -> tuple[list[Row], Drawn]:
+    """All rows of joints and drive, and their derivatives as drawn."""
+    bodies = (GROUND, *scene.links)
+    points, centre = joint_points(scene), scene_centre(scene)
+    rows = [row for name in scene.joints for row in _rows_of(scene.joints[name], name, bodies, centre)]
+    joints = len(rows)
+    rows += [_drive_row(scene, name, bodies) for name in scene.driven_joints]
+    size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
+    J = drawn_jacobian(rows, len(bodies), size)
+    names, driven = tuple(row.joint for row in rows), np.arange(len(rows)) >= joints
+    return rows, Drawn(J, names, driven, bodies[1:], scene.joints, centre, size)
+
+
+def drawn_linkage(scene: Scene) -> Drawn:
+    """A scene's linkage to first order as drawn; nothing is refused."""
+    return _drawn(scene)[1]
+
+
+def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
+    """Rows that joints would have if they were of a kind that holds less; driven joints are left as they are."""
+    bodies = (GROUND, *drawn.links)
+    out = {}
+    for name, joint in sorted(
+        scene.joints.items(), key=lambda each: GROUND in each[1].links
+    ):  # bearings stay, if they can
+        for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
+            rows = _rows_of(joint.model_copy(update={"kind": kind}), name, bodies, drawn.centre)
+            out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
+    return out
+
+
+def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> Row:
+    joint = scene.joints[name]
+    return drive_row(name, *_pair(joint, bodies), joint_axis(joint))
 
 
 def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
@@ -96,8 +122,7 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
     return unit(joint.axis or (0.0, 0.0, 1.0))
 
 
-def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
-    joint = scene.joints[name]
+def _rows_of(joint: Joint, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
     axis = None if joint.axis is None else unit(joint.axis)
     i, j = _pair(joint, bodies)
     axes = None
@@ -141,33 +166,47 @@ def scaled(J: Float[np.ndarray, "... m k"], rows: Rows, size: float) -> Float[np
     return np.asarray(J * row * column)
 
 
-def _check_mobility(
-    J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], drive: str, following: frozenset[str]
-) -> int:
+def _check_mobility(scene: Scene, drawn: Drawn) -> int:
     """How many motions the drive leaves free; they must be of links whose frames follow."""
-    _, s, Vt = scipy.linalg.svd(J)
-    rank = int((s > RANK_TOLERANCE * s[0]).sum())
-    without = J[[row.b_drive is None for row in rows]]
-    mobility = J.shape[1] - int(np.linalg.matrix_rank(without, tol=RANK_TOLERANCE * s[0]))
+    k, drives = int(drawn.J.shape[1]), int(drawn.driven.sum())
+    free, mobility = k - rank(drawn.J), k - rank(drawn.J[~drawn.driven])
+    driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
     if mobility == 0:
+        moves = would_move(drawn, looser_rows(scene, drawn))
         raise MotionError(
-            f"joints.{drive}: its drive must be able to move the linkage, got a structure without any mobility "
-            "(the joints hold every link; is an axis askew, or one joint too many?)"
+            f"{driven}: its drive must be able to move the linkage, got a structure without any mobility "
+            f"({f'it would move {moves}' if moves else 'the joints hold every link'}; "
+            "is an axis askew, or one joint too many?)"
         )
-    if rank == J.shape[1]:
+    if free == 0:
         return 0
-    if mobility == 1:
+    if mobility == drives:
+        other = listed(_other_drives(scene, drawn), "or")
         raise MotionError(
-            f"joints.{drive}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
-            "draw it at another angle or drive another joint"
+            f"{driven}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
+            f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
-    null = Vt[rank:].reshape(-1, len(bodies) - 1, 6)
-    if following.issuperset(_moving(null, bodies[1:])):
-        return len(null)
+    motions = free_motions(drawn)
+    if following_links(scene).issuperset(link for each in motions for link in each.links):
+        return free
+    words = "; ".join(each.words for each in motions)
     raise MotionError(
         "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
-        f'{_free_motion(null, bodies[1:])} (with analysis.frames = "following" they may)'
+        f"{words}; free motions: {free} (remedy: {'; '.join(held_by(each) for each in motions)}; "
+        'or let these links have frames = "following")'
     )
+
+
+def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
+    """Hinges on the ground that could drive the linkage from where it is drawn."""
+    bodies = (GROUND, *drawn.links)
+    out = []
+    for name, joint in scene.joints.items():
+        if joint.kind == "revolute" and GROUND in joint.links and name not in scene.driven_joints:
+            row = drawn_jacobian([_drive_row(scene, name, bodies)], len(bodies), drawn.size)
+            if rank(np.concatenate([drawn.J[~drawn.driven], row])) == drawn.J.shape[1]:
+                out.append(name)
+    return out
 
 
 def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[Row]:
@@ -181,24 +220,6 @@ def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, 
     change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T
     _, _, order = scipy.linalg.qr(change.T, pivoting=True, mode="economic")
     return [rows[k] for k in order[:free]]
-
-
-def _moving(null: np.ndarray, links: tuple[str, ...]) -> list[str]:
-    """The links that take part in free motions."""
-    norm = np.linalg.norm(null, axis=2).max(axis=0)
-    return [name for name, x in zip(links, norm, strict=True) if x > 1e-6]
-
-
-def _free_motion(null: np.ndarray, links: tuple[str, ...]) -> str:
-    """Free motions in words: which links can still turn or slide, and how."""
-    norm, moving = np.linalg.norm(null, axis=2).max(axis=0), _moving(null, links)
-    most = int(norm.argmax())
-    v, omega = null[np.linalg.norm(null[:, most], axis=1).argmax(), most].reshape(2, 3)
-    verb = "turn about" if np.linalg.norm(omega) > 1e-6 else "slide along"
-    d = omega if verb == "turn about" else v
-    d = d / np.linalg.norm(d) * np.sign(d[np.abs(d).argmax()])
-    direction = "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(d, 6)) + ")"
-    return f"link '{links[most]}' can {verb} {direction}; links that move: {', '.join(moving)}; free motions: {len(null)}"
 
 
 def _redundant(J: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:
