@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, drive_angle, scene_from
+from kedfem.scene import Scene, path_parameter, scene_from
 
 JointTable = Mapping[
     str, tuple[Any, ...]
@@ -65,7 +65,7 @@ def moved_scene(joints: JointTable, R: np.ndarray, p: np.ndarray) -> dict[str, t
 
 def motion_at(scene: Scene, t: np.ndarray) -> RigidMotion:
     """The rigid motion of a scene at given times."""
-    drive = drive_angle(scene.motion, t)
+    drive = path_parameter(scene, t)
     link = linkage(scene)
     return rigid_motion(link, path(link, min(drive[0].min(), 0.0), max(drive[0].max(), 0.0)), t, drive)
 

@@ -227,7 +227,7 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "points/C/distances": [0.05, 0.05],
         "joints/B/links": ["crank", "couple"],
         "joints/D/kind": "hinge",
-        "drive/joint": "C",
+        "drive/joint": "Q",
         "damping/alpha": 3,
         "analysis/end_time": 1,
         "output/probes/middle/link": "roker",
@@ -237,9 +237,10 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "analysis.turns: must stand without end_time, got both",
         "bodies.wheel.inertia: must be positive [kg*m^2], got 0",
         "damping.ratio: must stand without alpha and beta, got both",
-        "drive.joint: must name a joint of a link and the ground, got 'C' of 'coupler' and 'rocker'",
+        "drive.joint: must name a joint, got 'Q', known: A, B, C, D",
         "joints.B.links[1]: must name a link, got 'couple', did you mean 'coupler'?",
-        "joints.D.kind: must be one of revolute, spherical, weld, prismatic, got 'hinge'",
+        "joints.D.kind: must be one of revolute, spherical, weld, prismatic, cylindrical, screw, universal, planar, "
+        "slot, got 'hinge'",
         "links.coupler.shape.bore_diameter: must be a length [m], got '600 rpm': the unit 'rpm' "
         "is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",

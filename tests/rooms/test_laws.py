@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,8 +48,12 @@ class Driven:
     analysis: Analysis
 
     @property
-    def drive(self):
-        return self
+    def driven_joints(self):
+        return {"A": self}
+
+    @property
+    def joints(self):
+        return {"A": SimpleNamespace(kind="revolute")}
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.freedom import free_motions, remedy
 from kedfem.motion.linkage import drawn_linkage, linkage, looser_rows
@@ -13,11 +14,16 @@ from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
 from kedfem.motion.redundancy import redundancy, without_redundancy, wrenches
 from kedfem.report.mobility import mobility_table
+from kedfem.scene import Scene, scene_from
 from tests.linkages import (
+    RISE,
+    UNIT_SPEED,
     JointTable,
     Z,
+    bar,
     cardan,
     four_bar,
+    joint,
     linkage_scene,
     motion_at,
     revolute_loop,
@@ -111,17 +117,15 @@ def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> N
     stress = np.linalg.svd(drawn.J.T)[2][-3:].T
     for link in drawn.links:
         total = np.zeros((6, 3))
-        for name, joint in drawn.joints.items():
-            first = next(each for each in joint.links if each in drawn.links)
-            if link in joint.links:
+        for name, each in drawn.joints.items():
+            first = next(x for x in each.links if x in drawn.links)
+            if link in each.links:
                 w = wrenches(drawn, name, stress) * (1 if link == first else -1)
                 total[:3] += w[:3]
                 total[3:] += w[3:] + np.cross(drawn.place(name), w[:3].T).T
         np.testing.assert_allclose(total, 0.0, atol=1e-12)
-    for name, joint in drawn.joints.items():
-        np.testing.assert_allclose(
-            np.asarray(joint.axis) @ wrenches(drawn, name, stress)[3:], 0.0, atol=1e-12
-        )
+    for name, each in drawn.joints.items():
+        np.testing.assert_allclose(np.asarray(each.axis) @ wrenches(drawn, name, stress)[3:], 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -198,16 +202,24 @@ def nearest(joints: JointTable, high: float) -> DeadPoint:
 def test_how_far_a_limit_of_the_drive_lies_beyond_its_range_is_estimated(short: float, error: float) -> None:
     """Driven to some degrees before the limit; the estimate is of first order in that distance."""
     told = nearest(four_bar(*CRANK, 0.5), LIMIT - 0.5 - np.radians(short))
-    assert told.beyond is not None
-    assert np.degrees(told.beyond) == pytest.approx(short, rel=error)
+    assert told.outside is not None
+    assert np.degrees(told.outside - told.tau) == pytest.approx(short, rel=error)
 
 
 @pytest.mark.parametrize(("short", "error"), [(1.0, 0.01), (5.0, 0.01), (20.0, 0.06)])
 def test_a_change_point_beyond_the_range_is_estimated(short: float, error: float) -> None:
     """A parallelogram's, at a crank angle of 180°: its coupler there makes the same angle with its cranks."""
     told = nearest(four_bar(0.3, 0.9, 0.3, 0.9, 1.0), np.pi - 1.0 - np.radians(short))
-    assert told.beyond is not None
-    assert np.degrees(told.beyond) == pytest.approx(short, rel=error)
+    assert told.outside is not None
+    assert np.degrees(told.outside - told.tau) == pytest.approx(short, rel=error)
+
+
+def test_a_limit_behind_the_drawn_position_is_told_as_such() -> None:
+    """Drawn 5° after the limit on the other side, at minus the angle, and driven away from it."""
+    told = nearest(four_bar(*CRANK, np.radians(5) - LIMIT), 0.3)
+    assert told.tau == 0.0
+    assert told.outside is not None
+    assert np.degrees(told.outside) == pytest.approx(-5.0, rel=0.06)
 
 
 @pytest.mark.parametrize("bend", [2.0, 10.0, 25.0])
@@ -218,16 +230,17 @@ def test_how_far_the_joint_is_from_its_dead_position_is_the_transmission_angle(b
     told = nearest(four_bar(a, b, c, d, 0.6), TURN)
     assert told.joint == "C"
     assert np.degrees(told.off) == pytest.approx(bend, rel=0.12)
-    assert np.degrees(told.angle) + np.degrees(0.6) == pytest.approx(180, abs=3)
-    assert told.beyond is None  # it turns fully
+    assert np.degrees(told.tau) + np.degrees(0.6) == pytest.approx(180, abs=3)
+    assert told.outside is None  # it turns fully
 
 
 # -- the table ----------------------------------------------------------------------------------------------
 
 
-def said(joints: JointTable, high: float = LITTLE) -> str:
+def said(joints: JointTable, high: float = LITTLE, sliders: tuple[str, ...] = ()) -> str:
     console = Console(width=160, file=StringIO())
-    console.print(mobility_table(linkage_scene(joints), found(joints, high)))
+    scene = linkage_scene(joints, sliders=sliders)
+    console.print(mobility_table(scene, linkage(scene), found(joints, high, sliders)))
     return console.file.getvalue()  # type: ignore[attr-defined]
 
 
@@ -238,7 +251,7 @@ def test_the_table_reads_as_sentences() -> None:
         "joint equations                         │ 20, 3 of them redundant",
         "held redundantly at joints A, B, C and D │ force along z, moments about x and y",
         "without these                           │ make joint B spherical and joint C cylindrical",
-        "closest to a dead point                 │ at 54.06°, joint C about",
+        "closest to a dead point                 │ at drive angle 54.06 deg, joint C about",
         "to keep away from it                    │ drive another joint, limit the drive, or let a flywheel",
     ):
         wanted = [part.strip() for part in row.split("│")]
@@ -256,9 +269,60 @@ def test_an_arm_without_a_loop_has_no_dead_point() -> None:
 
 def test_far_from_a_dead_point_no_number_is_told_that_would_be_wrong() -> None:
     """A slider-crank of ratio 3: the rod is 71° from the direction in which it would lock, acos(1/3)."""
-    scene = linkage_scene(slider_crank(0.1, 0.3, 0.7), sliders=("slider",))
-    console = Console(width=160, file=StringIO())
-    console.print(mobility_table(scene, found(slider_crank(0.1, 0.3, 0.7), TURN, ("slider",))))
-    text = console.file.getvalue()  # type: ignore[attr-defined]
+    text = said(slider_crank(0.1, 0.3, 0.7), TURN, ("slider",))
     assert "30° or more from it (estimated" in text
     assert "to keep away" not in text
+
+
+# -- couplings and several drives -----------------------------------------------------------------------------
+
+WHEELS: JointTable = {
+    name: ("revolute", "ground", f"wheel{name}", (x, 0.0, 0.0), Z) for x, name in enumerate("ABC")
+}
+
+
+def scene_with(joints: JointTable, **tables: object) -> Scene:
+    """A linkage with gears or drives of its own."""
+    at = {link: np.asarray(joint[3], float) for joint in joints.values() for link in joint[1:3]}
+    links = {link: bar(point) for link, point in at.items() if link != "ground"}
+    raw = {"links": links, "joints": {name: joint(*fields) for name, fields in joints.items()}}
+    return scene_from({**raw, "analysis": {"end_time": 1.0, "step": 0.01}, **tables})
+
+
+def geared(ratio: float) -> Scene:
+    """Three wheels in a ring of gears: consistent at a ratio of 4 = (−2)²."""
+    pairs = {"g": (("A", "B"), -2.0), "h": (("B", "C"), -2.0), "k": (("A", "C"), ratio)}
+    gears = {name: {"joints": list(on), "ratio": x} for name, (on, x) in pairs.items()}
+    return scene_with(WHEELS, drive={"joint": "A", "motion": UNIT_SPEED}, gears=gears)
+
+
+def test_one_gear_of_a_ring_can_be_left_out() -> None:
+    scene = geared(4.0)
+    link = linkage(scene)
+    told = mobility(scene, link, path(link, 0.0, LITTLE))
+    assert (told.freedom, told.equations, told.redundancy) == (1, 18, 1)
+    assert [(each.joints, each.words) for each in told.redundant] == [
+        (("gears.g", "gears.h", "gears.k"), "the coupling itself")
+    ]
+    assert told.remedy == "leave out gears.g, gears.h or gears.k"
+
+
+def test_gears_that_contradict_one_another_are_a_structure() -> None:
+    with pytest.raises(MotionError, match=r"it would move without gears\.g, gears\.h or gears\.k;"):
+        linkage(geared(3.0))
+
+
+def test_a_five_bar_is_driven_twice_and_its_dead_point_is_told_by_time() -> None:
+    P = ((0, 0, 0), (0, 0.2, 0), (0.4, 0.6, 0), (0.9, 0.6, 0), (1.0, 0, 0))
+    names = ("ground", "crank", "one", "two", "rocker", "ground")
+    joints = {x: ("revolute", names[k], names[k + 1], P[k], Z) for k, x in enumerate("ABCDE")}
+    drives = {x: {"joint": x, "motion": {**RISE, "angle": angle}} for x, angle in (("A", 0.1), ("E", -0.1))}
+    scene = scene_with(joints, drives=drives)
+    link = linkage(scene)
+    told = mobility(scene, link, path(link, 0.0, 1.0))
+    assert (told.freedom, told.drives, told.redundancy) == (2, 2, 3)  # 6·4 − 5·5 = −1
+    console = Console(width=160, file=StringIO())
+    console.print(mobility_table(scene, link, told))
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "2, driven at joints A and E" in text
+    assert "at t = " in text

@@ -1,6 +1,7 @@
 """The motion room: what it refuses and how it says so, what it reports of a linkage."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,16 +11,8 @@ from kedfem.errors import MotionError
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.motion.rows import (
-    convective,
-    drive_derivative,
-    drive_row,
-    features,
-    jacobian,
-    joint_rows,
-    residuals,
-    stacked,
-)
+from kedfem.motion.rows import Row, coupled, joint_rows, stacked, travel_row, turn_row
+from kedfem.motion.values import convective, features, jacobian, residuals
 from tests.linkages import (
     RISE,
     UNIT_SPEED,
@@ -106,7 +99,7 @@ def test_a_linkage_drawn_in_its_dead_point_is_refused() -> None:
     }
     assert refusal(joints) == (
         "joints.A: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
-        "draw it at another angle or drive joint D"
+        "draw it at another angle or drive joint B, C or D"
     )
 
 
@@ -195,33 +188,67 @@ def test_a_time_off_the_path_leaves_a_joint_open_and_the_message_gives_time_and_
 # -- rows and their derivatives --------------------------------------------------------------------------------
 
 
+def open_rows(random: np.random.Generator) -> list[Row]:
+    """Rows of all kinds between bodies 0, 1 and 2, couplings among them, drives on a turn and a travel."""
+    axis = np.array([0.48, 0.6, 0.64])  # a unit vector
+    turn, travel = turn_row("R", 2, 1, axis), travel_row("P", 1, 0, random.uniform(-1, 1, 3), axis)
+    apart = [
+        replace(row, a_j=random.uniform(-1, 1, 3)) for row in joint_rows("spherical", "S", 2, 0, axis, None)
+    ]
+    return [
+        *joint_rows("weld", "W", 2, 1, random.uniform(-1, 1, 3), None),
+        *joint_rows("prismatic", "P", 1, 0, random.uniform(-1, 1, 3), axis),
+        *joint_rows("revolute", "R", 2, 0, random.uniform(-1, 1, 3), axis),
+        *apart,
+        replace(turn, drive=0),
+        coupled(travel, (-0.3, turn)),
+        coupled(turn, (2.5, turn_row("Q", 1, 0, np.array([0.0, 0.6, 0.8]))), (-0.7, travel)),
+        replace(travel, drive=1),
+    ]
+
+
 def test_derivatives_of_rows_are_their_differences_also_where_joints_are_open() -> None:
-    """Three bodies on screw motions, the drive between two of them: r' = J q' + r_φ φ', r'' without accelerations.
+    """Three bodies on screw motions: r' = J q' − drives', r'' without accelerations; a subset of the rows gives the same.
 
     Central differences: truncation h², with h = 1e-4 below 1e-7; rounding 1e-16/h² = 1e-8.
     """
     random = np.random.default_rng(5)
-    axis = np.array([0.48, 0.6, 0.64])  # a unit vector
-    rows = stacked(
-        [
-            *joint_rows("weld", "W", 2, 1, random.uniform(-1, 1, 3), None),
-            *joint_rows("prismatic", "P", 1, 0, random.uniform(-1, 1, 3), axis),
-            *joint_rows("revolute", "R", 2, 0, random.uniform(-1, 1, 3), axis),
-            drive_row("R", 2, 1, axis),
-        ]
-    )
+    rows = stacked(open_rows(random))
     R0, p0, v, omega = Rotation.random(3, rng=6).as_matrix(), *random.uniform(-1, 1, (3, 3, 3))
     v[0] = omega[0] = 0  # the ground
-    speed, h = 1.7, 1e-4
+    speeds, h = np.array([1.7, -0.6]), 1e-4
     t = np.array([-h, 0.0, h])
     R = np.stack([Rotation.from_rotvec(s * omega).as_matrix() @ R0 for s in t])
-    f = features(rows, (R, p0 + t[:, None, None] * v), 0.4 + speed * t)
-    r = residuals(f)
+    poses, near = (R, p0 + t[:, None, None] * v), np.zeros((3, len(rows.angles)))
+    near = features(rows, (R[1:2], p0[None]), near[:1]).value[rows.angles].T + 0 * near  # none at half a turn
+    f, q = features(rows, poses, near), 0.4 + speeds * t[:, None]
+    r = residuals(rows, f, q)
     twist = np.concatenate([v, omega], axis=1)[1:].ravel()
-    first = jacobian(rows, f, 3)[1] @ twist + speed * drive_derivative(f)[1]
+    first = jacobian(rows, f, 3)[1] @ twist
+    first[rows.drive >= 0] -= speeds[rows.drive[rows.drive >= 0]]
     np.testing.assert_allclose((r[2] - r[0]) / (2 * h), first, atol=1e-7)
-    second = convective(rows, f, (np.tile(v, (3, 1, 1)), np.tile(omega, (3, 1, 1))), np.full(3, speed))[1]
+    second = convective(rows, f, (np.tile(v, (3, 1, 1)), np.tile(omega, (3, 1, 1))))[1]
     np.testing.assert_allclose((r[2] - 2 * r[1] + r[0]) / h**2, second, atol=1e-6)
+    which = np.array([2, 7, 18, 19, 20, 21])
+    some, angles = rows.part(which)
+    g = features(some, poses, near[:, angles])
+    np.testing.assert_allclose(residuals(some, g, q), r[:, which], atol=1e-15)
+    np.testing.assert_allclose(jacobian(some, g, 3, 0.3), jacobian(rows, f, 3, 0.3)[:, which], atol=1e-15)
+
+
+def test_angles_count_on_beyond_a_turn_and_know_large_ones_to_rounding() -> None:
+    """A body turned by 1e-9 more than 10⁴ turns: the row sees the 1e-9 (2π in floats is exact to 2.5e-16 · 10⁴)."""
+    axis = np.array([0.0, 0.0, 1.0])
+    rows = stacked([replace(turn_row("A", 1, 0, axis), drive=0)])
+    many = 2e4 * np.pi
+    exact = np.array([[np.cos(many + 1e-9), np.sin(many + 1e-9)]])
+    c, s = exact[0]
+    R = np.stack([np.eye(3), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])])[None]
+    q = np.array([[many]])
+    f = features(rows, (R, np.zeros((1, 2, 3))), q)
+    np.testing.assert_allclose(
+        residuals(rows, f, q), 1e-9, atol=1.5e-11
+    )  # the sum itself is rounded to 7e-12
 
 
 # -- what is reported ----------------------------------------------------------------------------------------

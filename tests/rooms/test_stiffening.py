@@ -22,7 +22,7 @@ from kedfem.errors import SceneError, SolveError
 from kedfem.links.recovery import point_rows
 from kedfem.links.reduced import rigid_modes
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import drive_angle, scene_from, time_grid
+from kedfem.scene import path_parameter, scene_from, time_grid
 from tests.verification.stiffening import turning_scene
 
 from .test_dynamics import four_bar, slider_crank
@@ -62,7 +62,7 @@ def test_stress_modes_hold_every_stress_of_the_nominal_motion(
     ready = meshed(scene_from(made()))
     model = ready.model
     t = np.array([0.0, 0.013, 0.04])
-    motion = rigid_motion(ready.linkage, ready.path, t, drive_angle(ready.scene.drive.motion, t))
+    motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
     found = stiffening.stiffening(model)
     forcing = forcings(model, motion)
     stressed = found.stressed(forcing)

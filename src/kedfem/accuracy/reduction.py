@@ -31,7 +31,7 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, drive_angle, time_grid, turn_steps
+from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
@@ -249,7 +249,7 @@ def _training(full: Prepared) -> RigidMotion:
         turn = min(per_turn * grid.step, grid.end)
         t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
     t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
-    return rigid_motion(full.linkage, full.path, t, drive_angle(scene.motion, t))
+    return rigid_motion(full.linkage, full.path, t, path_parameter(scene, t))
 
 
 def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:

@@ -14,7 +14,7 @@ from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.transient import instants
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import drive_angle, time_grid, turn_steps
+from kedfem.scene import path_parameter, time_grid, turn_steps
 
 POSES = 8  # of the last turn in which the linkage stands still in thought
 LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
@@ -62,7 +62,7 @@ def resolution(ready: Prepared) -> Resolution | None:
     turn = turn_steps(scene)
     span = min((turn or grid.steps) * grid.step, grid.end)
     t = grid.end - span * np.arange(POSES)[::-1] / POSES
-    phi = drive_angle(scene.motion, t)
+    phi = path_parameter(scene, t)
     motion = rigid_motion(ready.linkage, ready.path, t, phi)
     try:
         parts = static_parts(ready.model)

@@ -18,7 +18,10 @@ def fewest_steps(scene: Scene) -> float:
         return math.inf
     end = time_grid(scene).end
     t = np.linspace(0.0, end, 2001)
-    fastest = float(np.abs(drive_angle(scene.motion, t)[1]).max())
+    turning = [
+        each.motion for name, each in scene.driven_joints.items() if scene.joints[name].kind != "prismatic"
+    ]
+    fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
     return fastest * end / (MARGIN * (1 - rho_inf))
 
 

@@ -80,7 +80,7 @@ def run(scene: Scene, repeats: int) -> Ran:
 def stepping(ready: Prepared, solver: Steps, steps: int) -> float:
     """Processor time of the solver's first steps alone [s]."""
     scene, model, total = ready.scene, ready.model, 0.0
-    state: Any = solver.begin(first_states(scene, ready.linkage, ready.path, scene.motion, model))
+    state: Any = solver.begin(first_states(scene, ready.linkage, ready.path, model))
     for first, motion in motions(scene, ready.linkage, ready.path):
         part = motion.part(0, max(0, steps + 1 - first))
         if not len(part.t):
@@ -93,7 +93,7 @@ def cost(scene: Scene) -> tuple[float, Steps]:
     """Processor time of a step [s], the least of some blocks; the solver."""
     ready = meshed(scene)
     solver, times = steps_of(scene, ready.model), []
-    states = first_states(scene, ready.linkage, ready.path, scene.motion, ready.model)
+    states = first_states(scene, ready.linkage, ready.path, ready.model)
     state: Any = solver.begin(states)
     _, motion = next(motions(scene, ready.linkage, ready.path))
     for k in range(0, BLOCKS * POINTS, POINTS):

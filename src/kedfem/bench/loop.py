@@ -48,7 +48,7 @@ def loop_time(ready: Prepared, repeats: int = 9) -> float:
     solver: Any = steps_of(scene, model)
     _, motion = next(motions(scene, ready.linkage, ready.path))
     forcing = forcings(model, motion)
-    states = first_states(scene, ready.linkage, ready.path, scene.motion, model)
+    states = first_states(scene, ready.linkage, ready.path, model)
     known = (forcing, motion) if following(scene) else (forcing,)
     solver.advance(solver.begin(states), *known)  # compiled
     return seconds(lambda: solver.advance(solver.begin(states), *known), repeats) / len(motion.t)
@@ -58,7 +58,7 @@ def recorded_rate(ready: Prepared) -> float:
     """Steps a second with all probes and joint forces at every step; the rigid motion is known."""
     scene, model = ready.scene, ready.model
     known = list(motions(scene, ready.linkage, ready.path))
-    states = first_states(scene, ready.linkage, ready.path, scene.motion, model)
+    states = first_states(scene, ready.linkage, ready.path, model)
     recorded = recording(scene, model)
     solver: Any = steps_of(scene, model)
 

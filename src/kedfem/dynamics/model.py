@@ -31,6 +31,7 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
+from kedfem.scene.checks import elastic_drive_faults
 
 T = TypeVar("T")
 
@@ -116,6 +117,8 @@ def elastic_model(scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | Non
     SceneError
         If a load or body does not fit its link.
     """
+    if faults := list(elastic_drive_faults(scene)):
+        raise SceneError(faults)
     cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
     links = {
         key: part

@@ -32,7 +32,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, MotionLaw, Scene, drive_angle, following, time_grid, turn_steps
+from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
@@ -80,10 +80,9 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    law = scene.motion
     stresses = None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
-    states = first_states(scene, linkage, along, law, model, stresses)
-    start = rigid_motion(linkage, along, np.zeros(1), drive_angle(law, np.zeros(1)))
+    states = first_states(scene, linkage, along, model, stresses)
+    start = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
     yield Block(0, start, _first(model, solver, states))
     state: Any = solver.begin(states)
     length = block_length(model)
@@ -115,7 +114,7 @@ def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge
     """Smaller steps for where those of the analysis do not settle."""
     return Bridge(
         time_grid(scene).step, scene.analysis.rho_inf,
-        lambda t: rigid_motion(linkage, along, t, drive_angle(scene.motion, t)),
+        lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)),
         lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
     )  # fmt: skip
 
@@ -139,20 +138,23 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
 def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
     """Rigid motion at all time points after the first, block after block with the number of its first point.
 
-    A drive at constant speed brings the linkage back after a turn: then only the first turn is solved.
+    A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved.
     """
     grid, law = time_grid(scene), scene.motion
-    turn = turn_steps(scene) or 0.0
+    turn = (turn_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
     kept: list[RigidMotion] = []
     for first in range(1, grid.steps + 1, POINTS):
         steps = np.arange(first, min(first + POINTS, grid.steps + 1))
         t = grid.step * steps
-        drive = drive_angle(law, t)
+        drive = path_parameter(scene, t)
         if kept and first > round(turn):
             if len(kept) > 1:
                 kept = [joined(kept)]
-            yield first, replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0])
+            yield (
+                first,
+                replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0], drives=drive[0][:, None]),
+            )
             continue
         motion = rigid_motion(linkage, along, t, drive)
         if returns and first <= turn <= KEPT and grid.steps > turn:
@@ -174,7 +176,7 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
 
 
 def first_states(
-    scene: Scene, linkage: Linkage, along: Path, law: MotionLaw | None, model: Model,
+    scene: Scene, linkage: Linkage, along: Path, model: Model,
     stresses: Stiffening | None = None,
 ) -> list[LinkState]:  # fmt: skip
     """States at t = 0: at rest, or quasi-static with its rate from three instants."""
@@ -182,7 +184,7 @@ def first_states(
     grid = time_grid(scene)
     h = min(grid.step, grid.end / 2)
     t = h * np.arange(1 if at_rest else 3)
-    motion = rigid_motion(linkage, along, t, drive_angle(law, t))
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     moments = instants(model, motion, stresses)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
@@ -237,7 +239,7 @@ def drive_range(scene: Scene) -> tuple[float, float]:
     """Least and greatest drive angle of the analysis [rad]."""
     grid = time_grid(scene)
     t = grid.step * np.arange(grid.steps + 1)
-    phi = drive_angle(scene.motion, t)[0]
+    phi = path_parameter(scene, t)[0]
     return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 

@@ -110,9 +110,16 @@ def listed(names: list[str] | tuple[str, ...], last: str = "and") -> str:
     return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
-def of_joints(names: list[str] | tuple[str, ...]) -> str:
-    """``joint A``, or ``joints A and B``."""
-    return f"joint{'s' * (len(names) > 1)} {listed(names)}"
+def of_joints(names: list[str] | tuple[str, ...], last: str = "and") -> str:
+    """``joint A``, or ``joints A and B``; couplings have names such as ``gears.pair``.
+
+    >>> of_joints(["A", "B", "gears.pair"])
+    'joints A and B and gears.pair'
+    """
+    joints, couplings = ([x for x in names if ("." in x) == coupling] for coupling in (False, True))
+    plural = "s" * (len(joints) > 1 and last == "and")
+    words = [f"joint{plural} {listed(joints, last)}"] if joints else []
+    return f" {last} ".join(words + ([listed(couplings, last)] if couplings else []))
 
 
 # -- free motions -------------------------------------------------------------------------------------------

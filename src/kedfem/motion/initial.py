@@ -9,9 +9,17 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.freedom import RANK_TOLERANCE
-from kedfem.motion.linkage import Linkage, drawn_jacobian, joint_axis, joint_free_rows, scaled
+from kedfem.motion.linkage import (
+    Linkage,
+    drawn_jacobian,
+    joint_axis,
+    joint_free_rows,
+    moving_pair,
+    resting_poses,
+)
 from kedfem.motion.newton import cross_matrix
-from kedfem.motion.rows import cross, features, jacobian
+from kedfem.motion.rows import cross
+from kedfem.motion.values import features, jacobian
 from kedfem.scene import Scene
 
 REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for
@@ -87,16 +95,15 @@ def _allowed(linkage: Linkage) -> Float[np.ndarray, "k f"]:
     held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
     if not held:
         return np.eye(6 * (bodies - 1))
-    poses = (np.tile(np.eye(3), (1, bodies, 1, 1)), np.zeros((1, bodies, 3)))
-    f = features(linkage.rows, poses, np.zeros(1))
-    J = scaled(jacobian(linkage.rows, f, bodies)[0], linkage.rows, linkage.size)
+    f = features(linkage.rows, resting_poses(1, bodies), np.zeros((1, len(linkage.rows.angles))))
+    J = jacobian(linkage.rows, f, bodies, linkage.size)[0]
     return np.asarray(scipy.linalg.null_space(J[:held], rcond=RANK_TOLERANCE))
 
 
 def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
     for name, value in scene.analysis.initial_speeds.items():
         joint = scene.joints[name]
-        moving, other = _order(joint.links)
+        moving, other = moving_pair(joint)
         i, j = linkage.bodies.index(moving), linkage.bodies.index(other)
         row, axis = np.zeros((len(linkage.bodies), 2, 3)), joint_axis(joint)
         if joint.kind == "revolute":
@@ -118,11 +125,6 @@ def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
                 row[k] = blocks[0][c], blocks[1][c]
                 where = f"analysis.initial_motions.{name}.{key} along {AXES[c]}"
                 yield Wanted(where, unit, row.ravel(), value)
-
-
-def _order(links: tuple[str, str]) -> tuple[str, str]:
-    """The link of a joint that its speeds and torques are of, and the other: the first that is not the ground."""
-    return (links[1], links[0]) if links[0] == "ground" else links
 
 
 def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"]) -> None:

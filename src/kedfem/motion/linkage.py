@@ -4,17 +4,29 @@ Where frames follow the links, motions may be left free. Nominally joints that b
 moves the rest; without a drive everything nominally rests.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.motion.drives import Drives, drives
 from kedfem.motion.freedom import RANK_TOLERANCE, Drawn, free_motions, listed, rank
 from kedfem.motion.freedom import remedy as held_by
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.rows import Row, Rows, drive_row, features, free_rows, jacobian, joint_rows, stacked
+from kedfem.motion.rows import (
+    ANGLE,
+    Row,
+    Rows,
+    coupled,
+    free_rows,
+    joint_rows,
+    stacked,
+    travel_row,
+    turn_row,
+)
+from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Joint, Scene, following_links
 
 GROUND = "ground"
@@ -22,16 +34,17 @@ GROUND = "ground"
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """Bodies (ground first) and all rows of joints and drive; also those that hold free motions as drawn.
+    """Bodies (ground first) and all rows of joints, couplings and drives; also those that hold free motions as drawn.
 
     bodies : names
     rows : as arrays
-    joints : for each row the joint's name
+    joints : for each row the joint's name, or that of the coupling as `gears.NAME`
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     redundant : joints whose rows repeat what others already hold
-    drive : name of the driven joint; None where nothing is driven
-    mobility : free motions that the drive leaves; as many rows, the last ones, hold these
+    drives : what is driven
+    start : poses (1, B, ...) that the path starts from
+    mobility : free motions that the drives leave; as many rows, the last ones, hold these
     """
 
     bodies: tuple[str, ...]
@@ -40,8 +53,14 @@ class Linkage:
     size: float
     centre: Float[np.ndarray, "3"]
     redundant: tuple[str, ...]
-    drive: str | None
+    drives: Drives
+    start: Poses
     mobility: int = 0
+
+    @property
+    def drive(self) -> str | None:
+        """Name of the first driven joint; None where nothing is driven."""
+        return self.drives.joints[0] if self.drives else None
 
 
 def linkage(scene: Scene) -> Linkage:
@@ -52,35 +71,38 @@ def linkage(scene: Scene) -> Linkage:
     MotionError
         If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
     """
-    rows, drawn = _drawn(scene)
+    rows, driven, drawn = _drawn(scene)
     J, bodies, size = drawn.J, (GROUND, *drawn.links), drawn.size
-    free = 0
-    if scene.driven is not None:
+    if driven:
         free = _check_mobility(scene, drawn)
         held = _holding(scene, J, bodies, size, free)
         J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
     else:
         free = J.shape[1] - rank(J)
     names = tuple(row.joint for row in rows)
-    return Linkage(bodies, stacked(rows), names, size, drawn.centre, _redundant(J, names), scene.driven, free)
+    start = resting_poses(1, len(bodies))
+    return Linkage(
+        bodies, stacked(rows), names, size, drawn.centre, _redundant(J, names), driven, start, free
+    )
 
 
-def _drawn(scene: Scene) -> tuple[list[Row], Drawn]:
-    """All rows of joints and drive, and their derivatives as drawn."""
+def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
+    """All rows of joints, couplings and drives, and their derivatives as drawn."""
     bodies = (GROUND, *scene.links)
     points, centre = joint_points(scene), scene_centre(scene)
-    rows = [row for name in scene.joints for row in _rows_of(scene.joints[name], name, bodies, centre)]
-    joints = len(rows)
-    rows += [_drive_row(scene, name, bodies) for name in scene.driven_joints]
     size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
-    J = drawn_jacobian(rows, len(bodies), size)
-    names, driven = tuple(row.joint for row in rows), np.arange(len(rows)) >= joints
-    return rows, Drawn(J, names, driven, bodies[1:], scene.joints, centre, size)
+    driven = drives(scene, size)
+    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
+    rows += [_gear_row(scene, name, bodies) for name in scene.gears]
+    rows += [_drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
+    J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
+    moves = np.array([row.drive is not None for row in rows], bool)
+    return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
 
 
 def drawn_linkage(scene: Scene) -> Drawn:
     """A scene's linkage to first order as drawn; nothing is refused."""
-    return _drawn(scene)[1]
+    return _drawn(scene)[2]
 
 
 def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
@@ -91,14 +113,14 @@ def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
         scene.joints.items(), key=lambda each: GROUND in each[1].links
     ):  # bearings stay, if they can
         for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
-            rows = _rows_of(joint.model_copy(update={"kind": kind}), name, bodies, drawn.centre)
+            rows = _rows_of(scene, name, bodies, drawn.centre, kind)
             out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
     return out
 
 
-def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> Row:
-    joint = scene.joints[name]
-    return drive_row(name, *_pair(joint, bodies), joint_axis(joint))
+def resting_poses(times: int, bodies: int) -> Poses:
+    """All bodies as drawn."""
+    return np.tile(np.eye(3), (times, bodies, 1, 1)), np.zeros((times, bodies, 3))
 
 
 def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
@@ -122,15 +144,50 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
     return unit(joint.axis or (0.0, 0.0, 1.0))
 
 
-def _rows_of(joint: Joint, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
-    axis = None if joint.axis is None else unit(joint.axis)
+def _rows_of(
+    scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray, kind: str | None = None
+) -> list[Row]:
+    """Rows of a joint, of its own kind or another."""
+    joint = scene.joints[name]
+    axis: np.ndarray | tuple[np.ndarray, np.ndarray] | None = None if joint.axis is None else unit(joint.axis)
     i, j = _pair(joint, bodies)
-    axes = None
     if joint.axes is not None:
-        first = bodies.index(joint.links[0]) == i
-        one, other = (unit(each) for each in (joint.axes if first else joint.axes[::-1]))
-        axes = (one, other)
-    return joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis, axes)
+        one, other = (unit(each) for each in joint.axes)
+        axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
+    rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
+    if joint.lead is not None:
+        travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
+        rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
+    return rows
+
+
+def moving_pair(joint: Joint) -> tuple[str, str]:
+    """The link of a joint that its turn and travel are of, and the other: the first that is not the ground."""
+    one, other = joint.links
+    return (other, one) if one == GROUND else (one, other)
+
+
+def coordinate_row(scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None) -> Row:
+    """Turn or travel of a joint; if not said which, the turn of all but slides."""
+    joint = scene.joints[name]
+    i, j = (bodies.index(link) for link in moving_pair(joint))
+    if joint.kind != "prismatic" if turns is None else turns:
+        return turn_row(name, i, j, joint_axis(joint))
+    return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), joint_axis(joint))
+
+
+def _gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> Row:
+    """Gears: coordinate of the second joint less ratio · that of the first; the greater coefficient is one."""
+    gear, where = scene.gears[name], f"gears.{name}"
+    first, second = (replace(coordinate_row(scene, each, bodies), joint=where) for each in gear.joints)
+    if second.kind == ANGLE and abs(gear.transmission) > 1:
+        return coupled(first, (-1 / gear.transmission, second))
+    return coupled(second, (-gear.transmission, first))
+
+
+def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> Row:
+    """The drive of a joint: its turn or travel has the drive's value."""
+    return replace(coordinate_row(scene, name, bodies), drive=number)
 
 
 def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Row]:
@@ -154,16 +211,8 @@ def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
 def drawn_jacobian(rows: list[Row], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
     """Row derivatives in the drawn position, lengths divided by `size`."""
     arrays = stacked(rows)
-    poses = (np.tile(np.eye(3), (1, bodies, 1, 1)), np.zeros((1, bodies, 3)))
-    f = features(arrays, poses, np.zeros(1))
-    return scaled(jacobian(arrays, f, bodies)[0], arrays, size)
-
-
-def scaled(J: Float[np.ndarray, "... m k"], rows: Rows, size: float) -> Float[np.ndarray, "... m k"]:
-    """J with gap rows and rotation columns in units of `size`: entries of order one."""
-    row = np.where(rows.kind == 0, 1 / size, 1.0)[:, None]
-    column = np.tile([size, size, size, 1.0, 1.0, 1.0], J.shape[-1] // 6)
-    return np.asarray(J * row * column)
+    f = features(arrays, resting_poses(1, bodies), np.zeros((1, len(arrays.angles))))
+    return np.asarray(jacobian(arrays, f, bodies, size)[0])
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:
@@ -178,12 +227,17 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
             f"({f'it would move {moves}' if moves else 'the joints hold every link'}; "
             "is an axis askew, or one joint too many?)"
         )
+    if mobility < drives:
+        raise MotionError(
+            f"{driven}: there must be no more drives than the linkage's mobility, {mobility}, got {drives}"
+        )
     if free == 0:
         return 0
     if mobility == drives:
+        angle = "drive angle 0 deg, " if drives == 1 else ""
         other = listed(_other_drives(scene, drawn), "or")
         raise MotionError(
-            f"{driven}: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
+            f"{driven}: the linkage locks (dead point) at {angle}the drawn position: "
             f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
     motions = free_motions(drawn)
@@ -198,12 +252,12 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
 
 
 def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
-    """Hinges on the ground that could drive the linkage from where it is drawn."""
+    """Joints whose drive could move the linkage from where it is drawn."""
     bodies = (GROUND, *drawn.links)
     out = []
     for name, joint in scene.joints.items():
-        if joint.kind == "revolute" and GROUND in joint.links and name not in scene.driven_joints:
-            row = drawn_jacobian([_drive_row(scene, name, bodies)], len(bodies), drawn.size)
+        if joint.kind in {"revolute", "prismatic"} and name not in scene.driven_joints:
+            row = drawn_jacobian([coordinate_row(scene, name, bodies)], len(bodies), drawn.size)
             if rank(np.concatenate([drawn.J[~drawn.driven], row])) == drawn.J.shape[1]:
                 out.append(name)
     return out
@@ -214,7 +268,10 @@ def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, 
     if not free:
         return []
     rows = [
-        row for name in scene.joints if name != scene.driven for row in joint_free_rows(scene, name, bodies)
+        row
+        for name in scene.joints
+        if name not in scene.driven_joints
+        for row in joint_free_rows(scene, name, bodies)
     ]
     _, _, Vt = scipy.linalg.svd(J)
     change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T

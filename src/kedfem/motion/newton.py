@@ -1,19 +1,13 @@
-"""Poses that close all joints, and their derivatives by the drive angle, at many drive angles at once."""
+"""Poses that close all joints, and their derivatives by the path's parameter, at many of its values at once."""
+
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from kedfem.motion.linkage import Linkage, scaled
-from kedfem.motion.rows import (
-    Features,
-    Poses,
-    Twists,
-    convective,
-    drive_derivative,
-    features,
-    jacobian,
-    residuals,
-)
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rows import Rows
+from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian, residuals
 
 SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding
 OPEN = 1e-6  # of the size: what joints of a redundant linkage may be out of true, far below any bearing's clearance
@@ -38,22 +32,73 @@ def cross_matrix(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
     return out - np.swapaxes(out, -1, -2)
 
 
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What the rows shall be at T time points.
+
+    q : (T, D) values of the drives [rad or m]
+    near : (T, A) turns of the angle rows, to within half a turn [rad]
+    over : (T, m) what rows have gathered over whole periods of the path, to be added; None: nothing
+    """
+
+    q: Float[np.ndarray, "T D"]
+    near: Float[np.ndarray, "T A"]
+    over: Float[np.ndarray, "T m"] | None = None
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def at(self, which: slice | Bool[np.ndarray, " T"]) -> "Target":
+        """Some of the time points."""
+        return Target(self.q[which], self.near[which], None if self.over is None else self.over[which])
+
+
+def remainder(rows: Rows, f: Features, aim: Target) -> Float[np.ndarray, "T m"]:
+    """Values of the constraints."""
+    rest = residuals(rows, f, aim.q)
+    return rest if aim.over is None else rest + aim.over
+
+
+def target(link: Linkage, tau: Float[np.ndarray, " T"], near: Float[np.ndarray, "T A"]) -> Target:
+    """The drives' values at τ; turns of their own rows are these, those of others near given ones."""
+    q, rows = link.drives.at(tau)[0], link.rows
+    near = near.copy()
+    for k, row in enumerate(rows.angles):
+        if row < rows.count and rows.drive[row] >= 0:
+            near[:, k] = q[:, rows.drive[row]]
+    return Target(q, near)
+
+
 class Factor:
     """QR of the scaled rows at T poses; least squares over all rows, so redundant ones need no choice."""
 
     def __init__(self, link: Linkage, f: Features) -> None:
         self.link, self.f, self.bodies = link, f, len(link.bodies)
-        self.row = np.where(link.rows.kind == 0, 1 / link.size, 1.0)
-        self.J = scaled(jacobian(link.rows, f, self.bodies), link.rows, link.size)
+        self.row = link.rows.scale(link.size)[: link.rows.count]
+        self.J = jacobian(link.rows, f, self.bodies, link.size)
         self.Q, self.U = np.linalg.qr(self.J)
 
     def twists(self, rhs: Float[np.ndarray, "T m"]) -> Twists:
         """Least-squares solution of J (v, ω) = rhs; the ground's are zero."""
         projected = np.swapaxes(self.Q, 1, 2) @ (rhs * self.row)[..., None]
-        x = np.linalg.solve(self.U, projected)[..., 0].reshape(len(rhs), -1, 6)
-        full = np.zeros((len(rhs), self.bodies, 6))
-        full[:, 1:] = x
-        return full[..., :3] * self.link.size, full[..., 3:]
+        return twists(self.link, np.linalg.solve(self.U, projected)[..., 0])
+
+
+def twists(
+    link: Linkage, x: Float[np.ndarray, "... k"]
+) -> tuple[Float[np.ndarray, "... B 3"], Float[np.ndarray, "... B 3"]]:
+    """Twists of all bodies from the scaled ones of all but the ground."""
+    full = np.zeros((*x.shape[:-1], len(link.bodies), 6))
+    full[..., 1:, :] = x.reshape(*x.shape[:-1], -1, 6)
+    return full[..., :3] * link.size, full[..., 3:]
+
+
+def of_drives(link: Linkage, rates: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
+    """Right-hand side of the rows from rates of the drives."""
+    out = np.zeros((len(rates), link.rows.count))
+    driven = np.flatnonzero(link.rows.drive >= 0)
+    out[:, driven] = rates[:, link.rows.drive[driven]]
+    return out
 
 
 def moved(poses: Poses, change: Twists) -> Poses:
@@ -68,39 +113,51 @@ def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]
 
 
 def closed(
-    link: Linkage, poses: Poses, phi: Float[np.ndarray, " T"], sweeps: int = 12
+    link: Linkage, poses: Poses, aim: Target, sweeps: int = 12
 ) -> tuple[Poses, Float[np.ndarray, " T"]]:
     """Newton: poses at which all rows vanish (redundant ones in the least squares), from poses close by.
 
     Parameters
     ----------
     poses : R (T, B, 3, 3), p (T, B, 3) first guess
-    phi : (T,) drive angles [rad]
 
     Returns
     -------
     poses, and (T,) the largest gap left, in units of size; infinite where Newton has not settled
     """
-    step = np.full(len(phi), np.inf)
+    step = np.full(len(aim), np.inf)
     for _ in range(sweeps):
-        f = features(link.rows, poses, phi)
+        f = features(link.rows, poses, aim.near)
         try:
-            change = Factor(link, f).twists(-residuals(f))
+            change = Factor(link, f).twists(-remainder(link.rows, f, aim))
         except np.linalg.LinAlgError:
-            return poses, np.full(len(phi), np.inf)
+            return poses, np.full(len(aim), np.inf)
         poses = moved(poses, change)
-        step = np.maximum(np.abs(change[0]).max(axis=(1, 2)) / link.size, np.abs(change[1]).max(axis=(1, 2)))
+        step = stride(link, change)
         if (step <= SETTLED).all() or not (step < 1).any():
             break
-    unit = np.where(link.rows.kind == 0, 1 / link.size, 1.0)
-    gap = np.abs(residuals(features(link.rows, poses, phi)) * unit)
-    return poses, np.where(step <= SETTLED, gap.max(axis=1), np.inf)
+    gap = gaps(link, poses, aim)
+    return poses, np.where(step <= SETTLED, gap.max(axis=1, initial=0.0), np.inf)
 
 
-def derivatives(link: Linkage, poses: Poses, phi: Float[np.ndarray, " T"]) -> tuple[Twists, Twists, Factor]:
-    """First and second derivatives of the motion by the drive angle, as twists: differentiated constraints."""
-    f = features(link.rows, poses, phi)
-    factor = Factor(link, f)
-    first = factor.twists(-drive_derivative(f))
-    second = factor.twists(-convective(link.rows, f, first, np.ones_like(phi)))
+def stride(link: Linkage, change: Twists) -> Float[np.ndarray, " T"]:
+    """How far twists move the bodies: the farthest, in the linkage's size and radians."""
+    v, theta = change
+    return np.asarray(np.maximum(np.abs(v).max(axis=(1, 2)) / link.size, np.abs(theta).max(axis=(1, 2))))
+
+
+def gaps(link: Linkage, poses: Poses, aim: Target) -> Float[np.ndarray, "T m"]:
+    """How far rows are from zero, in units of size."""
+    rest = remainder(link.rows, features(link.rows, poses, aim.near), aim)
+    return np.asarray(np.abs(rest * link.rows.scale(link.size)[: link.rows.count]))
+
+
+def derivatives(
+    link: Linkage, poses: Poses, tau: Float[np.ndarray, " T"], aim: Target
+) -> tuple[Twists, Twists, Factor]:
+    """First and second derivatives of the motion by τ, as twists: differentiated constraints."""
+    _, q1, q2 = link.drives.at(tau)
+    factor = Factor(link, features(link.rows, poses, aim.near))
+    first = factor.twists(of_drives(link, q1))
+    second = factor.twists(of_drives(link, q2) - convective(link.rows, factor.f, first))
     return first, second, factor

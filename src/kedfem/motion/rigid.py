@@ -7,9 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MotionError
+from kedfem.motion.batch import Moving, moving
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import OPEN, closed, cross_matrix, derivatives
-from kedfem.motion.path import Path, predicted
+from kedfem.motion.messages import place
+from kedfem.motion.newton import OPEN, cross_matrix
+from kedfem.motion.path import Path, aimed, predicted
 from kedfem.motion.rows import cross
 
 
@@ -22,7 +24,8 @@ class RigidMotion:
     omega, alpha : (T, B, 3) angular velocity and acceleration, world components [rad/s, rad/s²]
     v : (T, B, 3) p' [m/s]
     R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
-    omega_phi, v_phi : (T, B, 3) rotation and displacement of the origin per drive angle [-, m]
+    drives : (T, D) turn or travel of each drive [rad or m]; phi is the first of them
+    omega_drives, v_drives : (T, D, B, 3) rotation and displacement of the origin per turn or travel of each drive
     """
 
     t: Float[np.ndarray, " T"]
@@ -34,8 +37,19 @@ class RigidMotion:
     v: Float[np.ndarray, "T B 3"]
     R2: Float[np.ndarray, "T B 3 3"]
     p2: Float[np.ndarray, "T B 3"]
-    omega_phi: Float[np.ndarray, "T B 3"]
-    v_phi: Float[np.ndarray, "T B 3"]
+    drives: Float[np.ndarray, "T D"]
+    omega_drives: Float[np.ndarray, "T D B 3"]
+    v_drives: Float[np.ndarray, "T D B 3"]
+
+    @property
+    def omega_phi(self) -> Float[np.ndarray, "T B 3"]:
+        """Rotation per turn or travel of the first drive; zero without one [- or 1/m]."""
+        return self.omega_drives[:, 0] if self.drives.shape[1] else np.zeros_like(self.omega)
+
+    @property
+    def v_phi(self) -> Float[np.ndarray, "T B 3"]:
+        """Displacement of the origin per turn or travel of the first drive; zero without one [m or -]."""
+        return self.v_drives[:, 0] if self.drives.shape[1] else np.zeros_like(self.v)
 
     def part(self, first: int, end: int) -> "RigidMotion":
         """The time points from one number up to another."""
@@ -56,23 +70,26 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
     """Nominal motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
-    p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
-    return RigidMotion(t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, omega_phi, v_phi)
+    p, omega, alpha, v, p2 = np.zeros((5, len(t), bodies, 3))
+    none = np.zeros((len(t), 0, bodies, 3))
+    return RigidMotion(
+        t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, none[:, :, 0, 0], none, none
+    )
 
 
-Drive = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
+Along = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
 
 
-def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: Drive) -> RigidMotion:
+def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: Along) -> RigidMotion:
     """The rigid part of [KED, eqs. (2)(3)] at given times.
 
-    Newton from the nearest point of the path, then differentiated constraints.
+    Newton from the path, then differentiated constraints.
 
     Parameters
     ----------
-    along : path that covers the drive angles
+    along : path that covers the drive
     t : (T,) [s]
-    drive : angle, speed and acceleration of the drive at those times, each (T,) [rad, rad/s, rad/s²]
+    drive : place on the path and its derivatives, each (T,): turn or travel of the drive; of several t, 1, 0
 
     Raises
     ------
@@ -81,22 +98,26 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
     """
     if link.drive is None:
         return resting(len(link.bodies), t)
-    phi, speed, acceleration = drive
-    poses, worst = closed(link, predicted(along, phi), phi)
-    if worst.size and worst.max() > OPEN:
-        k = int(worst.argmax())
+    tau, speed, acceleration = (x[:, None] for x in drive)
+    q, q1, q2 = link.drives.at(drive[0])
+    rates = (q1 * speed, q2 * speed**2 + q1 * acceleration)
+    got = moving(link, along.rows, predicted(along, drive[0]), aimed(link, along, drive[0]), rates)
+    if got.gap.size and got.gap.max() > OPEN:
+        k = int(got.gap.argmax())
         raise MotionError(
-            f"joints: the linkage must close at all times, got an open joint ({worst[k] * link.size:.3g} m) "
-            f"at t = {t[k]:.6g} s, drive angle {np.degrees(phi[k]):.6g} deg"
+            f"joints: the linkage must close at all times, got an open joint ({got.gap[k] * link.size:.3g} m) "
+            f"at t = {t[k]:.6g} s, {place(link, float(tau[k, 0]), '.6g')}"
         )
-    first, second, _ = derivatives(link, poses, phi)
-    s, ss, a = speed[:, None, None], speed[:, None, None] ** 2, acceleration[:, None, None]
-    R, (v1, w1), (v2, w2) = poses[0], first, second
-    omega, alpha = w1 * s, w2 * ss + w1 * a
+    return _about_origin(link, t, q, got)
+
+
+def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got: Moving) -> RigidMotion:
+    """Bodies turn about the linkage's centre c in their poses: a point drawn at X is at p + c + R (X − c)."""
+    (R, p), (v, omega), (v2, alpha), (v_q, omega_q) = got.poses, got.first, got.second, got.partial
     W, c = cross_matrix(omega), link.centre
     R2 = (cross_matrix(alpha) + W @ W) @ R
-    # bodies turn about the linkage's centre c in their poses: a point is at p + c + R (X − c)
     c_now = R @ c
-    p, v_phi = poses[1] + c - c_now, v1 - cross(w1, c_now)
-    p2 = v2 * ss + v1 * a - R2 @ c
-    return RigidMotion(t, phi, R, p, omega, alpha, v_phi * s, R2, p2, w1, v_phi)
+    return RigidMotion(
+        t, q[:, 0], R, p + c - c_now, omega, alpha, v - cross(omega, c_now), R2, v2 - R2 @ c,
+        q, omega_q, v_q - cross(omega_q, c_now[:, None]),
+    )  # fmt: skip

@@ -33,7 +33,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
         *way_tables(ready.model),
         *second,
         _motion(ready),
-        mobility_table(ready.scene, mobility(ready.scene, ready.linkage, ready.path)),
+        mobility_table(ready.scene, ready.linkage, mobility(ready.scene, ready.linkage, ready.path)),
         *_actions(ready),
         *third,
         cost,

@@ -8,14 +8,17 @@ from rich.table import Table
 from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.freedom import of_joints
 from kedfem.motion.freedom import remedy as held_by
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.messages import place
 from kedfem.motion.mobility import Mobility
+from kedfem.report.words import with_prefix
 from kedfem.scene import Scene
 
 CLOSE = np.radians(20.0)  # of a dead point: forces of three times the load and more
 FAR = np.radians(30.0)  # estimates of joints from further away are rough
 
 
-def mobility_table(scene: Scene, found: Mobility) -> Table:
+def mobility_table(scene: Scene, link: Linkage, found: Mobility) -> Table:
     """Degrees of freedom, what is held twice, what is not held, and the nearest dead point."""
     table = Table(title="Mobility (as drawn)", show_header=False)
     driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
@@ -32,29 +35,31 @@ def mobility_table(scene: Scene, found: Mobility) -> Table:
         table.add_row("free", motion.words)
         if found.drives:
             table.add_row("to hold it", held_by(motion))
-    for row in _dead_point(found.dead_point):
+    for row in _dead_point(link, found.dead_point):
         table.add_row(*row)
     return table
 
 
-def _dead_point(found: DeadPoint | None) -> Iterator[tuple[str, str]]:
+def _dead_point(link: Linkage, found: DeadPoint | None) -> Iterator[tuple[str, str]]:
     if found is None:
         return
-    angle = np.degrees(found.angle)
     off = f"{np.degrees(FAR):.0f}° or more from it"
     if found.joint is not None and found.off < FAR:
         off = f"joint {found.joint} about {np.degrees(found.off):.2g}° from it"
     weakness = f"smallest singular value {found.weakness:.2g} of the largest"
-    yield "closest to a dead point", f"at {angle:.4g}°, {off} (estimated; {weakness})"
-    if found.beyond is not None:
-        beyond = np.degrees(found.beyond)
-        near = angle + np.copysign(beyond, angle)
-        yield (
-            "dead point outside the range",
-            f"about {beyond:.2g}° from its end, near {near:.3g}° (estimated)",
-        )
-    if min(found.off if found.joint else np.inf, found.beyond or np.inf) < CLOSE:
+    yield "closest to a dead point", f"at {place(link, found.tau, '.4g')}, {off} (estimated; {weakness})"
+    if found.outside is not None:
+        apart, near = _apart(link, abs(found.outside - found.tau)), place(link, found.outside, ".3g")
+        yield "dead point outside the range", f"about {apart} from its end, near {near} (estimated)"
+    if (found.joint is not None and found.off < CLOSE) or found.outside is not None:
         yield (
             "to keep away from it",
             "drive another joint, limit the drive, or let a flywheel carry the linkage through",
         )
+
+
+def _apart(link: Linkage, x: float) -> str:
+    """A length of the path in words."""
+    if len(link.drives) != 1:
+        return with_prefix(x, "s")
+    return f"{np.degrees(x):.2g}°" if link.drives.turning[0] else with_prefix(x, "m")

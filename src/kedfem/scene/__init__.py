@@ -2,11 +2,11 @@
 
 from kedfem.scene.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.damping import Damping, rayleigh
-from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, Gear, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import following, following_links, link_frames
 from kedfem.scene.initial import InitialMotion
-from kedfem.scene.laws import drive_angle, load_factor
+from kedfem.scene.laws import drive_angle, load_factor, path_parameter
 from kedfem.scene.links import GROUND, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
     Body,
@@ -50,6 +50,7 @@ __all__ = [
     "Flywheel",
     "ForceCurve",
     "ForceLoad",
+    "Gear",
     "Hole",
     "InitialMotion",
     "Joint",
@@ -92,6 +93,7 @@ __all__ = [
     "link_from",
     "load_factor",
     "part_geometry",
+    "path_parameter",
     "rayleigh",
     "read_scene",
     "scene_from",

@@ -7,11 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, get_args
 
-from kedfem.scene.faults import either, line
-from kedfem.scene.links import DIRECTED, GROUND, SQUARE
+from pydantic_core import PydanticCustomError
+
+from kedfem.scene.drives import SLIDING, TURNING
+from kedfem.scene.faults import either, line, place
+from kedfem.scene.links import DIRECTED, GROUND, SQUARE, JointKind
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
+
+if TYPE_CHECKING:
+    from kedfem.scene.scene import Scene
 
 SHAPES = {
     "solid": ["bar", "plate_link", "extrusion", "part", "mesh", "cad"],
@@ -48,9 +55,10 @@ def reference_faults(parts: Parts) -> Iterator[str]:
         link_name = user.word("link")
         if link_name is not None and parts.links and link_name not in parts.links:
             yield user.fault("link", unknown_name("a link", link_name, parts.links))
-    joint_name = parts.drive.word("joint")
-    if joint_name is not None and parts.joints and joint_name not in parts.joints:
-        yield parts.drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
+    for drive in parts.all_drives:
+        joint_name = drive.word("joint")
+        if joint_name is not None and parts.joints and joint_name not in parts.joints:
+            yield drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
 
 
 def link_names(joint: Entry) -> list[str]:
@@ -238,17 +246,77 @@ def connected(start: str, pairs: list[list[str]]) -> set[str]:
 
 
 def drive_faults(parts: Parts) -> Iterator[str]:
-    """A drive on a joint that is not a hinge on the ground."""
-    joint = parts.joints.get(parts.drive.word("joint") or "")
-    if joint is None:
+    """Drives on joints that cannot be driven, or twice, or with a law for another kind of joint."""
+    if parts.drive.where and parts.drives:
+        yield line(("drives",), "must stand without drive, got both")
+    met: dict[str, Entry] = {}
+    for drive in parts.all_drives:
+        joint = parts.joints.get(drive.word("joint") or "")
+        if joint is None:
+            continue
+        if joint.name in met:
+            other = place(met[joint.name].where)
+            yield drive.fault("joint", f"must name a joint of its own, got {joint.name!r} as in {other}")
+        met[joint.name] = drive
+        kind = joint.word("kind")
+        if kind in {"revolute", "prismatic"}:
+            yield from law_faults(drive, str(kind))
+        elif kind in get_args(JointKind):
+            wanted = "must name a revolute or prismatic joint"
+            yield drive.fault("joint", f"{wanted}, got {joint.name!r}, which is {kind}")
+
+
+def law_faults(drive: Entry, kind: str) -> Iterator[str]:
+    """A law of motion that is one of angles on a slide, or of travel on a hinge."""
+    motion = drive.raw.get("motion")
+    if not isinstance(motion, Mapping):
         return
-    kind = joint.word("kind")
-    if kind in {"spherical", "weld", "prismatic"}:
-        yield parts.drive.fault("joint", f"must name a revolute joint, got {joint.name!r}, which is {kind}")
-    names = link_names(joint)
-    if len(names) == 2 and GROUND not in names:
-        got = f"got {joint.name!r} of {names[0]!r} and {names[1]!r}"
-        yield parts.drive.fault("joint", f"must name a joint of a link and the ground, {got}")
+    wanted, other = ("travel", "angle") if kind == "prismatic" else ("angle", "travel")
+    if motion.get(other) is not None:
+        article = "an" if other == "angle" else "a"
+        yield drive.fault(
+            "motion", f"must be given as {wanted} of a {kind} joint, got {article} {other}", other
+        )
+    if (speed := motion.get("speed")) is not None:
+        try:
+            (SLIDING if kind == "prismatic" else TURNING).number(speed)
+        except PydanticCustomError as reason:
+            yield drive.fault("motion", reason.message(), "speed")
+
+
+def gear_faults(parts: Parts) -> Iterator[str]:
+    """Gears on joints that do not exist or do not turn."""
+    for gear in parts.gears.values():
+        names = gear.raw.get("joints")
+        if not isinstance(names, (list, tuple)) or len(names) != 2:
+            continue
+        if names[0] == names[1]:
+            yield gear.fault("joints", f"must be two different joints, got {names[0]!r} twice")
+        rack = gear.has("radius")
+        for i, (name, wanted) in enumerate(
+            zip(names, ("revolute", "prismatic" if rack else "revolute"), strict=True)
+        ):
+            joint = parts.joints.get(name) if isinstance(name, str) else None
+            if joint is None:
+                if parts.joints:
+                    yield gear.fault("joints", unknown_name("a joint", str(name), parts.joints), i)
+            elif joint.word("kind") in get_args(JointKind) and joint.word("kind") != wanted:
+                noun = f"the {('first', 'second')[i]} joint of a rack" if rack else "joints of gears"
+                got = f"got {joint.name!r}, which is {joint.word('kind')}"
+                yield gear.fault("joints", f"{noun} must be {wanted}, {got}", i)
+
+
+def elastic_drive_faults(scene: Scene) -> Iterator[str]:
+    """Drives and couplings that the rigid motion knows, but the elastic analysis not yet."""
+    if len(scene.driven_joints) > 1:
+        yield f"drives: must be one only in an elastic analysis, got {len(scene.driven_joints)}"
+    for name in scene.driven_joints:
+        joint = scene.joints[name]
+        if joint.kind != "revolute" or GROUND not in joint.links:
+            wanted = "must be a hinge between a link and the ground if an elastic analysis drives it"
+            yield f"joints.{name}: {wanted}, got a {joint.kind} joint of {joint.links[0]!r} and {joint.links[1]!r}"
+    if scene.gears:
+        yield "gears: must be left out in an elastic analysis, got some"
 
 
 def load_faults(parts: Parts) -> Iterator[str]:

@@ -1,30 +1,54 @@
-"""Drives: which joint turns, and how."""
+"""Drives: which joints turn or slide, and how; gears between joints."""
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Fault, FileName, Record, refuse
-from kedfem.scene.units import Angle, Duration, PositiveTime, Speed, Time
+from kedfem.scene.units import Angle, Duration, Length, Number, PositiveTime, Quantity, Time
+
+TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
+
+
+@dataclass(frozen=True, slots=True)
+class EitherSpeed(Quantity):
+    """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
+
+    def number(self, value: object) -> float:
+        """The SI number of a field that holds a number, or a string with a unit of either kind."""
+        try:
+            return TURNING.number(value)
+        except PydanticCustomError:
+            if isinstance(value, str):
+                with suppress(PydanticCustomError):
+                    return SLIDING.number(value)
+            raise
+
+
+DriveSpeed = Annotated[float, EitherSpeed("rad/s")]
+Teeth = Annotated[StrictInt, Field(ge=1)]
 
 
 class ConstantSpeed(Record):
-    """Turns at a constant speed: φ = ω t."""
+    """Turns, or slides, at a constant speed: φ = ω t."""
 
     kind: Literal["constant_speed"] = "constant_speed"
-    speed: Speed
-    """rotational speed, positive from x to y about z; rpm allowed in a string"""
+    speed: DriveSpeed
+    """rotational speed, positive from x to y about z; rpm allowed in a string; of a prismatic joint its speed"""
 
 
 class Ramp(Record):
     """Speeds up from rest, then turns at a constant speed."""
 
     kind: Literal["ramp"] = "ramp"
-    speed: Speed
-    """final speed"""
+    speed: DriveSpeed
+    """final speed: rotational, of a prismatic joint along it"""
     time: PositiveTime
     """duration of the speeding up"""
     shape: Literal["smooth", "linear"] = "smooth"
@@ -32,32 +56,72 @@ class Ramp(Record):
 
 
 class Table(Record):
-    """An angle given over time: a cubic spline (twice continuously differentiable, not-a-knot ends)."""
+    """An angle or a travel given over time: a cubic spline (twice continuously differentiable, not-a-knot ends)."""
 
     kind: Literal["table"] = "table"
     time: tuple[Time, ...] = ()
     """times, increasing, from 0 or before"""
     angle: tuple[Angle, ...] = ()
     """angle at these times, from the drawn position"""
+    travel: tuple[Length, ...] = ()
+    """of a prismatic joint: travel at these times, instead of angles"""
     file: FileName | None = None
-    """CSV file with two columns, time and angle, instead of the two lists; a heading may give the units:
+    """CSV file with two columns, time and angle (or travel), instead of the two lists; a heading may give the units:
     `time [s], angle [deg]`"""
+    smooth: Annotated[Any, Field()] = None
+    """how far a smoother curve may pass from the values, in the mean square; for values that are rounded or measured"""
 
     @model_validator(mode="after")
     def _one_row_per_time(self) -> Table:
+        key = "travel" if self.travel else "angle"
         if self.file is None:
-            refuse(table_faults(self.time, "angle", self.angle, at_least=2))
-        elif self.time or self.angle:
-            refuse([(("file",), "must stand without time and angle, got both")])
+            refuse(table_faults(self.time, key, self.values, at_least=2))
+        elif self.time or self.values:
+            refuse([(("file",), f"must stand without time and {key}, got both")])
+        if self.travel and self.angle:
+            refuse([(("travel",), "must stand without angle, got both")])
+        if self.smooth is None:
+            return self
+        try:
+            return self.fill(smooth=Quantity("m" if self.travel else "rad", above=0.0).number(self.smooth))
+        except PydanticCustomError as reason:
+            refuse([(("smooth",), reason.message())])
         return self
 
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Angles or travels."""
+        return self.travel or self.angle
 
-class Cycloidal(Record):
+
+class _Rise(Record):
+    """What laws that rise and return share."""
+
+    angle: Angle | None
+    travel: Length | None
+
+    @model_validator(mode="after")
+    def _one_rise(self) -> _Rise:
+        if self.angle is None and self.travel is None:
+            refuse([(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
+        if self.angle is not None and self.travel is not None:
+            refuse([(("travel",), "must stand without angle, got both")])
+        return self
+
+    @property
+    def height(self) -> float:
+        """Angle or travel."""
+        return self.angle if self.angle is not None else self.travel or 0.0
+
+
+class Cycloidal(_Rise):
     """Rise by an angle, dwell, return, dwell, and so on, by the cycloidal law: s = x − sin(2πx)/2π."""
 
     kind: Literal["cycloidal"] = "cycloidal"
-    angle: Angle
+    angle: Angle | None = None
     """the rise"""
+    travel: Length | None = None
+    """the rise of a prismatic joint, instead of an angle"""
     rise: PositiveTime
     """duration of the rise"""
     dwell: Duration = 0.0
@@ -68,14 +132,16 @@ class Cycloidal(Record):
     """duration of the dwell after the return, before it all repeats"""
 
 
-class Polynomial(Record):
+class Polynomial(_Rise):
     """Rise by an angle, dwell, return, dwell, and so on, by a polynomial law."""
 
     kind: Literal["polynomial"] = "polynomial"
     order: Literal[5, 7] = 5
     """5: the 3-4-5 polynomial, zero acceleration at the ends; 7: 4-5-6-7, zero jerk there too"""
-    angle: Angle
+    angle: Angle | None = None
     """the rise"""
+    travel: Length | None = None
+    """the rise of a prismatic joint, instead of an angle"""
     rise: PositiveTime
     """duration of the rise"""
     dwell: Duration = 0.0
@@ -90,12 +156,51 @@ MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial, Fie
 
 
 class Drive(Record):
-    """A hinge on the ground that turns in a given way."""
+    """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
 
     joint: str
-    """name of the driven joint: a revolute one between the ground and a link"""
+    """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
-    """how it turns, from the drawn position"""
+    """how it turns or slides, from the drawn position"""
+
+
+class Gear(Record):
+    """Gears, belts or a rack: two joints whose motions are in proportion.
+
+    A joint's motion is that of its first link that is not the ground against the other, about or along its axis.
+    """
+
+    joints: tuple[str, str]
+    """the two joints: A and B revolute; of a rack A revolute and B prismatic"""
+    ratio: Number | None = None
+    """turn of B per turn of A, positive in the same direction about their axes; not zero"""
+    teeth: tuple[Teeth, Teeth] | None = None
+    """numbers of teeth at A and B, instead of `ratio`: the ratio is −A/B, as wheels that mesh turn against each other"""
+    internal: StrictBool = False
+    """with teeth: whether one of the wheels is toothed inside, so that both turn the same way"""
+    radius: Length | None = None
+    """of a rack: travel of B per radian of A; negative if it runs against B's axis"""
+
+    @model_validator(mode="after")
+    def _one_of_three(self) -> Gear:
+        given = [key for key in ("ratio", "teeth", "radius") if getattr(self, key) is not None]
+        if not given:
+            refuse([(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
+        if len(given) > 1:
+            refuse([((given[1],), f"must stand without {given[0]}, got both")])
+        if self.internal and self.teeth is None:
+            refuse([(("internal",), "must be given with teeth only, got it without")])
+        for key in given:
+            if getattr(self, key) == 0.0:
+                refuse([((key,), "must not be zero, got 0")])
+        return self
+
+    @property
+    def transmission(self) -> float:
+        """Motion of the second joint per motion of the first [- or m]."""
+        if self.teeth is not None:
+            return (1 if self.internal else -1) * self.teeth[0] / self.teeth[1]
+        return self.radius if self.radius is not None else self.ratio or 0.0
 
 
 def table_faults(

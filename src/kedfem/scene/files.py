@@ -86,8 +86,8 @@ def part_geometry(path: Path) -> PartGeometry:
     return part
 
 
-def motion_table(path: Path) -> tuple[list[float], list[float]]:
-    """Times [s] and angles [rad] of a CSV file with two columns, under an optional heading with units.
+def motion_table(path: Path) -> tuple[list[float], str, list[float]]:
+    """Times [s], and `angle` [rad] or `travel` [m], of a CSV file with two columns, under an optional heading with units.
 
     Raises
     ------
@@ -95,19 +95,20 @@ def motion_table(path: Path) -> tuple[list[float], list[float]]:
         Not readable, or a line that is not two numbers.
     """
     rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
-    factors = (1.0, 1.0)
+    factors, key = (1.0, 1.0), "angle"
     if rows and not _numbers(rows[0][1]):
-        factors = _heading_factors(path, rows[0][1])
+        key = "travel" if "travel" in rows[0][1][-1] else "angle"
+        factors = _heading_factors(path, rows[0][1], key)
         rows = rows[1:]
     pairs = []
     for i, row in rows:
         numbers = _numbers(row)
         if numbers is None:
             raise SceneError(
-                f"{path.name}, line {i}: must be two numbers, time and angle, got {','.join(row)!r}"
+                f"{path.name}, line {i}: must be two numbers, time and {key}, got {','.join(row)!r}"
             )
         pairs.append(numbers)
-    return [time * factors[0] for time, _ in pairs], [angle * factors[1] for _, angle in pairs]
+    return [time * factors[0] for time, _ in pairs], key, [value * factors[1] for _, value in pairs]
 
 
 def _numbers(row: list[str]) -> tuple[float, float] | None:
@@ -118,32 +119,46 @@ def _numbers(row: list[str]) -> tuple[float, float] | None:
     return time, angle
 
 
-def _heading_factors(path: Path, row: list[str]) -> tuple[float, float]:
+def _heading_factors(path: Path, row: list[str], key: str) -> tuple[float, float]:
     """SI units per unit of each column, from a heading such as 'time [ms], angle [deg]'."""
     units = [re.search(r"\[(.*)\]", cell) for cell in row]
     if len(units) != 2:
-        raise SceneError(f"{path.name}, line 1: must head two columns, time and angle, got {','.join(row)!r}")
+        raise SceneError(f"{path.name}, line 1: must head two columns, time and {key}, got {','.join(row)!r}")
     try:
         time, angle = (
             si_number(f"1 {unit[1]}", si) if unit else 1.0
-            for unit, si in zip(units, ("s", "rad"), strict=True)
+            for unit, si in zip(units, ("s", "m" if key == "travel" else "rad"), strict=True)
         )
     except ValueError as reason:
-        raise SceneError(f"{path.name}, line 1: must have units of time and angle, got: {reason}") from None
+        raise SceneError(f"{path.name}, line 1: must have units of time and {key}, got: {reason}") from None
     return time, angle
 
 
-def with_motion_table(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """A raw scene with the motion table of its drive read from the file that it names; and faults."""
-    drive = raw.get("drive")
+def with_motion_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with the motion tables of its drives read from the files that they name; and faults."""
+    read: dict[str, Any] = dict(raw)
+    faults: list[str] = []
+    if isinstance(raw.get("drive"), Mapping):
+        read["drive"], faults = _with_motion_table("drive", raw["drive"], folder)
+    if isinstance(raw.get("drives"), Mapping):
+        tables = {
+            name: _with_motion_table(f"drives.{name}", each, folder) for name, each in raw["drives"].items()
+        }
+        read["drives"] = {name: drive for name, (drive, _) in tables.items()}
+        faults = faults + [fault for _, found in tables.values() for fault in found]
+    return read, faults
+
+
+def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[str]]:
     motion = drive.get("motion") if isinstance(drive, Mapping) else None
-    if not isinstance(drive, Mapping) or not isinstance(motion, Mapping):
-        return dict(raw), []
+    if not isinstance(motion, Mapping):
+        return drive, []
     named = motion.get("kind") == "table" and isinstance(motion.get("file"), str)
-    if not named or "time" in motion or "angle" in motion:
-        return dict(raw), []
+    if not named or any(key in motion for key in ("time", "angle", "travel")):
+        return drive, []
     try:
-        time, angle = motion_table(folder / motion["file"])
+        time, key, values = motion_table(folder / motion["file"])
     except SceneError as error:
-        return dict(raw), [f"drive.motion.file: {fault}" for fault in error.faults]
-    return {**raw, "drive": {**drive, "motion": {"kind": "table", "time": time, "angle": angle}}}, []
+        return drive, [f"{where}.motion.file: {fault}" for fault in error.faults]
+    others = {name: value for name, value in motion.items() if name != "file"}
+    return {**drive, "motion": {**others, "time": time, key: values}}, []

@@ -12,7 +12,7 @@ Frames = Literal["nominal", "following"]
 
 def link_frames(scene: Scene, name: str) -> Frames:
     """The frames of one link: its own choice, else that of the analysis."""
-    return scene.links[name].frames or scene.analysis.frames or default_frames(scene.drive is not None)
+    return scene.links[name].frames or scene.analysis.frames or default_frames(bool(scene.driven_joints))
 
 
 def default_frames(driven: bool) -> Frames:

@@ -115,7 +115,7 @@ def joint_of(parts: Parts, entry: Entry) -> Entry | None:
 
 def held_joint_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]:
     """A motor or spring on a joint that the drive moves, or between links with nominal frames."""
-    if parts.drive.word("joint") == joint.name:
+    if joint.name in parts.driven_joints:
         yield entry.fault("joint", f"must name a joint that the drive does not move, got {joint.name!r}")
     else:
         yield from nominal_faults(parts, entry, "joint", link_names(joint))
@@ -124,7 +124,9 @@ def held_joint_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]
 def nominal_faults(parts: Parts, entry: Entry, key: str, names: list[str]) -> Iterator[str]:
     """A motor or spring on links whose nominal frames leave its force no say: it depends on the state."""
     held = [parts.links[name] for name in names if name in parts.links]
-    driven = link_names(parts.joints[name]) if (name := parts.drive.word("joint")) in parts.joints else []
+    driven = [
+        link for name in parts.driven_joints & set(parts.joints) for link in link_names(parts.joints[name])
+    ]
     nominal = [
         link.name
         for link in held
@@ -170,7 +172,7 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[str]:
         got = f"got {joint.name!r}, which is {kind}"
         message = f"must be of a revolute or prismatic joint, {got}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
-    elif parts.drive.word("joint") == joint.name:
+    elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
     elif kind in AXES and isinstance(given, str) and not in_unit(given, AXES[kind]):

@@ -1,6 +1,8 @@
-"""The drive's angle and the loads' factors over time, in closed form."""
+"""The drives' angles or travels and the loads' factors over time, in closed form."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -9,12 +11,15 @@ from kedfem.errors import MotionError
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.loads import Factor
 
+if TYPE_CHECKING:
+    from kedfem.scene.scene import Scene
+
 Times = Float[np.ndarray, " t"]
 Law = tuple[Times, Times, Times]
 
 
 def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
-    """Angle of the driven joint and its derivatives.
+    """Angle, or travel, of a driven joint and its derivatives.
 
     Parameters
     ----------
@@ -24,7 +29,7 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
 
     Returns
     -------
-    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²]
+    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²; of a slide m, m/s, m/s²]
         Relative to the drawn position; right-hand derivatives where a law has a jump.
 
     Raises
@@ -46,6 +51,24 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
             return np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
 
 
+def path_parameter(scene: Scene, t: Times) -> Law:
+    """Place on the linkage's path and its derivatives: the drive's angle or travel; of several drives the time.
+
+    Parameters
+    ----------
+    t : (t,) [s]
+
+    Raises
+    ------
+    MotionError
+        A time outside the table of a table law.
+    """
+    if len(scene.driven_joints) < 2:
+        return drive_angle(scene.motion, t)
+    t = np.asarray(t, dtype=float)
+    return t, np.ones_like(t), np.zeros_like(t)
+
+
 def ramp(motion: Ramp, t: Times) -> Law:
     """A speed that rises from 0 to ω in T: linearly, or as ω/2 (1 − cos πt/T)."""
     w, T = motion.speed, motion.time
@@ -60,18 +83,59 @@ def ramp(motion: Ramp, t: Times) -> Law:
 
 
 def spline(motion: Table, t: Times) -> Law:
-    """The cubic spline through a table."""
-    from scipy.interpolate import CubicSpline
+    """The cubic spline through a table; with a tolerance the smoothest quintic one that passes so close."""
+    from scipy.interpolate import BSpline, CubicSpline, splrep
 
     first, last = motion.time[0], motion.time[-1]
     slack = 1e-9 * (last - first)
     if t.size and (t.min() < first - slack or t.max() > last + slack):
         wrong = t.min() if t.min() < first - slack else t.max()
         raise MotionError(
-            f"drive.motion.time: must reach t = {wrong:.6g} s, got a table from {first:.6g} to {last:.6g} s"
+            f"motion.time of a drive: must reach t = {wrong:.6g} s, got a table from {first:.6g} to {last:.6g} s"
         )
-    curve = CubicSpline(motion.time, motion.angle)
-    return curve(t), curve(t, 1), curve(t, 2)
+    if motion.smooth is None:
+        curve = CubicSpline(motion.time, motion.values)
+        return curve(t), curve(t, 1), curve(t, 2)
+    bound = len(motion.time) * motion.smooth**2
+    knots, coefficients, order = splrep(motion.time, motion.values, k=min(5, len(motion.time) - 1), s=bound)
+    smooth = BSpline(knots, coefficients, order)
+    return smooth(t), smooth(t, 1), smooth(t, 2)
+
+
+def table_noise(motion: Table) -> tuple[float, float]:
+    """How far the values of a table are out of a smooth curve, and what that makes of its acceleration.
+
+    Divided differences of growing order take away what is smooth; of independent errors of standard deviation σ a
+    difference whose weights have unit norm keeps σ. The least of those of orders 4 to 8 is the estimate (R. W. Hamming,
+    Numerical Methods for Scientists and Engineers, 1962, on the noise in a table). A second difference then has an
+    error of √6 σ/h², to be compared with the mean square of all of them. A harmonic motion sampled six times in a
+    period still counts as smooth; one of 30 deg amplitude at every degree of its phase, rounded to 0.01 deg, does not.
+
+    Returns
+    -------
+    σ [rad or m], and the share of the acceleration that is noise [-]; zeros of a table of fewer than 12 times
+    """
+    t, y = np.array(motion.time), np.array(motion.values)
+    if len(t) < 12:
+        return 0.0, 0.0
+    noise = min(_left_by_differences(t, y, order) for order in range(4, 9))
+    h = np.diff(t)
+    second = 2 * np.diff(np.diff(y) / h) / (h[1:] + h[:-1])
+    scale = float(np.sqrt(np.mean(second**2)))
+    rough = float(np.sqrt(6) * noise / np.median(h) ** 2)
+    return noise, rough / scale if scale > 0 else 0.0
+
+
+def _left_by_differences(t: Times, y: Times, order: int) -> float:
+    """Mean square of divided differences whose weights have unit norm."""
+    window = np.lib.stride_tricks.sliding_window_view
+    times, values = window(t, order + 1), window(y, order + 1)
+    apart = times[:, :, None] - times[:, None, :] + np.eye(order + 1)
+    span = (times[:, -1] - times[:, 0])[:, None, None] + 0 * apart
+    weights = 1 / np.prod(np.where(np.eye(order + 1) > 0, 1.0, apart / span), axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    left = ((values - values[:, :1]) * weights).sum(axis=1)
+    return float(np.sqrt(np.mean(left**2)))
 
 
 def rise_dwell(motion: Cycloidal | Polynomial, t: Times) -> Law:
@@ -79,14 +143,14 @@ def rise_dwell(motion: Cycloidal | Polynomial, t: Times) -> Law:
     rise, back = motion.rise, motion.return_time
     if back is None:
         s, ds, dds = unit_rise(motion, np.clip(t / rise, 0.0, 1.0))
-        return motion.angle * s, motion.angle / rise * ds, motion.angle / rise**2 * dds
+        return motion.height * s, motion.height / rise * ds, motion.height / rise**2 * dds
     top = rise + motion.dwell
     tau = np.mod(t, top + back + motion.dwell_after)
     falling = tau >= top
     span = np.where(falling, back, rise)
     s, ds, dds = unit_rise(motion, np.clip(np.where(falling, tau - top, tau) / span, 0.0, 1.0))
-    sign = np.where(falling, -1.0, 1.0) * motion.angle
-    return np.where(falling, motion.angle, 0.0) + sign * s, sign / span * ds, sign / span**2 * dds
+    sign = np.where(falling, -1.0, 1.0) * motion.height
+    return np.where(falling, motion.height, 0.0) + sign * s, sign / span * ds, sign / span**2 * dds
 
 
 def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:

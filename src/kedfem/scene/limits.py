@@ -9,10 +9,13 @@ from kedfem.errors import SceneError
 from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
+from kedfem.scene.laws import table_noise
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import FLAT, off_plane, spring_ends, vector
 from kedfem.scene.shapes import Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
+
+ROUGH = 0.05  # share of a table's acceleration that may be noise
 
 
 def planar_faults(parts: Parts) -> Iterator[str]:
@@ -86,44 +89,70 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
         yield analysis.fault(key, f"{wanted}, got {'neither' if parts.driven else 'nothing'}")
     if analysis.has("step") and analysis.has("steps_per_turn"):
         yield analysis.fault("step", "must stand without steps_per_turn, got both")
-    if parts.drive.record is not None:
-        yield from drive_and_analysis_faults(parts)
+    if parts.driven:
+        yield from open_fidelity_faults(parts)
+    drives = [drive for drive in parts.all_drives if drive.record is not None]
+    for drive in drives:
+        yield from drive_table_faults(parts, drive)
+    if len(parts.all_drives) == 1:
+        for drive in drives:
+            yield from drive_and_analysis_faults(parts, drive)
+    elif drives:
+        got = f"{len(parts.all_drives)} drives"
+        yield from steps_faults(parts, got, "one drive that goes on turning", "several drives")
 
 
-def drive_and_analysis_faults(parts: Parts) -> Iterator[str]:
-    """An analysis that does not suit the law of motion, or leaves links open without saying for which accuracy."""
+def open_fidelity_faults(parts: Parts) -> Iterator[str]:
+    """Links left open without saying for which accuracy."""
     for link in parts.links.values():
         if link.word("fidelity") == "auto" and not parts.analysis.has("accuracy"):
             yield link.fault("fidelity", "needs analysis.accuracy, e.g. 0.01, got none for 'auto'")
-    analysis, motion = parts.analysis, parts.drive.record.motion
-    if turning_speed(motion) == 0.0:
+
+
+def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[str]:
+    """An analysis that does not suit the law of motion of the only drive."""
+    motion, joint = drive.record.motion, parts.joints.get(drive.record.joint)
+    if joint is not None and joint.word("kind") == "prismatic":
+        yield from steps_faults(parts, "one on a prismatic joint")
+    elif turning_speed(motion) == 0.0:
         still = isinstance(motion, (ConstantSpeed, Ramp))
-        got = "speed 0" if still else f"{motion.kind!r}"
-        for key in ("turns", "steps_per_turn"):
-            if analysis.has(key):
-                instead = "end_time" if key == "turns" else "step"
-                yield analysis.fault(
-                    key, f"needs a drive that goes on turning (else {instead} [s]), got {got}"
-                )
-        if not any(analysis.has(key) for key in ("step", "steps_per_turn", "accuracy")):
-            yield analysis.fault(
-                "step", f"is required with a drive that does not go on turning [s], got {got}"
-            )
-    if isinstance(motion, Table) and motion.time:
-        yield from table_faults(parts, motion)
+        yield from steps_faults(parts, "speed 0" if still else f"{motion.kind!r}")
+
+
+def steps_faults(
+    parts: Parts, got: str, wanted: str = "a drive that goes on turning",
+    doing: str = "a drive that does not go on turning",
+) -> Iterator[str]:  # fmt: skip
+    """Turns that are asked for where there are none, and a step that is not given."""
+    analysis = parts.analysis
+    for key, instead in (("turns", "end_time"), ("steps_per_turn", "step")):
+        if analysis.has(key):
+            yield analysis.fault(key, f"needs {wanted} (else {instead} [s]), got {got}")
+    if not any(analysis.has(key) for key in ("step", "steps_per_turn", "accuracy")):
+        yield analysis.fault("step", f"is required with {doing} [s], got {got}")
+
+
+def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[str]:
+    """A motion table that does not cover the analysis or is too rough for it; a dwell without a return."""
+    motion = drive.record.motion
     stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
     if stays and motion.dwell_after > 0.0:
-        yield "drive.motion.dwell_after: must stand with return_time, got no return"
-
-
-def table_faults(parts: Parts, motion: Table) -> Iterator[str]:
-    """A motion table that does not cover the analysis."""
+        yield drive.fault("motion", "must stand with return_time, got no return", "dwell_after")
+    if not isinstance(motion, Table) or not motion.time:
+        return
     if motion.time[0] > 0.0:
-        yield f"drive.motion.time: must begin at 0 or before [s], got {motion.time[0]:.6g}"
+        wanted = f"must begin at 0 or before [s], got {motion.time[0]:.6g}"
+        yield drive.fault("motion", wanted, "time")
     end = parts.analysis.record.end_time if parts.analysis.record is not None else None
     if end is not None and end > motion.time[-1] * (1.0 + 1e-9):
         wanted = f"must reach the end of the analysis {end:.6g} [s]"
-        yield f"drive.motion.time: {wanted}, got {motion.time[-1]:.6g}"
+        yield drive.fault("motion", f"{wanted}, got {motion.time[-1]:.6g}", "time")
+    noise, share = table_noise(motion)
+    if motion.smooth is None and share > ROUGH:
+        key, unit = ("travel", "m") if motion.travel else ("angle", "rad")
+        wanted = "must be smooth enough for its acceleration to shake nothing (more digits, or smooth"
+        got = f"got values that scatter by {noise:.2g} [{unit}], {100 * share:.0f} % of the acceleration"
+        yield drive.fault("motion", f"{wanted} = {2 * noise:.1g}), {got}", key)
 
 
 def file_faults(parts: Parts) -> Iterator[str]:

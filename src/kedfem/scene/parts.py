@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from kedfem.scene.analysis import Analysis, Animation, Probe
 from kedfem.scene.damping import Damping
-from kedfem.scene.drives import Drive
+from kedfem.scene.drives import Drive, Gear
 from kedfem.scene.faults import line
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
@@ -29,6 +29,8 @@ TYPES: dict[str, Any] = {
     "springs": Spring,
     "probes": Probe,
     "drive": Drive,
+    "drives": Drive,
+    "gears": Gear,
     "damping": Damping,
     "analysis": Analysis,
     "animation": Animation,
@@ -97,6 +99,8 @@ class Parts:
     springs: dict[str, Entry]
     probes: dict[str, Entry]
     drive: Entry
+    drives: dict[str, Entry]
+    gears: dict[str, Entry]
     damping: Entry
     analysis: Entry
     animation: Entry
@@ -107,7 +111,17 @@ class Parts:
     @property
     def driven(self) -> bool:
         """Whether the scene has a drive, be it a good one or not."""
-        return bool(self.drive.where)
+        return bool(self.all_drives)
+
+    @property
+    def all_drives(self) -> list[Entry]:
+        """The drive or the drives."""
+        return [*([self.drive] if self.drive.where else []), *self.drives.values()]
+
+    @property
+    def driven_joints(self) -> set[str]:
+        """Names of the joints that are to be driven."""
+        return {name for drive in self.all_drives if (name := drive.word("joint")) is not None}
 
 
 def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
@@ -138,6 +152,8 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         springs=entries("springs", raw.get("springs")),
         probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
+        drives=entries("drives", raw.get("drives")),
+        gears=entries("gears", raw.get("gears")),
         damping=single("damping", raw.get("damping")),
         analysis=single("analysis", raw.get("analysis")),
         animation=single(

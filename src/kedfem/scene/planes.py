@@ -28,7 +28,7 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     known = {section: _entries(section, table) for section, table in tables.items()}
     probes = _entries("probes", scene.output.probes, "output")
     parts = Parts(
-        **known, probes=probes, drive=NONE, damping=NONE, analysis=NONE, animation=NONE,
+        **known, probes=probes, drive=NONE, drives={}, gears={}, damping=NONE, analysis=NONE, animation=NONE,
         gravity=scene.gravity, materials=[], folder=scene.folder,
     )  # fmt: skip
     return spatial_names(parts)

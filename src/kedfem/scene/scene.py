@@ -18,11 +18,18 @@ from pydantic import (
 from kedfem.errors import SceneError
 from kedfem.scene.analysis import Analysis, Output
 from kedfem.scene.base import Name, Record, plain
-from kedfem.scene.checks import drive_faults, joint_faults, link_faults, load_faults, reference_faults
+from kedfem.scene.checks import (
+    drive_faults,
+    gear_faults,
+    joint_faults,
+    link_faults,
+    load_faults,
+    reference_faults,
+)
 from kedfem.scene.damping import Damping
-from kedfem.scene.drives import Drive, MotionLaw
+from kedfem.scene.drives import Drive, Gear, MotionLaw
 from kedfem.scene.faults import fault_lines
-from kedfem.scene.files import scene_folder, with_motion_table
+from kedfem.scene.files import scene_folder, with_motion_tables
 from kedfem.scene.frames import default_frames
 from kedfem.scene.free import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
 from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
@@ -62,9 +69,13 @@ class Scene(Record):
     """the links by name"""
     joints: dict[Name, Joint] = Field(default_factory=dict)
     """the joints by name; required with a drive"""
+    gears: dict[Name, Gear] = Field(default_factory=dict)
+    """joints whose motions are in proportion: gears, belts, racks"""
     drive: Drive | None = None
     """what moves the mechanism; without one it moves by itself: under motors, springs, gravity and other loads, from its
     initial speeds, with frames that follow"""
+    drives: dict[Name, Drive] = Field(default_factory=dict)
+    """several drives, by name, instead of `drive`"""
     motors: dict[Name, Motor] = Field(default_factory=dict)
     """torques and forces on joints that are not driven"""
     springs: dict[Name, Spring] = Field(default_factory=dict)
@@ -96,18 +107,20 @@ class Scene(Record):
 
     @property
     def motion(self) -> MotionLaw | None:
-        """How the driven joint turns; None without a drive."""
-        return None if self.drive is None else self.drive.motion
+        """How the driven joint moves; None without a drive, and with several."""
+        drives = list(self.driven_joints.values())
+        return drives[0].motion if len(drives) == 1 else None
 
     @property
     def driven(self) -> str | None:
-        """Name of the driven joint; None without a drive."""
-        return None if self.drive is None else self.drive.joint
+        """Name of the driven joint, of several the first; None without a drive."""
+        return next(iter(self.driven_joints), None)
 
     @property
     def driven_joints(self) -> dict[str, Drive]:
         """The joints whose motion is prescribed, and the drive of each."""
-        return {} if self.drive is None else {self.drive.joint: self.drive}
+        own = [] if self.drive is None else [self.drive]
+        return {drive.joint: drive for drive in [*own, *self.drives.values()]}
 
     @property
     def results_folder(self) -> Path:
@@ -128,9 +141,9 @@ class Scene(Record):
             raw = {**raw, "links": {name: spelt_out(link) for name, link in links.items()}}
         if isinstance(analysis := raw.get("analysis"), Mapping) and analysis.get("accuracy") is not None:
             raw = {**raw, "links": left_open(raw.get("links"))}
-        raw, faults = with_motion_table(raw, scene_folder.get())
+        raw, faults = with_motion_tables(raw, scene_folder.get())
         faults = placement.faults + faults
-        if raw.get("drive") is not None and raw.get("joints", {}) == {}:
+        if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
             faults.append("joints: is required with a drive, got nothing")
         with known_points(placement):
             try:
@@ -141,7 +154,7 @@ class Scene(Record):
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
         if scene.analysis.frames is None:
-            scene.analysis.fill(frames=default_frames(scene.drive is not None))
+            scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))
         return scene
 
 
@@ -185,6 +198,7 @@ def cross_faults(parts: Parts) -> list[str]:
         link_faults,
         joint_faults,
         drive_faults,
+        gear_faults,
         load_faults,
         planar_faults,
         beam_faults,

@@ -41,6 +41,12 @@ def turning_speed(motion: MotionLaw | None) -> float:
     return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
 
 
+def scene_speed(scene: Scene) -> float:
+    """The speed [rad/s] at which the only drive of a scene goes on turning; 0 for a slide, for several and for none."""
+    slides = any(scene.joints[name].kind == "prismatic" for name in scene.driven_joints)
+    return 0.0 if slides else turning_speed(scene.motion)
+
+
 def time_of_turns(motion: MotionLaw, turns: float) -> float:
     """Time [s] at which a drive that goes on turning has made so many turns."""
     angle, speed = 2.0 * math.pi * turns, turning_speed(motion)
@@ -73,13 +79,14 @@ def time_grid(scene: Scene) -> TimeGrid:
     if analysis.step is not None:
         steps = max(1, math.ceil(end / analysis.step - 1e-9))
         return TimeGrid(end / steps, steps)
-    if not turning_speed(motion):
+    speed = scene_speed(scene)
+    if not speed:
         return TimeGrid(end / STEPS_PER_TURN, STEPS_PER_TURN)
-    step = 2.0 * math.pi / (turning_speed(motion) * (analysis.steps_per_turn or STEPS_PER_TURN))
+    step = 2.0 * math.pi / (speed * (analysis.steps_per_turn or STEPS_PER_TURN))
     return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
 
 
 def turn_steps(scene: Scene) -> float | None:
     """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
-    speed = turning_speed(scene.motion)
+    speed = scene_speed(scene)
     return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

@@ -1,0 +1,184 @@
+"""All time points at once: one or two small linear systems each, from a close prediction.
+
+A constant set of as many rows as motions, independent all along the path, takes the place of least squares over all
+rows; the others are only checked to be closed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float, Int
+
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.newton import SETTLED, Target, moved, remainder, stride, twists
+from kedfem.motion.rows import Rows
+from kedfem.motion.values import Poses, Twists, convective, features, jacobian
+
+EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
+QUADRATIC = 1e-7  # after such a step the next one would be rounding
+SWEEPS = 12
+SPREAD = 30.0  # how much worse a square set of rows may be conditioned than all rows
+TRIES = 4  # places on a path whose own best rows are tried for all of it
+POINTS = 250  # time points solved together: as many as stay in the cache
+
+Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Some rows of a linkage, with the numbers of their constraints and angles."""
+
+    rows: Rows
+    which: Int[np.ndarray, " k"]
+    angles: Int[np.ndarray, " a"]
+
+    def target(self, aim: Target) -> Target:
+        """What these rows shall be."""
+        over = None if aim.over is None else aim.over[:, self.which]
+        return Target(aim.q, aim.near[:, self.angles], over)
+
+
+def choice(rows: Rows, which: Int[np.ndarray, " k"]) -> Choice:
+    """Constraints picked by their numbers."""
+    part, angles = rows.part(which)
+    return Choice(part, which, angles)
+
+
+def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " k"]:
+    """Numbers of k rows that are about as well conditioned as all of them at G places; all rows where none are.
+
+    Parameters
+    ----------
+    J : scaled rows; least : (G,) their smallest singular values
+    """
+    m, k = J.shape[1:]
+    at = int(least.argmin())
+    for _ in range(TRIES if m > k else 0):
+        _, _, pivot = scipy.linalg.qr(J[at].T, pivoting=True, mode="economic")
+        which = np.sort(pivot[:k])
+        try:
+            worse = np.linalg.norm(np.linalg.inv(J[:, which]), axis=(1, 2)) * least
+        except np.linalg.LinAlgError:
+            return np.arange(m)
+        if worse.max() < SPREAD * np.sqrt(k):
+            return np.asarray(which)
+        at = int(worse.argmax())
+    return np.arange(m)
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """Poses and rates of all bodies at T time points.
+
+    poses : R (T, B, 3, 3), p (T, B, 3)
+    first, second : twists (v, ω) and their time derivatives, each a pair of (T, B, 3)
+    partial : (T, D, B, 3) each: twists per unit of each drive
+    gap : (T,) largest gap left, in units of size; infinite where Newton has not settled
+    """
+
+    poses: Poses
+    first: Twists
+    second: Twists
+    partial: tuple[Float[np.ndarray, "T D B 3"], Float[np.ndarray, "T D B 3"]]
+    gap: Float[np.ndarray, " T"]
+
+
+def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Target, rates: Rates) -> Moving:
+    """Poses that close all joints next to a guess, and the bodies' rates at given speeds and accelerations of the drives.
+
+    which : constraints to solve, square or in least squares; the others are checked
+    """
+    chosen = choice(link.rows, which)
+    rest = choice(link.rows, np.setdiff1d(np.arange(link.rows.count), which))
+    blocks = [slice(k, k + POINTS) for k in range(0, max(len(aim), 1), POINTS)]
+    parts = [
+        _block(link, chosen, rest, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b]))
+        for b in blocks
+    ]
+    return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Target, rates: Rates) -> Moving:
+    rows, own, bodies = chosen.rows, chosen.target(aim), len(link.bodies)
+    scale, columns = rows.scale(link.size)[: rows.count], drive_columns(rows, aim.q.shape[1])
+    rhs = np.empty((len(aim), rows.count, 1 + columns.shape[1]))
+    rhs[..., 1:] = columns * scale[:, None]
+    step = before = np.full(len(aim), np.inf)
+    for _ in range(SWEEPS):
+        f = features(rows, poses, own.near)
+        rhs[..., 0] = -scale * remainder(rows, f, own)
+        try:
+            solve = solver(jacobian(rows, f, bodies, link.size))
+            x = solve(rhs)
+        except np.linalg.LinAlgError:
+            return _one_by_one(link, chosen, rest, poses, aim, rates)
+        change = twists(link, x[..., 0])
+        before, step = step, stride(link, change)
+        poses = moved(poses, change)
+        if not (step > EXACT).any() or not (before > QUADRATIC).any() or not (step < 1).any():
+            break
+    if not (step <= SETTLED).all():
+        return _failed(poses, aim, step)
+    first = x[..., 1:] @ rates[0][..., None]
+    bent = convective(rows, f, twists(link, first[..., 0])) * -scale
+    second = x[..., 1:] @ rates[1][..., None] + solve(bent[..., None])
+    gap = _gap(link, rest, poses, aim)
+    by_drive = twists(link, np.swapaxes(x[..., 1:], 1, 2))
+    return Moving(poses, twists(link, first[..., 0]), twists(link, second[..., 0]), by_drive, gap)
+
+
+def solver(J: Float[np.ndarray, "T m k"]) -> Callable[[np.ndarray], np.ndarray]:
+    """Solution of J x = b; in least squares if there are more rows than unknowns."""
+    if J.shape[1] == J.shape[2]:
+        return partial(np.linalg.solve, J)
+    Q, U = np.linalg.qr(J)
+    return lambda b: np.linalg.solve(U, np.swapaxes(Q, 1, 2) @ b)
+
+
+def drive_columns(rows: Rows, drives: int) -> Float[np.ndarray, "m D"]:
+    """Right-hand sides of the rows for a unit of each drive."""
+    return np.asarray(rows.drive[:, None] == np.arange(drives), float)
+
+
+def _gap(link: Linkage, rest: Choice, poses: Poses, aim: Target) -> Float[np.ndarray, " T"]:
+    """The largest gap of rows that were not solved for."""
+    if not rest.rows.count:
+        return np.zeros(len(aim))
+    own = rest.target(aim)
+    left = remainder(rest.rows, features(rest.rows, poses, own.near), own)
+    return np.asarray(np.abs(left * rest.rows.scale(link.size)[: rest.rows.count]).max(axis=1))
+
+
+def _one_by_one(
+    link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Target, rates: Rates
+) -> Moving:
+    """Time points apart from each other, as the system of one is singular."""
+    if len(aim) == 1:
+        return _failed(poses, aim, np.full(1, np.inf))
+    each = [slice(k, k + 1) for k in range(len(aim))]
+    return _joined([
+        _block(link, chosen, rest, (poses[0][k], poses[1][k]), aim.at(k), (rates[0][k], rates[1][k]))
+        for k in each
+    ])  # fmt: skip
+
+
+def _failed(poses: Poses, aim: Target, step: Float[np.ndarray, " T"]) -> Moving:
+    """Points of which some have not settled; without rates."""
+    nothing = np.zeros_like(poses[1])
+    none = np.zeros((len(aim), aim.q.shape[1], *nothing.shape[1:]))
+    twist, gap = (nothing, nothing), np.where(step <= SETTLED, 0.0, np.inf)
+    return Moving(poses, twist, twist, (none, none), gap)
+
+
+def _joined(parts: list[Moving]) -> Moving:
+    """Successive time points, one after the other."""
+
+    def pair(name: str) -> tuple[np.ndarray, np.ndarray]:
+        one, other = ([getattr(x, name)[k] for x in parts] for k in (0, 1))
+        return np.concatenate(one), np.concatenate(other)
+
+    gap = np.concatenate([x.gap for x in parts])
+    return Moving(pair("poses"), pair("first"), pair("second"), pair("partial"), gap)
