@@ -114,7 +114,9 @@ class Breaking:
     def begin(self, states: Any) -> Any:
         return self.solver.begin(states)
 
-    def advance(self, state: Any, forcing: Sequence[Forcing], rows: Any = None) -> tuple[list[LinkHistory], Any]:
+    def advance(
+        self, state: Any, forcing: Sequence[Forcing], rows: Any = None
+    ) -> tuple[list[LinkHistory], Any]:
         links, state = self.solver.advance(state, forcing)
         if self.left <= len(forcing[0].R):
             links[1].g[self.left - 1 :] = np.nan

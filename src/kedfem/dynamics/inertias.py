@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import slider_axis
-from kedfem.dynamics.loads import Pattern, patterns
+from kedfem.dynamics.loads import Pattern, Times, amounts, patterns
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.places import slider_axis
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import Linkage, unit
@@ -33,7 +33,7 @@ class RigidLoad:
     force : (3,) Σ f at factor one, as drawn [N]
     moment : (3, 3) Σ X ⊗ f, X from the linkage's centre [N m]
     couple : about z, of planar beams [N m]
-    follows, factor : as in `Pattern`
+    follows, factor, share : as in `Pattern`
     """
 
     body: int
@@ -41,7 +41,8 @@ class RigidLoad:
     moment: Float[np.ndarray, "3 3"]
     couple: float
     follows: bool
-    factor: Callable[[Float[np.ndarray, " t"]], Float[np.ndarray, " t"]]
+    factor: Callable[[Times, Times], Times]
+    share: tuple[Vector, Vector] | None = None
 
 
 @dataclass(slots=True)
@@ -87,7 +88,9 @@ class Inertias:
         f = in_space(link, load.forces)
         arms = (link.X - np.outer(link.one, self.centre)) * [1, 1, 0 if link.planar else 1]
         couple = float(link.one @ load.forces[:, 2]) if link.kind == "beam" else 0.0
-        self.loads.append(RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor))
+        self.loads.append(
+            RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor, load.share)
+        )
 
     def centre_of(self, body: int) -> Vector | None:
         """Centre of mass of a body, as drawn [m]; None without mass."""
@@ -189,7 +192,7 @@ def _rate(motion: RigidMotion) -> Float[np.ndarray, "T B 3 3"]:
 
 def _load(load: RigidLoad, motion: RigidMotion) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
     """Force and moment of a load over time, about the point drawn at the linkage's centre."""
-    R, factor = motion.R[:, load.body], load.factor(motion.t)[:, None]
+    R, factor = motion.R[:, load.body], amounts(load, motion, load.body)[:, None]
     N = R @ load.moment
     force = np.broadcast_to(load.force, (len(R), 3))
     if load.follows:

@@ -6,6 +6,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -204,7 +205,19 @@ def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np
     return motion.p2[:, body, : link.d]
 
 
-def amounts(load: Pattern, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
+class Varying(Protocol):
+    """A load whose amount varies over time."""
+
+    @property
+    def factor(self) -> Callable[[Times, Times], Times]:
+        """As in `Pattern`."""
+
+    @property
+    def share(self) -> tuple[Vector, Vector] | None:
+        """As in `Pattern`."""
+
+
+def amounts(load: Varying, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
     """What a load's forces are multiplied by over time."""
     factor = load.factor(motion.t, motion.phi)
     if load.share is None:

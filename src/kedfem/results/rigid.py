@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.coupling import slider_axis
 from kedfem.dynamics.inertias import Inertias, acting
+from kedfem.dynamics.places import slider_axis
 from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import Reactions, reactions
