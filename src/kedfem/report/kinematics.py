@@ -5,7 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.kinematics import Moved, first_largest, worst_angle
-from kedfem.report.words import with_prefix
+from kedfem.report.words import NOTHING, with_prefix
 from kedfem.results.kinematic import transmission_key
 from kedfem.scene import Scene
 
@@ -54,13 +54,19 @@ def _forces(moved: Moved) -> Table:
     table = Table(title="Largest forces were all links rigid")
     for column in ("of", "largest", "at drive angle"):
         table.add_column(column, justify="left" if column == "of" else "right")
-    for name, (channel, values) in moved.results.channels.items():
-        if "/rigid_" in name:
-            size = np.linalg.norm(values, axis=1)
-            k = first_largest(size)
-            shown = float(values[k, 0]) if values.shape[1] == 1 else float(size[k])
-            of = name.replace("/rigid_", " ").replace("/", " ").removeprefix("joints ")
-            table.add_row(of, with_prefix(shown, channel.unit), f"{np.degrees(moved.results.angle[k]):.1f}°")
+    found = {name: x for name, x in moved.results.channels.items() if "/rigid_" in name}
+    highest: dict[str, float] = {}
+    for channel, values in found.values():
+        highest[channel.unit] = max(highest.get(channel.unit, 0.0), float(np.abs(values).max()))
+    for name, (channel, values) in found.items():
+        size = np.linalg.norm(values, axis=1)
+        k = first_largest(size)
+        shown = float(values[k, 0]) if values.shape[1] == 1 else float(size[k])
+        of = name.replace("/rigid_", " ").replace("/", " ").removeprefix("joints ")
+        if abs(shown) <= NOTHING * highest[channel.unit]:
+            table.add_row(of, "≈ 0", "")
+            continue
+        table.add_row(of, with_prefix(shown, channel.unit), f"{np.degrees(moved.results.angle[k]):.1f}°")
     return table
 
 
