@@ -23,16 +23,21 @@ def linkage_scene(
     drive: str | None = "A",
     motion: Mapping[str, Any] | None = None,
     sliders: tuple[str, ...] = (),
+    sections: Mapping[str, Any] | None = None,
     **analysis: Any,
 ) -> Scene:
-    """A scene of joints alone; every link is a small bar at its first joint, sliders are rigid; drive may be None."""
+    """A scene of joints alone; every link is a small bar at its first joint, sliders are rigid; drive may be None.
+
+    sections : further sections of the scene, such as gears or drives
+    """
     names = dict.fromkeys(link for joint in joints.values() for link in joint[1:3] if link != "ground")
     first = {link: np.asarray(j[3], float) for j in reversed(joints.values()) for link in j[1:3]}
     return scene_from(
         {
             "links": {name: {"fidelity": "rigid"} if name in sliders else bar(first[name]) for name in names},
-            "joints": {name: joint(*fields) for name, fields in joints.items()},
+            "joints": {name: {**joint(*fields[:5]), **dict(*fields[5:])} for name, fields in joints.items()},
             "analysis": {"end_time": 1.0, "step": 0.01, **analysis},
+            **(sections or {}),
             **({} if drive is None else {"drive": {"joint": drive, "motion": dict(motion or UNIT_SPEED)}}),
         }
     )

@@ -415,3 +415,25 @@ def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
                     assert ", got " in line or "unknown key, " in line, line
                     assert "function-" not in line, line
                     assert "Input should" not in line, line
+
+
+def test_a_table_rounded_to_whole_degrees_is_refused_with_its_place_and_remedy(tmp_path):
+    rows = [f"{k / 100},{round(90 * k / 100 * k / 100)}" for k in range(101)]
+    (tmp_path / "motion.csv").write_text("\n".join(["time [s],angle [deg]", *rows]))
+    motion = {"kind": "table", "file": "motion.csv"}
+    change = {"drive/motion": motion, "analysis": {"end_time": 1, "step": 0.1}}
+    (fault,) = faults_of(scene_from, changed(GOOD, change), tmp_path)
+    assert fault.startswith(
+        "drive.motion.angle: must be smooth enough for its acceleration to shake nothing (more digits"
+    )
+    assert "smooth = 0.01" in fault  # twice the 0.005 rad that rounding to 1 deg scatters by: 0.0175/√12
+    change["drive/motion"] = {**motion, "smooth": "0.5 deg"}
+    assert scene_from(changed(GOOD, change), tmp_path).motion.smooth == pytest.approx(0.00873, abs=1e-5)
+
+
+def test_a_table_of_travel_is_read_in_its_unit(tmp_path):
+    (tmp_path / "motion.csv").write_text("time [ms],travel [mm]\n0,0\n500,3\n1000,20\n")
+    change = {"drive": {"joint": "S", "motion": {"kind": "table", "file": "motion.csv"}}}
+    motion = scene_from(changed(BEAMS, change), tmp_path).motion
+    assert motion.time == (0.0, 0.5, 1.0)
+    assert motion.travel == pytest.approx((0.0, 0.003, 0.02))

@@ -25,6 +25,7 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
+from kedfem.scene.laws import table_noise
 
 TIMES = tuple(np.linspace(0.0, 2.0, 9))
 LAWS = {
@@ -179,3 +180,39 @@ def test_rayleigh_damping_has_the_given_ratio_at_both_frequencies():
         omega = 2.0 * math.pi * f
         assert_allclose(alpha / (2.0 * omega) + beta * omega / 2.0, ratio, rtol=1e-12)  # ζ = α/2ω + βω/2
     assert rayleigh(Damping(alpha=1.0, beta=2e-5)) == (1.0, 2e-5)
+
+
+def noisy(digits):
+    """A harmonic motion at every degree of its phase, 1 s a period, in degrees with so many digits."""
+    t = np.arange(361) / 360
+    return t, np.radians(np.round(30 * np.sin(2 * np.pi * t), digits))
+
+
+def test_the_noise_of_a_rounded_table_is_that_of_rounding():
+    """Standard deviation of rounding: a unit of the last digit by √12; acceleration error √6 σ/h² of 30° ω²/√2."""
+    t, angle = noisy(2)
+    sigma, share = table_noise(Table(time=tuple(t), angle=tuple(angle)))
+    assert_allclose(sigma, np.radians(0.01) / np.sqrt(12), rtol=0.15)
+    alone = np.sqrt(6) * sigma * 360**2 / (np.radians(30) * (2 * np.pi) ** 2 / np.sqrt(2))
+    assert_allclose(
+        share, alone / np.hypot(1, alone), rtol=0.15
+    )  # of all second differences, the noise among them
+    assert share > 0.05
+
+
+@pytest.mark.parametrize("points", [13, 25, 400])
+def test_a_smooth_table_has_no_noise_however_coarse(points):
+    t = np.sort(np.linspace(0, 1, points) + 0.1 / points * np.sin(np.arange(points)))
+    assert table_noise(Table(time=tuple(t), angle=tuple(np.sin(2 * np.pi * t))))[1] < 0.01
+
+
+def test_smoothing_mends_the_acceleration_of_a_rounded_table():
+    """Within 1 % of the true one between the ends; the spline through the rounded values is off by 10 % and more."""
+    t, angle = noisy(2)
+    times = np.linspace(0.1, 0.9, 777)
+    true = -math.radians(30) * (2 * np.pi) ** 2 * np.sin(2 * np.pi * times)
+    rough, smooth = (
+        np.abs(drive_angle(Table(time=tuple(t), angle=tuple(angle), smooth=s), times)[2] - true).max()
+        for s in (None, "0.003 deg")
+    )
+    assert smooth < 0.01 * np.abs(true).max() < 0.1 * np.abs(true).max() < rough

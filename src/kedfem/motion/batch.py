@@ -122,12 +122,12 @@ def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Targe
             break
     if not (step <= SETTLED).all():
         return _failed(poses, aim, step)
-    first = x[..., 1:] @ rates[0][..., None]
-    bent = convective(rows, f, twists(link, first[..., 0])) * -scale
-    second = x[..., 1:] @ rates[1][..., None] + solve(bent[..., None])
+    first, second = ((x[..., 1:] * rate[:, None]).sum(axis=2) for rate in rates)
+    bent = convective(rows, f, twists(link, first)) * -scale
+    second += solve(bent[..., None])[..., 0]
     gap = _gap(link, rest, poses, aim)
     by_drive = twists(link, np.swapaxes(x[..., 1:], 1, 2))
-    return Moving(poses, twists(link, first[..., 0]), twists(link, second[..., 0]), by_drive, gap)
+    return Moving(poses, twists(link, first), twists(link, second), by_drive, gap)
 
 
 def solver(J: Float[np.ndarray, "T m k"]) -> Callable[[np.ndarray], np.ndarray]:

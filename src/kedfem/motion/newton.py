@@ -10,6 +10,7 @@ from kedfem.motion.rows import Rows
 from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian, residuals
 
 SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding
+NEARLY = 1e-8  # what is as far from a rotation is one to rounding after a step
 OPEN = 1e-6  # of the size: what joints of a redundant linkage may be out of true, far below any bearing's clearance
 
 
@@ -108,8 +109,13 @@ def moved(poses: Poses, change: Twists) -> Poses:
 
 
 def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]:
-    """The rotation next to a matrix that almost is one: one Newton step R (3 − Rᵀ R)/2 of the polar decomposition."""
-    return np.asarray(R @ (1.5 * np.eye(3) - 0.5 * np.swapaxes(R, -1, -2) @ R))
+    """The rotation next to a matrix that almost is one: Newton steps R (3 − Rᵀ R)/2 to it, one or two."""
+    for _ in range(2):
+        off = np.swapaxes(R, -1, -2) @ R - np.eye(3)
+        R = R - 0.5 * (R @ off)
+        if np.abs(off).max(initial=0.0) < NEARLY:
+            break
+    return np.asarray(R)
 
 
 def closed(

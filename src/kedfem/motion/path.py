@@ -30,7 +30,7 @@ from kedfem.motion.values import Poses, Twists, features, turning
 JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
 CONTRACTION = 0.1  # Newton's second step against its first: well within the branch's own basin
 SMALLEST_STEP = 1e-6  # of a usual step
-FARTHEST = 0.2  # turn of a body between grid points [rad]
+FARTHEST = 0.8  # turn of a body between grid points [rad]
 ROUNDING = 1e-12  # of τ against a usual step
 WEAK, SINGULAR = 0.05, 1e-7  # relative singular values: worth a closer look; a dead point
 MOST_TURNS = 60  # that a linkage may take to return to its pose
@@ -153,7 +153,7 @@ def predicted(along: Path, tau: Float[np.ndarray, " T"]) -> Poses:
     for power in range(4, -1, -1):
         x *= s
         x += along.curve[k, power]
-    return orthonormal(orthonormal(x[:, : 9 * B].reshape(-1, B, 3, 3))), x[:, 9 * B :].reshape(-1, B, 3)
+    return orthonormal(x[:, : 9 * B].reshape(-1, B, 3, 3)), x[:, 9 * B :].reshape(-1, B, 3)
 
 
 def aimed(link: Linkage, along: Path, tau: Float[np.ndarray, " T"]) -> Target:
