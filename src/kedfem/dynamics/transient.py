@@ -124,7 +124,7 @@ def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
     grid = time_grid(scene)
     h = min(grid.step, grid.end / (INSTANTS - 1))
     t = h * np.arange(INSTANTS)
-    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, drive_angle(scene.motion, t)))
+    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, path_parameter(scene, t)))
     return None if rows is None else first_rows(rows, h)
 
 
