@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from kedfem.scene.checks import fidelity, link_names
+from kedfem.scene.checks import fidelity, is_slide, link_names
 from kedfem.scene.drives import Drive
 from kedfem.scene.free import any_following
 from kedfem.scene.links import GROUND, Joint
@@ -68,7 +68,8 @@ def slider_faults(joint: Entry, parts: Parts) -> Iterator[str]:
     names = link_names(joint)
     for name in names:
         link = parts.links.get(name)
-        guide = joint.word("kind") == "prismatic" and GROUND in names
-        if link is not None and fidelity(link) == "rigid" and not link.has("shape") and not guide:
+        slides = any(is_slide(other) and name in link_names(other) for other in parts.joints.values())
+        bare = link is not None and fidelity(link) == "rigid" and not link.has("shape")
+        if bare and slides and not is_slide(joint):
             wanted = f"must join links with a shape by a {joint.word('kind')} joint"
             yield joint.fault("links", f"{wanted}, got {name!r}, a rigid slider: give it a shape")
