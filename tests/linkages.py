@@ -10,7 +10,9 @@ from kedfem.motion.path import path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from
 
-JointTable = Mapping[str, tuple[Any, ...]]  # name: kind, link, link, at[, axis]
+JointTable = Mapping[
+    str, tuple[Any, ...]
+]  # name: kind, link, link, at[, axis; of a universal joint both axes]
 UNIT_SPEED = {"kind": "constant_speed", "speed": 1.0}  # rad/s: time is the drive angle
 RISE = {"kind": "cycloidal", "rise": 1.0}  # with an angle: a drive that speeds up and slows down within 1 s
 Z = (0.0, 0.0, 1.0)
@@ -46,13 +48,17 @@ def bar(at: np.ndarray) -> dict[str, Any]:
 
 def joint(kind: str, one: str, other: str, at: Any, axis: Any = None) -> dict[str, Any]:
     fields = {"kind": kind, "links": [one, other], "at": [float(x) for x in at]}
-    return fields if axis is None else {**fields, "axis": [float(x) for x in axis]}
+    if axis is None:
+        return fields
+    if kind == "universal":
+        return {**fields, "axes": [[float(x) for x in each] for each in axis]}
+    return {**fields, "axis": [float(x) for x in axis]}
 
 
 def moved_scene(joints: JointTable, R: np.ndarray, p: np.ndarray) -> dict[str, tuple[Any, ...]]:
     """The same joints, everything turned by R and shifted by p."""
     return {
-        name: (kind, one, other, R @ np.asarray(at) + p, *(R @ np.asarray(a) for a in axis))
+        name: (kind, one, other, R @ np.asarray(at) + p, *(np.asarray(a) @ R.T for a in axis))
         for name, (kind, one, other, at, *axis) in joints.items()
     }
 

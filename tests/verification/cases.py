@@ -22,6 +22,7 @@ MODULES = (
     "rotation",
     "stiffening",
     "kinematics",
+    "spatial_kinematics",
     "mechanisms",
     "nominal_frames",
     "following",

@@ -24,6 +24,7 @@ from tests.linkages import (
     spatial_slider_crank,
     turned,
 )
+from tests.spatial_linkages import universal_rssr, universal_slider_crank
 
 from .cases import Row, case
 
@@ -39,11 +40,11 @@ def in_time(curve: Curve, drive: Curve) -> Curve:
     return y, y1 * speed, y2 * speed**2 + y1 * acceleration
 
 
-def errors(name: str, got: Curve, wanted: Curve, model: str) -> list[Row]:
+def errors(name: str, got: Curve, wanted: Curve, model: str, cap: float = CAP) -> list[Row]:
     """Greatest errors over the motion, relative to the greatest value of each derivative."""
     what = (name, f"speed of the {name}", f"acceleration of the {name}")
     return [
-        Row(f"{q}, greatest error over a turn", 0.0, float(np.abs(g - w).max() / np.abs(w).max()), CAP, model)
+        Row(f"{q}, greatest error over a turn", 0.0, float(np.abs(g - w).max() / np.abs(w).max()), cap, model)
         for q, g, w in zip(what, got, wanted, strict=True)
     ]
 
@@ -130,16 +131,25 @@ def planar_slider_crank() -> list[Row]:
 def slider_crank_in_space() -> list[Row]:
     """Crank 0.08 m about an axis along x at y = 0.1, z = 0.12; rod 0.3 m; slider on x: x² = l² − y_B² − z_B².
 
-    A ball at the crank; at the slider a universal joint (a cross body), so that the rod cannot spin.
+    A ball at the crank; at the slider a universal joint, or its cross as a body, so that the rod cannot spin.
     """
     drawn = 0.3
-    got, drive = slider_x(spatial_slider_crank(drawn))
+    crossed = "4 links, 3 revolutes, a ball, a slide"
+    universal = "3 links, a revolute, a ball, a universal joint, a slide"
+    return [
+        *_slider_in_space(spatial_slider_crank(drawn), drawn, crossed),
+        *_slider_in_space(universal_slider_crank(drawn), drawn, universal),
+    ]
+
+
+def _slider_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:
+    got, drive = slider_x(joints)
     sin, cos = np.sin(drawn + drive[0]), np.cos(drawn + drive[0])
     w = 0.1**2 + 0.12**2 + 0.08**2 + 0.16 * (0.12 * cos - 0.1 * sin)
     w1, w2 = 0.16 * (-0.12 * sin - 0.1 * cos), 0.16 * (-0.12 * cos + 0.1 * sin)
     x = np.sqrt(0.3**2 - w)
     wanted = in_time((x, -w1 / (2 * x), -w2 / (2 * x) - w1**2 / (4 * x**3)), drive)
-    return errors("slider", got, wanted, "4 links, 3 revolutes, a ball, a slide")
+    return errors("slider", got, wanted, model)
 
 
 @case("Cardan joint", "closed form of any textbook: tan φ2 = tan φ1 / cos β")
@@ -199,7 +209,14 @@ def bricard() -> list[Row]:
 def spatial_four_bar() -> list[Row]:
     """Crank 0.1 m about z, rocker 0.25 m about x; one ball is a universal joint, so that the coupler cannot spin."""
     drawn = 1.0
-    joints = rssr(drawn)
+    crossed, universal = "4 links, 4 revolutes, a ball", "3 links, 2 revolutes, a ball, a universal joint"
+    return [
+        *_rocker_in_space(rssr(drawn), drawn, crossed),
+        *_rocker_in_space(universal_rssr(drawn), drawn, universal),
+    ]
+
+
+def _rocker_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:
     got, drive = angle_of(joints, "rocker", (1.0, 0.0, 0.0), drawn)
     phi, r = drive[0], RSSR_ROCKER
     length2 = ((np.subtract(*rssr_points(np.zeros(()), np.asarray(drawn)))) ** 2).sum()
@@ -222,4 +239,4 @@ def spatial_four_bar() -> list[Row]:
     rates = implicit(
         dot(d, P1), -dot(d, Q1), dot(P1, P1) + dot(d, P2), -dot(P1, Q1), dot(Q1, Q1) - dot(d, Q2)
     )
-    return errors("rocker angle", got, in_time((psi, *rates), drive), "4 links, 4 revolutes, a ball")
+    return errors("rocker angle", got, in_time((psi, *rates), drive), model)

@@ -47,7 +47,7 @@ def choice(rows: Rows, which: Int[np.ndarray, " k"]) -> Choice:
     return Choice(part, which, angles)
 
 
-def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " k"]:
+def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " i"]:
     """Numbers of k rows that are about as well conditioned as all of them at G places; all rows where none are.
 
     Parameters

@@ -8,8 +8,8 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.motion.freedom import RANK_TOLERANCE
 from kedfem.motion.linkage import (
-    RANK_TOLERANCE,
     Linkage,
     drawn_jacobian,
     joint_axis,

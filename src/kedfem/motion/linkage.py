@@ -12,6 +12,9 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.drives import Drives, drives
+from kedfem.motion.freedom import RANK_TOLERANCE, Drawn, free_motions, listed, rank
+from kedfem.motion.freedom import remedy as held_by
+from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.rows import (
     ANGLE,
     Row,
@@ -27,7 +30,6 @@ from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Joint, Scene, following_links
 
 GROUND = "ground"
-RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +71,23 @@ def linkage(scene: Scene) -> Linkage:
     MotionError
         If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
     """
+    rows, driven, drawn = _drawn(scene)
+    J, bodies, size = drawn.J, (GROUND, *drawn.links), drawn.size
+    if driven:
+        free = _check_mobility(scene, drawn)
+        held = _holding(scene, J, bodies, size, free)
+        J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
+    else:
+        free = J.shape[1] - rank(J)
+    names = tuple(row.joint for row in rows)
+    start = resting_poses(1, len(bodies))
+    return Linkage(
+        bodies, stacked(rows), names, size, drawn.centre, _redundant(J, names), driven, start, free
+    )
+
+
+def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
+    """All rows of joints, couplings and drives, and their derivatives as drawn."""
     bodies = (GROUND, *scene.links)
     points, centre = joint_points(scene), scene_centre(scene)
     size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
@@ -76,27 +95,32 @@ def linkage(scene: Scene) -> Linkage:
     rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
     rows += [_gear_row(scene, name, bodies) for name in scene.gears]
     rows += [_drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
-    J = drawn_jacobian(rows, len(bodies), size)
-    if driven:
-        free = _check_mobility(J, rows, bodies, driven, following_links(scene))
-        held = _holding(scene, J, bodies, size, free)
-        J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
-    else:
-        free = J.shape[1] - _rank(J)
-    names = tuple(row.joint for row in rows)
-    start = resting_poses(1, len(bodies))
-    return Linkage(bodies, stacked(rows), names, size, centre, _redundant(J, names), driven, start, free)
+    J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
+    moves = np.array([row.drive is not None for row in rows], bool)
+    return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
+
+
+def drawn_linkage(scene: Scene) -> Drawn:
+    """A scene's linkage to first order as drawn; nothing is refused."""
+    return _drawn(scene)[2]
+
+
+def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
+    """Rows that joints would have if they were of a kind that holds less; driven joints are left as they are."""
+    bodies = (GROUND, *drawn.links)
+    out = {}
+    for name, joint in sorted(
+        scene.joints.items(), key=lambda each: GROUND in each[1].links
+    ):  # bearings stay, if they can
+        for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
+            rows = _rows_of(scene, name, bodies, drawn.centre, kind)
+            out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
+    return out
 
 
 def resting_poses(times: int, bodies: int) -> Poses:
     """All bodies as drawn."""
     return np.tile(np.eye(3), (times, bodies, 1, 1)), np.zeros((times, bodies, 3))
-
-
-def _rank(J: Float[np.ndarray, "m k"]) -> int:
-    """Number of independent rows."""
-    s = scipy.linalg.svdvals(J) if len(J) else np.zeros(0)
-    return int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
 
 
 def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
@@ -120,14 +144,17 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
     return unit(joint.axis or (0.0, 0.0, 1.0))
 
 
-def _rows_of(scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray) -> list[Row]:
+def _rows_of(
+    scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray, kind: str | None = None
+) -> list[Row]:
+    """Rows of a joint, of its own kind or another."""
     joint = scene.joints[name]
     axis: np.ndarray | tuple[np.ndarray, np.ndarray] | None = None if joint.axis is None else unit(joint.axis)
     i, j = _pair(joint, bodies)
     if joint.axes is not None:
         one, other = (unit(each) for each in joint.axes)
         axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
-    rows = joint_rows(joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
+    rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
     if joint.lead is not None:
         travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
         rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
@@ -188,39 +215,52 @@ def drawn_jacobian(rows: list[Row], bodies: int, size: float) -> Float[np.ndarra
     return np.asarray(jacobian(arrays, f, bodies, size)[0])
 
 
-def _check_mobility(
-    J: np.ndarray, rows: list[Row], bodies: tuple[str, ...], driven: Drives, following: frozenset[str]
-) -> int:
-    """How many motions the drives leave free; they must be of links whose frames follow."""
-    _, s, Vt = scipy.linalg.svd(J)
-    rank = int((s > RANK_TOLERANCE * s[0]).sum())
-    without = J[[row.drive is None for row in rows]]
-    mobility = J.shape[1] - int(np.linalg.matrix_rank(without, tol=RANK_TOLERANCE * s[0]))
-    joints = ", ".join(f"joints.{name}" for name in driven.joints)
+def _check_mobility(scene: Scene, drawn: Drawn) -> int:
+    """How many motions the drive leaves free; they must be of links whose frames follow."""
+    k, drives = int(drawn.J.shape[1]), int(drawn.driven.sum())
+    free, mobility = k - rank(drawn.J), k - rank(drawn.J[~drawn.driven])
+    driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
     if mobility == 0:
+        moves = would_move(drawn, looser_rows(scene, drawn))
         raise MotionError(
-            f"{joints}: its drive must be able to move the linkage, got a structure without any mobility "
-            "(the joints hold every link; is an axis askew, or one joint too many?)"
+            f"{driven}: its drive must be able to move the linkage, got a structure without any mobility "
+            f"({f'it would move {moves}' if moves else 'the joints hold every link'}; "
+            "is an axis askew, or one joint too many?)"
         )
-    if mobility < len(driven):
+    if mobility < drives:
         raise MotionError(
-            f"{joints}: there must be no more drives than the linkage's mobility, {mobility}, got {len(driven)}"
+            f"{driven}: there must be no more drives than the linkage's mobility, {mobility}, got {drives}"
         )
-    if rank == J.shape[1]:
+    if free == 0:
         return 0
-    if mobility == len(driven):
-        angle = "drive angle 0 deg, " if len(driven) == 1 else ""
+    if mobility == drives:
+        angle = "drive angle 0 deg, " if drives == 1 else ""
+        other = listed(_other_drives(scene, drawn), "or")
         raise MotionError(
-            f"{joints}: the linkage locks (dead point) at {angle}the drawn position: "
-            "draw it at another angle or drive another joint"
+            f"{driven}: the linkage locks (dead point) at {angle}the drawn position: "
+            f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
-    null = Vt[rank:].reshape(-1, len(bodies) - 1, 6)
-    if following.issuperset(_moving(null, bodies[1:])):
-        return len(null)
+    motions = free_motions(drawn)
+    if following_links(scene).issuperset(link for each in motions for link in each.links):
+        return free
+    words = "; ".join(each.words for each in motions)
     raise MotionError(
         "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
-        f'{_free_motion(null, bodies[1:])} (with analysis.frames = "following" they may)'
+        f"{words}; free motions: {free} (remedy: {'; '.join(held_by(each) for each in motions)}; "
+        'or let these links have frames = "following")'
     )
+
+
+def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
+    """Joints whose drive could move the linkage from where it is drawn."""
+    bodies = (GROUND, *drawn.links)
+    out = []
+    for name, joint in scene.joints.items():
+        if joint.kind in {"revolute", "prismatic"} and name not in scene.driven_joints:
+            row = drawn_jacobian([coordinate_row(scene, name, bodies)], len(bodies), drawn.size)
+            if rank(np.concatenate([drawn.J[~drawn.driven], row])) == drawn.J.shape[1]:
+                out.append(name)
+    return out
 
 
 def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[Row]:
@@ -237,24 +277,6 @@ def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, 
     change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T
     _, _, order = scipy.linalg.qr(change.T, pivoting=True, mode="economic")
     return [rows[k] for k in order[:free]]
-
-
-def _moving(null: np.ndarray, links: tuple[str, ...]) -> list[str]:
-    """The links that take part in free motions."""
-    norm = np.linalg.norm(null, axis=2).max(axis=0)
-    return [name for name, x in zip(links, norm, strict=True) if x > 1e-6]
-
-
-def _free_motion(null: np.ndarray, links: tuple[str, ...]) -> str:
-    """Free motions in words: which links can still turn or slide, and how."""
-    norm, moving = np.linalg.norm(null, axis=2).max(axis=0), _moving(null, links)
-    most = int(norm.argmax())
-    v, omega = null[np.linalg.norm(null[:, most], axis=1).argmax(), most].reshape(2, 3)
-    verb = "turn about" if np.linalg.norm(omega) > 1e-6 else "slide along"
-    d = omega if verb == "turn about" else v
-    d = d / np.linalg.norm(d) * np.sign(d[np.abs(d).argmax()])
-    direction = "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(d, 6)) + ")"
-    return f"link '{links[most]}' can {verb} {direction}; links that move: {', '.join(moving)}; free motions: {len(null)}"
 
 
 def _redundant(J: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -10,9 +10,13 @@ from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.analysis import frame_steps
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost
+from kedfem.motion.freedom import of_joints
 from kedfem.motion.initial import initial_twists
+from kedfem.motion.messages import place
+from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
 from kedfem.report.links import link_table, way_tables
+from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
 from kedfem.report.words import NOTHING, with_prefix
 from kedfem.scene import LineSpring, Motor, Spring, time_grid
@@ -31,6 +35,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
         *way_tables(ready.model),
         *second,
         _motion(ready),
+        mobility_table(ready.scene, ready.linkage, mobility(ready.scene, ready.linkage, ready.path)),
         *_actions(ready),
         *third,
         cost,
@@ -54,22 +59,9 @@ def resolution_table(found: Resolution) -> Table:
 def _motion(ready: Prepared) -> Table:
     along: Path = ready.path
     table = Table(title="Rigid motion", show_header=False)
-    weakness, angle = along.weakest
-    low, high = np.degrees(along.phi[[0, -1]])
-    over = "repeats every turn" if along.periodic else f"{low:.4g}° to {high:.4g}°"
-    driven = ready.scene.driven is not None
-    table.add_row(
-        "drive", f"joint {ready.scene.driven}, {over}" if driven else "none: the mechanism moves by itself"
-    )
-    if ready.linkage.mobility or not driven:
-        table.add_row("free motions", str(ready.linkage.mobility))
-    if driven:
-        table.add_row(
-            "closest to a dead point",
-            f"at {np.degrees(angle):.4g}° (smallest singular value {weakness:.2g} of the largest)",
-        )
-    if ready.linkage.redundant:
-        table.add_row("redundant joint equations", "at joints " + ", ".join(ready.linkage.redundant))
+    names = tuple(ready.scene.driven_joints)
+    driven, joints = bool(names), of_joints(names)
+    table.add_row("drive", f"{joints}, {_over(ready)}" if driven else "none: the mechanism moves by itself")
     for where, speed in _initial_speeds(ready):
         table.add_row(where, speed)
     if not driven:
@@ -80,6 +72,17 @@ def _motion(ready: Prepared) -> Table:
         ).max()
         table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the drawn position")
     return table
+
+
+def _over(ready: Prepared) -> str:
+    """The range of the drives in words."""
+    link, along = ready.linkage, ready.path
+    if not along.periodic:
+        return " to ".join(place(link, float(tau), ".4g") for tau in along.phi[[0, -1]])
+    turns = along.period / (2 * np.pi)
+    if len(link.drives) > 1:
+        return f"repeats every {with_prefix(along.period, 's')}"
+    return "repeats every turn" if round(turns) == 1 else f"repeats every {turns:.4g} turns"
 
 
 def _actions(ready: Prepared) -> list[Table]:

@@ -1,0 +1,102 @@
+"""How close a linkage comes to a dead point over the drive's range, estimated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.newton import Factor, moved
+from kedfem.motion.path import Path
+from kedfem.motion.values import Poses, features
+from kedfem.scene import Scene
+
+SEARCHED = np.radians(
+    60.0
+)  # joints, and drives beyond their range (slides by size, times by a quarter of the path)
+FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singular value vanishes
+
+
+@dataclass(frozen=True, slots=True)
+class DeadPoint:
+    """Where over its range a linkage is nearest to a dead point.
+
+    weakness : smallest singular value of the rows there, of the largest
+    tau : place on the path: turn or travel of the drive, of several the time [rad, m or s]
+    joint, off : the joint that would have to turn most to get into a dead point, and by how much [rad], estimated; None
+        where that is far
+    outside : τ at which the path, led on beyond that end, would meet one, estimated; None if the weakest
+        position is not at an end, or that is far
+    """
+
+    weakness: float
+    tau: float
+    joint: str | None = None
+    off: float = 0.0
+    outside: float | None = None
+
+
+def nearest_dead_point(scene: Scene, link: Linkage, along: Path) -> DeadPoint:
+    """The weakest position on a path, and the dead point beside it."""
+    weakness, tau = along.weakest
+    k = int(np.abs(along.phi - tau).argmin())
+    joint, off = _off(scene, link, (along.R[k : k + 1], along.p[k : k + 1]), along.near[k : k + 1])
+    ends = not along.periodic and k in {0, len(along.phi) - 1}
+    return DeadPoint(weakness, tau, joint, off, _outside(link, along, k) if ends else None)
+
+
+def _rows(link: Linkage, poses: Poses, near: Float[np.ndarray, "T A"]) -> Float[np.ndarray, "T m k"]:
+    """Scaled derivatives of the rows."""
+    return Factor(link, features(link.rows, poses, near)).J
+
+
+def _off(
+    scene: Scene, link: Linkage, poses: Poses, near: Float[np.ndarray, "1 A"]
+) -> tuple[str | None, float]:
+    """The joint that turns most on the way to the singular position, and by how much.
+
+    All bodies are moved along the motion v that the rows hold least, joints left open to second order, until uᵀ J v is
+    zero; here it is the smallest singular value.
+    """
+    U, _, Vt = np.linalg.svd(_rows(link, poses, near)[0], full_matrices=False)
+    u, v = U[:, -1], Vt[-1]
+    twist = np.concatenate([np.zeros((1, 6)), v.reshape(-1, 6)])
+    number = {name: k for k, name in enumerate(link.bodies)}
+    turns = {
+        name: float(np.linalg.norm(np.subtract(*(twist[number[each], 3:] for each in joint.links))))
+        for name, joint in scene.joints.items()
+    }
+    joint = max(turns, key=lambda name: turns[name], default=None)
+    if joint is None or turns[joint] < 1e-3:
+        return None, 0.0
+    s = np.arange(-120, 121) / 120 * SEARCHED / turns[joint]
+    there = (np.repeat(poses[0], len(s), 0), np.repeat(poses[1], len(s), 0))
+    there = moved(there, (s[:, None, None] * twist[:, :3] * link.size, s[:, None, None] * twist[:, 3:]))
+    held = np.einsum("m,tmk,k->t", u, _rows(link, there, np.repeat(near, len(s), 0)), v)
+    change = np.flatnonzero(held[:-1] * held[1:] <= 0)
+    if not len(change):
+        return None, 0.0
+    zeros = s[change] + held[change] / (held[change] - held[change + 1]) * (s[1] - s[0])
+    return joint, float(np.abs(zeros).min() * turns[joint])
+
+
+def _outside(link: Linkage, along: Path, k: int) -> float | None:
+    """Where beyond an end of the path the least singular value σ would vanish.
+
+    With x inward from the end, d to the dead point: σ² = c (d + x) at a limit of the drive, σ = c (d + x) where two
+    branches meet; whichever fits the next three points of the path better.
+    """
+    near = np.arange(k, k + 3) if k == 0 else np.arange(k, k - 3, -1)
+    if len(along.phi) < len(near):
+        return None
+    s = np.linalg.svd(_rows(link, (along.R[near], along.p[near]), along.near[near]), compute_uv=False)
+    x, sigma = np.abs(along.phi[near] - along.phi[k]), s[:, -1] / s[:, 0]
+    trials = []
+    for power in (FOLD, CROSSING):
+        y = sigma ** (1 / power)
+        slope = (y[1] - y[0]) / x[1]
+        misfit = abs(y[0] + slope * x[2] - y[2]) / abs(y[2] - y[0])
+        trials.append((misfit, y[0] / slope if slope > 0 else np.inf))
+    distance = float(min(trials)[1])
+    far = SEARCHED * link.drives.units[0] if len(link.drives) == 1 else np.ptp(along.phi) / 4
+    return float(along.phi[k]) + (-distance if k == 0 else distance) if distance < far else None

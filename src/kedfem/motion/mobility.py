@@ -1,0 +1,50 @@
+"""What a linkage can do, holds twice, and comes close to: in words that name links and joints."""
+
+from dataclasses import dataclass
+
+from kedfem.motion.dead_point import DeadPoint, nearest_dead_point
+from kedfem.motion.freedom import FreeMotion, free_motions, rank
+from kedfem.motion.linkage import Linkage, drawn_linkage, looser_rows
+from kedfem.motion.path import Path
+from kedfem.motion.redundancy import Redundant, redundancy, redundant, remedy
+from kedfem.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Mobility:
+    """Degrees of freedom of a linkage as drawn, and what is amiss with them.
+
+    freedom : motions that the joints leave, drives free
+    drives : how many of them are driven
+    equations, redundancy : of the joints, and how many of these others imply
+    redundant : what they hold redundantly, by joints
+    remedy : how to do without; empty where nothing is redundant
+    free : motions that drives leave free
+    dead_point : nearest over the drive's range; None where nothing is driven, or no loop is closed that could lock
+    """
+
+    freedom: int
+    drives: int
+    equations: int
+    redundancy: int
+    redundant: tuple[Redundant, ...]
+    remedy: str
+    free: tuple[FreeMotion, ...]
+    dead_point: DeadPoint | None
+
+
+def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
+    """Degrees of freedom, redundant equations, free motions and the nearest dead point of a linkage."""
+    drawn = drawn_linkage(scene)
+    held = drawn.J[~drawn.driven]
+    count, loops = redundancy(drawn), len(scene.joints) - len(scene.links)
+    return Mobility(
+        freedom=drawn.J.shape[1] - rank(held),
+        drives=int(drawn.driven.sum()),
+        equations=len(held),
+        redundancy=count,
+        redundant=tuple(redundant(drawn)) if count else (),
+        remedy=remedy(drawn, looser_rows(scene, drawn)) if count else "",
+        free=tuple(free_motions(drawn)),
+        dead_point=nearest_dead_point(scene, link, along) if loops and drawn.driven.any() else None,
+    )
