@@ -111,3 +111,67 @@ def cardan(kind: str = "cylindrical", bend: float = 0.4, **analysis: Any) -> dic
     }
     steps = {"turns": 0.5, "steps_per_turn": 360, "initial": "quasi-static", "rho_inf": 0.9, **analysis}
     return {"links": links, "joints": joints, "drive": turning("300 rpm"), "analysis": steps}
+
+
+def rising(angle: float, key: str = "angle") -> dict[str, Any]:
+    return {"kind": "cycloidal", key: angle, "rise": 0.1}
+
+
+TENTH = {"end_time": 0.12, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static"}
+
+
+def two_drives() -> dict[str, Any]:
+    """An arm of two links, both of whose joints are driven."""
+    return {
+        "links": {"one": bar("beam", (0, 0), (0.3, 0)), "two": bar("beam", (0.3, 0), (0.5, 0))},
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "one"], "at": [0, 0]},
+            "B": {"kind": "revolute", "links": ["one", "two"], "at": [0.3, 0]},
+        },
+        "drives": {"a": {"joint": "A", "motion": rising(1.0)}, "b": {"joint": "B", "motion": rising(-1.5)}},
+        "analysis": dict(TENTH),
+    }
+
+
+def driven_slide() -> dict[str, Any]:
+    """A beam that is pushed across itself."""
+    return {
+        "links": {"one": bar("beam", (0, 0), (0.3, 0))},
+        "joints": {"A": {"kind": "prismatic", "links": ["one", "ground"], "at": [0, 0], "axis": "y"}},
+        "drive": {"joint": "A", "motion": rising(0.1, "travel")},
+        "analysis": dict(TENTH),
+    }
+
+
+def geared() -> dict[str, Any]:
+    """Two beams on the ground whose hubs mesh; the first is driven over a shaft that gives."""
+    return {
+        "links": {"one": bar("beam", (0, 0), (0.3, 0)), "two": bar("beam", (0.5, 0), (0.7, 0))},
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "one"], "at": [0, 0]},
+            "B": {"kind": "revolute", "links": ["ground", "two"], "at": [0.5, 0]},
+        },
+        "gears": {"g": {"joints": ["A", "B"], "teeth": [20, 40]}},
+        "drive": {"joint": "A", "shaft_stiffness": 500.0, "shaft_damping": 0.1, "motion": rising(1.0)},
+        "analysis": dict(TENTH),
+    }
+
+
+def turned(raw: dict[str, Any], R: np.ndarray) -> dict[str, Any]:
+    """A scene of beams in space, turned as a whole."""
+
+    def vector(x: Any) -> list[float]:
+        return [float(c) for c in R @ np.asarray(x, float)]
+
+    links = {
+        name: {**link, "shape": {**link["shape"], "points": [vector(p) for p in link["shape"]["points"]],
+                                 "up": vector(link["shape"]["up"])}}
+        for name, link in raw["links"].items()
+    }  # fmt: skip
+    joints = {
+        name: {**joint, "at": vector(joint["at"])}
+        | ({"axis": vector(joint["axis"])} if "axis" in joint else {})
+        | ({"axes": [vector(a) for a in joint["axes"]]} if "axes" in joint else {})
+        for name, joint in raw["joints"].items()
+    }
+    return {**raw, "links": links, "joints": joints}

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.dynamics.places import part_seat, slider_axis
 from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import Own, Ways, row_joint
+from kedfem.dynamics.row_ports import Own, Ways, gear_joint, row_joint
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, port_weights
@@ -133,15 +133,16 @@ def joined(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways
     unknowns = len(sliders)
     rows: list[tuple[RowJoint, list[Own | None]]] = []
     columns: list[list[int]] = []  # of each side's own unknowns
+    held_by_rows = [row_joint(scene, name, links, ways) for name in scene.joints if needs_rows(scene, name)]
+    for row, own in [*held_by_rows, *(gear_joint(scene, name, links, ways) for name in scene.gears)]:
+        if all(each is None for each in own):
+            continue
+        for each in own:
+            columns.append(_own_columns(ports, row.name, each, first_of, unknowns))
+            unknowns += len(columns[-1]) if each is not None and each.key else 0
+        rows.append((row, own))
     for name, joint in scene.joints.items():
         if needs_rows(scene, name):
-            row, own = row_joint(scene, name, links, ways)
-            if own == [None, None]:
-                continue
-            for each in own:
-                columns.append(_own_columns(ports, name, each, first_of, unknowns))
-                unknowns += len(columns[-1]) if each is not None and each.key else 0
-            rows.append((row, own))
             continue
         elastic = {link.name for link in links.values()}
         seats = dict(part_seat(scene, name, links, link) for link in joint.links if link in elastic)
@@ -191,13 +192,19 @@ def _on(
 ) -> Iterator[RowJoint]:
     """Joints with rows on the interface unknowns, as these turned out."""
     of_side = iter(columns)
-    for row, own in rows:
+
+    def on(row: RowJoint, own: Iterator[Own | None]) -> RowJoint:
         sides = [
             None if side is None or each is None
             else replace(side, onto=(each.selection @ Z[here]).reshape(*side.onto.shape[:2], -1))
             for side, each, here in zip(row.sides, own, of_side, strict=False)
         ]  # fmt: skip
-        yield replace(row, sides=(sides[0], sides[1]))
+        return replace(
+            row, sides=(sides[0], sides[1]), plus=tuple((c, on(other, own)) for c, other in row.plus)
+        )
+
+    for row, own in rows:
+        yield on(row, iter(own))
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first: int) -> int:
@@ -334,7 +341,7 @@ def port_points(
     if links[next(iter(seats))].planar:
         return _plane_points(scene, name, joint, seats)
     seat = next(iter(seats.values()))
-    driven = scene.driven == name
+    driven = name in scene.driven_joints
     if joint.kind == "revolute":
         axis = joint_axis(joint)
         half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
@@ -372,7 +379,7 @@ def _unheld(link: Link) -> str:
 def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
     """The joint's point and, where turning is held, others: along a slide, else along the narrowest seat, and across."""
     at = np.asarray(joint.at)
-    if joint.kind == "revolute" and scene.driven != name:
+    if joint.kind == "revolute" and name not in scene.driven_joints:
         return at[None, :]
     narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
     along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
@@ -406,7 +413,7 @@ def _widest_across(seat: Seat, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray
 
 def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:
     """Which of a port's components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
-    turning = scene.driven == name or joint.kind in {"weld", "prismatic"}
+    turning = name in scene.driven_joints or joint.kind in {"weld", "prismatic"}
     if not any(link.planar for link in held):
         return [0, 1, 2]
     if not turning or all(link.kind == "plane" for link in held):

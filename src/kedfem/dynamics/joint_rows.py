@@ -63,21 +63,23 @@ def joint_rows(joints: Sequence[RowJoint], motion: RigidMotion) -> JointRows | N
 
 def rows_over(joint: RowJoint, motion: RigidMotion) -> Float[np.ndarray, "T r k"]:
     """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns."""
-    sides, on_ports = [side for side in joint.sides if side is not None], port_rows(joint, motion)
-    shares = [np.tensordot(on, side.onto, ((2, 3), (0, 1))) for on, side in zip(on_ports, sides, strict=True)]
-    C, size = np.sum(shares, axis=0), np.sqrt(sum((on**2).sum(axis=(2, 3)) for on in on_ports))
+    shares = port_rows(joint, motion)
+    C = np.sum([np.tensordot(on, side.onto, ((2, 3), (0, 1))) for side, on in shares], axis=0)
+    size = np.sqrt(sum((on**2).sum(axis=(2, 3)) for _, on in shares))
     C[np.linalg.norm(C, axis=2) < REPEATED * size] = 0.0
     return np.asarray(C)
 
 
-def port_rows(joint: RowJoint, motion: RigidMotion) -> list[Float[np.ndarray, "T r _ _"]]:
+def port_rows(joint: RowJoint, motion: RigidMotion) -> list[tuple[Side, Float[np.ndarray, "T r _ _"]]]:
     """Rows of one joint on the displacements at the ports of each of its sides that has any, world components."""
     along = directions(joint, motion)
-    return [
-        sign * _side_rows(side, joint, along, motion)
+    own = [
+        (side, sign * _side_rows(side, joint, along, motion))
         for side, sign in zip(joint.sides, (1.0, -1.0), strict=True)
         if side is not None
     ]
+    others = [(side, c * rows) for c, other in joint.plus for side, rows in port_rows(other, motion)]
+    return own + others
 
 
 def directions(joint: RowJoint, motion: RigidMotion) -> Directions:

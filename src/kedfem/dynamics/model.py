@@ -36,7 +36,6 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
-from kedfem.scene.checks import elastic_drive_faults
 
 T = TypeVar("T")
 
@@ -127,8 +126,6 @@ def elastic_model(
     SceneError
         If a load or body does not fit its link.
     """
-    if faults := list(elastic_drive_faults(scene)):
-        raise SceneError(faults)
     cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
     links = {
         key: part
@@ -141,8 +138,8 @@ def elastic_model(
             on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     carried = tuple(
-        Carried(rigid(links.pop(name)), linkage.bodies.index(name), str(scene.driven), ())
-        for name in list(cut) if moves_with_drive(scene, name)
+        Carried(rigid(links.pop(name)), linkage.bodies.index(name), hub, ())
+        for name in list(cut) if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
         raise SceneError(
@@ -199,12 +196,12 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
     ]
 
 
-def moves_with_drive(scene: Scene, name: str) -> bool:
-    """Whether a link is rigid and turns on the ground with the drive."""
-    rigid_ = scene.links[name].fidelity == "rigid"
-    return rigid_ and any(
-        name in scene.joints[x].links and not needs_rows(scene, x) for x in scene.driven_joints
-    )
+def hub_of(scene: Scene, name: str) -> str | None:
+    """The driven joint by which a link, if it is rigid, turns on the ground with a drive."""
+    if scene.links[name].fidelity != "rigid":
+        return None
+    driven = (x for x in scene.driven_joints if name in scene.joints[x].links and not needs_rows(scene, x))
+    return next(driven, None)
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:

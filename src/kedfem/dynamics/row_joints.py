@@ -15,11 +15,9 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat
 from kedfem.links.stations import Stations
-from kedfem.motion.linkage import joint_axis, unit
+from kedfem.motion.linkage import unit
 from kedfem.motion.rows import perpendiculars
-from kedfem.scene import GROUND, Joint, Scene
-
-SHARED = ("revolute", "spherical", "weld")  # kinds whose links share port points
+from kedfem.scene import GROUND, Joint, Scene, holds_by_rows
 
 Ports = Float[np.ndarray, "p 3"]
 
@@ -55,6 +53,7 @@ class RowJoint:
     cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
     stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
     axis : (3,) of the joint, as drawn
+    plus : rows of other joints that these are combined with, each with its coefficient: gears
     """
 
     name: str
@@ -67,15 +66,12 @@ class RowJoint:
     stiffness: Float[np.ndarray, " r"]
     damping: Float[np.ndarray, " r"]
     axis: Float[np.ndarray, "3"]
+    plus: "tuple[tuple[float, RowJoint], ...]" = ()
 
 
 def needs_rows(scene: Scene, name: str) -> bool:
     """Whether a joint holds by rows: where shared port points cannot say what it holds."""
-    joint = scene.joints[name]
-    grounded, driven = GROUND in joint.links, name in scene.driven_joints
-    if joint.kind in SHARED:
-        return driven and not grounded
-    return joint.kind != "prismatic" or driven or not grounded
+    return holds_by_rows(scene.joints[name], scene.driven_joints.get(name))
 
 
 def ordered(joint: Joint) -> tuple[str, str]:
@@ -95,14 +91,11 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
 
 def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
     """Directions of what a joint holds, as drawn: gap and turn of each row."""
-    zero = np.zeros(3)
+    zero, frame = np.zeros(3), joint_frame(joint)
     if joint.kind in {"spherical", "weld", "universal"}:
-        gaps, turns = list(np.eye(3)), list(np.eye(3)) if joint.kind == "weld" else []
-        if joint.kind == "universal":
-            turns = [zero]  # follows both axes
-        return _stacked(gaps, turns)
-    axis = joint_axis(joint)
-    across = list(perpendiculars(axis))
+        turns = {"spherical": [], "weld": list(frame), "universal": [zero]}[joint.kind]  # of a cross later
+        return _stacked(list(frame), turns)
+    *across, axis = frame
     match joint.kind:
         case "planar":
             return _stacked([axis], across)
@@ -118,6 +111,38 @@ def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Flo
         if driven:
             gap, turn = np.vstack([gap, zero]), np.vstack([turn, axis])
     return gap, turn
+
+
+def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
+    """Axes x, y, z of a joint as rows, as drawn: z its axis; those of the world without one."""
+    if joint.axis is None:
+        return np.eye(3)
+    axis = unit(joint.axis)
+    return np.stack([*perpendiculars(axis), axis])
+
+
+def springs(
+    scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]
+) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+    """Stiffness and damping of a joint's rows: of its bushing, its drive's shaft; infinite and zero where they hold."""
+    joint, drive = scene.joints[name], scene.driven_joints.get(name)
+    k, c = np.full(len(gap), np.inf), np.zeros(len(gap))
+    frame, of = joint_frame(joint), joint.bushing
+    for r in range(len(gap)):
+        if gap[r].any() and turn[r].any():
+            continue  # a screw's thread
+        along = (
+            2
+            if joint.kind == "universal" and turn[r].any()
+            else int(np.abs(frame @ (gap[r] + turn[r])).argmax())
+        )
+        if of is not None and gap[r].any() and of.stiffness is not None:
+            k[r], c[r] = of.stiffness[along], of.damping[along]
+        if of is not None and turn[r].any() and of.turning_stiffness is not None:
+            k[r], c[r] = of.turning_stiffness[along], of.turning_damping[along]
+        if drive is not None and drive.shaft_stiffness is not None and turn[r].any() and along == 2:
+            k[r], c[r] = drive.shaft_stiffness, drive.shaft_damping
+    return k, c
 
 
 def _stacked(

@@ -1,7 +1,7 @@
 """What joints that hold by rows have on their links: seats, or stations along the line of a slot."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,7 @@ from kedfem.dynamics.row_joints import (
     in_plane,
     ordered,
     seat_ports,
+    springs,
     station_ports,
 )
 from kedfem.links.record import Link
@@ -48,10 +49,32 @@ class Own:
     selection: Float[np.ndarray, "m c"]
 
 
-def row_joint(
+Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
+
+
+def gear_joint(
     scene: Scene, name: str, links: dict[str, Link], ways: Ways
 ) -> tuple[RowJoint, list[Own | None]]:
+    """The row of a pair of gears: motion of the second joint less its transmission times that of the first."""
+    gear, zero = scene.gears[name], np.zeros((1, 3))
+    found = []
+    for each in gear.joints:
+        axis = joint_axis(scene.joints[each])[None]
+        slides = scene.joints[each].kind == "prismatic"
+        found.append(row_joint(scene, each, links, ways, (axis, zero) if slides else (zero, axis)))
+    (first, own), (second, others) = found
+    row = replace(second, name=f"gears.{name}", plus=((-gear.transmission, first),))
+    return row, [*others, *own]
+
+
+def row_joint(
+    scene: Scene, name: str, links: dict[str, Link], ways: Ways, only: Held | None = None
+) -> tuple[RowJoint, list[Own | None]]:
     """A joint that holds by rows, still without the interface unknowns, and the port points of its two sides.
+
+    Parameters
+    ----------
+    only : directions of other rows than those of what the joint holds, and all hard
 
     Raises
     ------
@@ -65,17 +88,18 @@ def row_joint(
         _side(scene, name, j, links, ways, joint.kind == "slot"),
     ]
     sides, own = zip(*found, strict=True)
-    gap, turn = held_rows(joint, name in scene.driven_joints)
+    gap, turn = only or held_rows(joint, name in scene.driven_joints)
     axes = None
-    if joint.axes is not None:
+    if joint.axes is not None and only is None:
         a, b = (np.asarray(bore_axis(joint, link)) for link in (i, j))
         axes, turn[-1] = (a, b), np.cross(a, b)
     here = [link for link in links.values() if link.name in (i, j)]
     kept = in_plane(gap, turn) if all(link.planar for link in here) else np.ones(len(gap), bool)
-    count = int(kept.sum())
+    hard = np.full(len(gap), np.inf), np.zeros(len(gap))
+    stiffness, damping = hard if only else springs(scene, name, gap, turn)
     return RowJoint(
         name, np.asarray(joint.at), (ways.bodies[i], ways.bodies[j]), (sides[0], sides[1]), gap[kept], turn[kept],
-        axes, np.full(count, np.inf), np.zeros(count), joint_axis(joint),
+        axes, stiffness[kept], damping[kept], joint_axis(joint),
     ), list(own)  # fmt: skip
 
 

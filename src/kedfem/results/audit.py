@@ -8,6 +8,9 @@ because T K0 Tᵀ turns with the nominal motion, not with the bent link: its for
 link's inner forces do not have. That is the equation's geometric error, and is kept apart. What is left over is the
 integration's: of second order in the step, and what numerical damping takes (ρ∞ < 1).
 
+Supports do work on the elastic motion too where joints hold by rows whose directions vary in time. Springs in joints,
+bushings and shafts, store energy and dampers take it: that is no work of supports.
+
 Work is the trapezoidal sum of powers; damping's is that of the means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
 """
 
@@ -27,13 +30,15 @@ from kedfem.results.balance import Flow, carried_fields, fields_of, flow
 from kedfem.results.moments import Constants, Nominal, constants, nominal
 from kedfem.results.records import Channel
 from kedfem.results.resistance import Last, last_of, products, resistance
+from kedfem.results.row_forces import RowForces
+from kedfem.results.row_work import row_work
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
 UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
-    ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)]"),
+    ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)], and of springs in joints"),
     (
         "work",
         ("loads", "supports"),
@@ -101,6 +106,7 @@ class Account:
         self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
         self._carried_groups = [group for k in (2, 3) for group in _grouped(self.carried, k)]
         self._block: Block | None = None
+        self._forces = RowForces(model)
         self._begin()
 
     def _begin(self) -> None:
@@ -108,6 +114,7 @@ class Account:
         self._sums: _Sums | None = None
         self._start: Float[np.ndarray, " 7"] = np.zeros(7)
         self._last: list[Last | None] = [None] * len(self._groups)
+        self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
         self._largest = np.zeros(8)
 
     def rows(self, block: Block) -> dict[str, Rows]:
@@ -131,14 +138,24 @@ class Account:
         """Energies and sums of one more block."""
         flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
+        springs = (
+            row_work(self.model, block, self._forces.of(block), self._springs) if self.model.rows else None
+        )
+        pushed = np.zeros(len(block))
+        if springs is not None:
+            # what springs push is no support's work: they store it or take it
+            strain, pushed, self._springs = strain + springs.stored, springs.pushed, springs.last
+            taken = taken + springs.dissipated[:, None] * (np.arange(8) == 0)
+        taken = np.column_stack([taken, pushed])
         state = np.vstack([flow.kinetic + strain, flow.momentum, flow.angular]).T
         rates = np.vstack(
             [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning]
         ).T
         if self._sums is None:
-            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(8))
+            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(9))
             self._start = state[0]
         work, total = self._sums.add(block.motion.t, rates, taken)
+        work = work - total[:, 8:] * (np.arange(12) == 1)
         change = state - self._start
         left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
         left += np.column_stack(

@@ -52,9 +52,10 @@ def recording(
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
     forces = RowForces(model)
     joints = [channel for name in scene.joints for channel in _joint(scene, model, name, forces)]
-    drive = [] if scene.driven is None else _torque(scene, model, scene.driven, forces)
+    drive = [channel for name in scene.driven_joints for channel in _torque(scene, model, name, forces)]
+    gears = [_gear(model, name, forces) for name in scene.gears]
     energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
-    return [*probes, *joints, *drive, *_rigid(scene, model, along), *acting(scene, model), *energies]
+    return [*probes, *joints, *drive, *gears, *_rigid(scene, model, along), *acting(scene, model), *energies]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -344,7 +345,13 @@ def _torque(scene: Scene, model: Model, driven: str, forces: RowForces) -> list[
     joint = scene.joints[driven]
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
-    channel = Channel("drive/torque", ("torque",), "N m", "world", f"torque of the drive on link {name}")
+    channel = Channel(
+        f"drive/{_of_several(scene, driven)}torque",
+        ("torque",),
+        "N m",
+        "world",
+        f"torque of the drive on link {name}",
+    )
     carried = next((x for x in model.carried if x.link.name == name), None)
     if carried is None:
         wrench = _wrench(model, _holder(model, name, driven), driven, at, forces)
@@ -355,6 +362,22 @@ def _torque(scene: Scene, model: Model, driven: str, forces: RowForces) -> list[
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
 
 
+def _of_several(scene: Scene, driven: str) -> str:
+    """Part of a channel's name where there are several drives."""
+    return f"{driven}/" if len(scene.driven_joints) > 1 else ""
+
+
+def _gear(model: Model, name: str, forces: RowForces) -> Recorded:
+    """What gears exert on the first joint's link."""
+    row, here = of_joint(model.rows, f"gears.{name}")
+    share = row.plus[0][0]
+    text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
+    return Recorded(
+        Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
+        lambda block: share * forces.of(block)[:, here],
+    )
+
+
 def _row_drive(scene: Scene, model: Model, driven: str, forces: RowForces) -> Recorded:
     """Torque, of a slide force, of a drive that holds by rows, along its axis in the second link."""
     joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
@@ -362,7 +385,11 @@ def _row_drive(scene: Scene, model: Model, driven: str, forces: RowForces) -> Re
     sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
     quantity, unit = ("force", "N") if slide else ("torque", "N m")
     channel = Channel(
-        f"drive/{quantity}", (quantity,), unit, "world", f"{quantity} of the drive on link {on}"
+        f"drive/{_of_several(scene, driven)}{quantity}",
+        (quantity,),
+        unit,
+        "world",
+        f"{quantity} of the drive on link {on}",
     )
 
     def along(block: Block) -> Rows:

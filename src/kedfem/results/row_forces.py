@@ -44,8 +44,7 @@ class RowForces:
         for joint in self.model.rows:
             here = mu[:, first : first + len(joint.gap)]
             first += len(joint.gap)
-            sides = (side for side in joint.sides if side is not None)
-            for each, side in zip(port_rows(joint, block.motion), sides, strict=True):
+            for side, each in port_rows(joint, block.motion):
                 if side.shared:
                     out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
         return np.concatenate(out, axis=1)

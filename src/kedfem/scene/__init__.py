@@ -24,6 +24,7 @@ from kedfem.scene.loads import (
 )
 from kedfem.scene.materials import Material
 from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
+from kedfem.scene.moving import holds_by_rows
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import link_from, read_scene, scene_from
@@ -93,6 +94,7 @@ __all__ = [
     "factor_table",
     "following",
     "following_links",
+    "holds_by_rows",
     "inertia_tensor",
     "link_frames",
     "link_from",

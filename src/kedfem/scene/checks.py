@@ -19,7 +19,7 @@ from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
 
 if TYPE_CHECKING:
-    from kedfem.scene.scene import Scene
+    pass
 
 SHAPES = {
     "solid": ["bar", "plate_link", "extrusion", "part", "mesh", "cad"],
@@ -305,19 +305,6 @@ def gear_faults(parts: Parts) -> Iterator[str]:
                 noun = f"the {('first', 'second')[i]} joint of a rack" if rack else "joints of gears"
                 got = f"got {joint.name!r}, which is {joint.word('kind')}"
                 yield gear.fault("joints", f"{noun} must be {wanted}, {got}", i)
-
-
-def elastic_drive_faults(scene: Scene) -> Iterator[str]:
-    """Drives and couplings that the rigid motion knows, but the elastic analysis not yet."""
-    if len(scene.driven_joints) > 1:
-        yield f"drives: must be one only in an elastic analysis, got {len(scene.driven_joints)}"
-    for name in scene.driven_joints:
-        joint = scene.joints[name]
-        if joint.kind != "revolute" or GROUND not in joint.links:
-            wanted = "must be a hinge between a link and the ground if an elastic analysis drives it"
-            yield f"joints.{name}: {wanted}, got a {joint.kind} joint of {joint.links[0]!r} and {joint.links[1]!r}"
-    if scene.gears:
-        yield "gears: must be left out in an elastic analysis, got some"
 
 
 def load_faults(parts: Parts) -> Iterator[str]:

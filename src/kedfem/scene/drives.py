@@ -155,6 +155,10 @@ class Polynomial(_Rise):
 MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial, Field(discriminator="kind")]
 
 
+ShaftStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]
+ShaftDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
+
+
 class Drive(Record):
     """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
 
@@ -162,6 +166,17 @@ class Drive(Record):
     """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
     """how it turns or slides, from the drawn position"""
+    shaft_stiffness: ShaftStiffness | None = None
+    """of a hinge: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
+    given"""
+    shaft_damping: ShaftDamper = 0.0
+    """of a hinge: torsional damping of that shaft"""
+
+    @model_validator(mode="after")
+    def _damped_shaft(self) -> Drive:
+        if self.shaft_damping and self.shaft_stiffness is None:
+            refuse([(("shaft_damping",), "must stand with shaft_stiffness, got it alone")])
+        return self
 
 
 class Gear(Record):

@@ -30,7 +30,7 @@ def planar_faults(parts: Parts) -> Iterator[str]:
         off = max(abs(axis[0]), abs(axis[1]))
         if joint.record.kind == "revolute" and off > FLAT:
             yield joint.fault("axis", f"must be along z in {here}, got {vector(axis)}")
-        if joint.record.kind == "prismatic" and abs(axis[2]) > FLAT:
+        if joint.record.kind in {"prismatic", "slot"} and abs(axis[2]) > FLAT:
             yield joint.fault("axis", f"must lie in the xy plane in {here}, got {vector(axis)}")
     if parts.gravity[2] != 0.0:
         yield f"gravity: must lie in the xy plane in {here} [m/s^2], got {vector(parts.gravity)}"

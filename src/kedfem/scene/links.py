@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
 from kedfem.scene.base import FileName, Record, refuse
+from kedfem.scene.bushings import Bushing
 from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
 from kedfem.scene.points import Axis, Point
@@ -199,6 +200,9 @@ class Joint(Record):
     faces: Annotated[dict[str, tuple[str, ...]], BeforeValidator(face_names)] = Field(default_factory=dict)
     """of a link from CAD, or from a mesh file with groups: the name of the face that holds it, or a list of names, by
     link, `{ rod = "pin_bore" }`; if not given, what lies about `at`"""
+
+    bushing: Bushing | None = None
+    """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
 
     def stiff(self, link: str) -> bool:
         """Whether the seat on a link keeps its shape."""

@@ -117,8 +117,12 @@ def joint_obstacles(parts: Parts, name: str, whose: str) -> Iterator[str]:
         axis, kind = joint.record.axis, joint.record.kind
         if kind == "revolute" and axis is not None and math.hypot(*axis[:2]) > FLAT:
             yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
-        if kind == "prismatic" and axis is not None and abs(axis[2]) > FLAT:
+        if kind in {"cylindrical", "screw", "planar"} and axis is not None and math.hypot(*axis[:2]) > FLAT:
+            yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
+        if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
             yield joint.fault("axis", f"must lie in the xy plane {whose}, got {vector(axis)}")
+        if kind == "universal":
+            yield joint.fault("kind", f"must be one that turns about z only {whose}, got a universal joint")
         others = [parts.links[x] for x in joint.record.links if x in parts.links and x != name]
         if kind == "weld" and name in joint.record.links and others:
             other = fidelity(others[0])

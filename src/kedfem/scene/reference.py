@@ -16,6 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from kedfem.scene import (
     analysis,
+    bushings,
     damping,
     drives,
     initial,
@@ -82,6 +83,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
     ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
     ("[joints.NAME]", "", [links.Joint]),
+    ("bushing of a joint", "", [bushings.Bushing]),
     ("[gears.NAME]", "", [drives.Gear]),
     ("[drive]", "Or several, as `[drives.NAME]`.", [drives.Drive]),
     ("[drive.motion]", "", models(drives.MotionLaw)),

@@ -37,6 +37,7 @@ from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
+from kedfem.scene.moving import moving_faults
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
@@ -210,5 +211,6 @@ def cross_faults(parts: Parts) -> list[str]:
         spring_faults,
         initial_faults,
         undriven_faults,
+        moving_faults,
     )
     return [fault for check in checks for fault in check(parts)]

@@ -1,0 +1,75 @@
+"""What an analysis needs where the directions of joints vary in time, as they slide or turn between moving links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kedfem.scene.checks import fidelity, is_slide, link_names
+from kedfem.scene.drives import Drive
+from kedfem.scene.free import any_following
+from kedfem.scene.links import GROUND, Joint
+from kedfem.scene.parts import Entry, Parts
+
+SHARED = (
+    "revolute",
+    "spherical",
+    "weld",
+)  # kinds that hold points of their links together, wherever these go
+
+
+def holds_by_rows(joint: Joint, drive: Drive | None = None) -> bool:
+    """Whether a joint cannot be said of points that its links share for good.
+
+    Parameters
+    ----------
+    drive : of the joint, if it is driven
+    """
+    if joint.bushing is not None or (drive is not None and drive.shaft_stiffness is not None):
+        return True
+    if joint.kind in SHARED:
+        return drive is not None and GROUND not in joint.links
+    return joint.kind != "prismatic" or drive is not None or GROUND not in joint.links
+
+
+def moving_joints(parts: Parts) -> list[Entry]:
+    """Good joints of a scene under validation that hold by rows."""
+    drives = {drive.word("joint"): drive.record for drive in parts.all_drives if drive.record is not None}
+    good = [joint for joint in parts.joints.values() if joint.record is not None]
+    return [joint for joint in good if holds_by_rows(joint.record, drives.get(joint.name))]
+
+
+def moving_faults(parts: Parts) -> Iterator[str]:
+    """Frames, stiffening and numerical damping that do not suit such joints, sliders without a shape on them, shafts."""
+    for joint in moving_joints(parts):
+        got = f"got a {'driven ' if joint.word('kind') in SHARED else ''}{joint.word('kind')} joint"
+        if joint.record.bushing is not None:
+            got = "got a joint with a bushing"
+        if any_following(parts):
+            wanted = (
+                "must be revolute, spherical, weld, or prismatic on the ground, undriven and without bushing"
+            )
+            yield joint.fault("kind", f'{wanted}, with frames = "following", {got}')
+        if parts.analysis.raw.get("stiffening") is True:
+            yield joint.fault("kind", f"must stand without analysis.stiffening, {got}")
+        if parts.analysis.record is not None and parts.analysis.record.rho_inf == 1.0:
+            wanted = f"must be less than 1 with joints.{joint.name} (its force would swing from step to step, and grow)"
+            yield parts.analysis.fault("rho_inf", f"{wanted}: take 0.95, got 1")
+        yield from slider_faults(joint, parts)
+    for drive in parts.all_drives:
+        driven = parts.joints.get(drive.word("joint") or "")
+        if drive.has("shaft_stiffness") and driven is not None and driven.word("kind") == "prismatic":
+            yield drive.fault(
+                "shaft_stiffness", f"must be given for a hinge, got {driven.name!r}, which is prismatic"
+            )
+
+
+def slider_faults(joint: Entry, parts: Parts) -> Iterator[str]:
+    """Rigid links without a shape on other joints than their own guide."""
+    names = link_names(joint)
+    for name in names:
+        link = parts.links.get(name)
+        slides = any(is_slide(other) and name in link_names(other) for other in parts.joints.values())
+        bare = link is not None and fidelity(link) == "rigid" and not link.has("shape")
+        if bare and slides and not is_slide(joint):
+            wanted = f"must join links with a shape by a {joint.word('kind')} joint"
+            yield joint.fault("links", f"{wanted}, got {name!r}, a rigid slider: give it a shape")
