@@ -36,7 +36,8 @@ def bench_kinematics(folder: Path, quick: bool, watch: Watch) -> str:
     note = (
         f"Poses, speeds and accelerations of all links at {POINTS:,} points of a turn, in plain numpy; processor time, "
         "the least of nine runs. One by one is Newton to rounding from each point to the next, in least squares over all "
-        "rows, then the differentiated constraints. The path is followed once before; it is the same for any number of points."
+        "rows, then the differentiated constraints. "
+        "The path is followed once before; it is the same for any number of points."
     )
     text = markdown("Rigid motion", "kedfem bench kinematics", header, rows, note)
     write_page(folder, "kinematics", text)

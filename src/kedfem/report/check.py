@@ -56,7 +56,9 @@ def _motion(ready: Prepared) -> Table:
     table = Table(title="Rigid motion", show_header=False)
     weakness, angle = along.weakest
     low, high = np.degrees(along.phi[[0, -1]])
-    over = "repeats every turn" if along.periodic else f"{low:.4g}° to {high:.4g}°"
+    turns = round(along.period / (2 * np.pi)) if along.periodic else 0
+    again = "every turn" if turns == 1 else f"every {turns} turns"
+    over = f"repeats {again}" if along.periodic else f"{low:.4g}° to {high:.4g}°"
     driven = ready.scene.driven is not None
     table.add_row(
         "drive", f"joint {ready.scene.driven}, {over}" if driven else "none: the mechanism moves by itself"
