@@ -47,7 +47,11 @@ def at_one_instant(motion: Motion, alpha: np.ndarray, p2: np.ndarray) -> RigidMo
 
     zero = np.zeros(1)
     R, p, omega = both(motion.R), both(motion.p), both(motion.omega)
-    return RigidMotion(zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), omega, p)
+    none = np.zeros((len(zero), 0))
+    per_drive = np.zeros((len(zero), 0, *omega.shape[1:]))
+    return RigidMotion(
+        zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), none, per_drive, per_drive
+    )
 
 
 def point_acceleration(motion: Motion, alpha: np.ndarray, p2: np.ndarray, X: np.ndarray) -> np.ndarray:

@@ -19,7 +19,17 @@ from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import Linkage, unit
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
-from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, load_factor
+from kedfem.scene import (
+    ROTARY,
+    Body,
+    Flywheel,
+    ForceLoad,
+    PointMass,
+    RigidBody,
+    Scene,
+    inertia_tensor,
+    load_factor,
+)
 
 Vector = Float[np.ndarray, "3"]
 Wrenches = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
@@ -263,6 +273,7 @@ def _add_body(out: Inertias, scene: Scene, linkage: Linkage, body: Body) -> None
 
 def _axis_at(scene: Scene, body: Flywheel) -> Vector:
     """Axis of the hinge that a flywheel sits on."""
-    hinges = [x for x in scene.joints.values() if body.link in x.links and x.kind == "revolute" and x.axis]
+    turning = [x for x in scene.joints.values() if body.link in x.links and x.kind in ROTARY]
+    hinges = [x for x in turning if x.axis]
     nearest = min(hinges, key=lambda x: float(np.linalg.norm(np.subtract(x.at, body.at))))
     return unit(nearest.axis or (0.0, 0.0, 1.0))

@@ -7,7 +7,7 @@ from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import following, following_links, link_frames
 from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, factor_table, load_factor, path_parameter
-from kedfem.scene.links import GROUND, Joint, LinkScene, Meshing
+from kedfem.scene.links import GROUND, ROTARY, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
     Body,
     BodyLoad,
@@ -36,6 +36,7 @@ from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
 
 __all__ = [
     "GROUND",
+    "ROTARY",
     "Analysis",
     "Animation",
     "Arc",

@@ -25,6 +25,7 @@ JointKind = Literal[
     "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
 ]
 DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # joints that need an axis
+ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
 SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
 PORTS = ("averaged", "stiff")
 Port = Literal["averaged", "stiff"]
