@@ -42,7 +42,6 @@ def main() -> None:
     )
     assert beside < 0.05
 
-    # over the last turn the drive gives what damping takes, and what the vibration and the neglected terms keep
     torque, rigid = (channels[f"drive/{name}"][:, 0] for name in ("torque", "rigid_torque"))
     print(f"drive: {np.abs(torque).max():.2f} N m, were all links rigid {np.abs(rigid).max():.2f} N m")
     assert run.balance is not None

