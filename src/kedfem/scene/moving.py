@@ -1,4 +1,4 @@
-"""Joints whose directions vary in time, as they slide or turn between links that move: what an analysis with them needs."""
+"""Joints whose directions vary in time, as they slide or turn between links that move: what they need."""
 
 from __future__ import annotations
 
