@@ -29,6 +29,7 @@ from tests.moving import (
     geared,
     inverted,
     ran,
+    screwed,
     state,
     turned,
     two_drives,
@@ -44,6 +45,7 @@ KINDS = {
     "two drives": two_drives,
     "driven slide": driven_slide,
     "gears and a shaft": geared,
+    "nut on a spindle": screwed,
 }
 
 
@@ -97,7 +99,7 @@ def test_condensed_and_dense_steps_are_the_literal_ones(kind: str) -> None:
         ready, blocks = ran(KINDS[kind](), solver)
         links = range(len(ready.model.links))
         found.append([state(blocks, k, name) for name in ("u", "v", "port_forces") for k in links])
-    tolerance = 2e-5 if kind == "universal joint" else 1e-7
+    tolerance = 2e-5 if kind in {"universal joint", "nut on a spindle"} else 1e-7
     for other in found[1:]:
         for x, y in zip(other, found[0], strict=True):
             assert_allclose(x, y, atol=tolerance * np.abs(y).max())
@@ -116,6 +118,45 @@ def test_joints_stay_closed_and_what_is_free_is_free(kind: str) -> None:
             size = max(size, float(np.abs(z).max()))
     assert open_ < 1e-10 * max(size, 1e-3)
     assert size > 1e-8 or kind == "driven slide"  # which holds all of its seat
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "two drives"])
+def test_joints_let_the_rigid_motion_pass(kind: str) -> None:
+    """Rows see nothing of the linkage's own rigid rates; those of a drive see its own, 1 per radian or metre."""
+    ready, blocks = ran(KINDS[kind]())
+    motion, model = blocks[-1].motion, ready.model
+    rows = joint_rows(model.rows, motion)
+    assert rows is not None
+    for t in (0, len(motion.t) - 1):
+        rates = []
+        for link, body in zip(model.links, model.bodies, strict=True):
+            v, omega = motion.v_phi[t, body], motion.omega_phi[t, body]
+            u = np.outer(link.one, v) + np.cross(omega, link.X @ motion.R[t, body].T)
+            if link.kind == "beam":
+                u[:, 2] = omega[2] * link.one
+            rates.append(u[:, : link.d])
+        seen = rows.C[t] @ interface_values(model.joints, rates)
+        held, paced = np.abs(seen) < 1e-7, np.abs(np.abs(seen) - 1) < 1e-7
+        assert (held | paced).all()
+        assert paced.sum() == sum(x.name in ready.scene.driven_joints for x in model.rows)
+
+
+def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
+    """e of z + t z' + t² z''/2 grows as t³: eightfold in twice the time. Drawn askew, so that nothing is symmetric."""
+    raw = inverted("beam", "slot", turns=0.05)
+    pin = 0.1 * np.array([np.cos(1.0), np.sin(1.0)])
+    arm = pin + np.array([0.3, 0])
+    along = arm / np.linalg.norm(arm)
+    raw["links"]["crank"] = bar("beam", (0, 0), pin.tolist())
+    raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.8 * along - [0.3, 0]).tolist(), 16)
+    raw["joints"]["S"] |= {"at": pin.tolist(), "axis": [*along.tolist(), 0]}
+    ready, blocks = ran(raw)
+    first, later = blocks[0].links, joint_rows(ready.model.rows, blocks[1].motion)
+    assert later is not None
+    z, z1, z2 = (interface_values(ready.model.joints, [getattr(x, k)[0] for x in first]) for k in "uva")
+    t = blocks[1].motion.t[[3, 7]]
+    e = [np.abs(later.C[k] @ (z + s * z1 + s**2 / 2 * z2)).max() for k, s in zip((3, 7), t, strict=True)]
+    assert_allclose(e[1] / e[0], 8, rtol=0.2)
 
 
 def balanced(ready: Prepared, a: np.ndarray) -> np.ndarray:
