@@ -175,3 +175,26 @@ def turned(raw: dict[str, Any], R: np.ndarray) -> dict[str, Any]:
         for name, joint in raw["joints"].items()
     }
     return {**raw, "links": links, "joints": joints}
+
+
+def screwed() -> dict[str, Any]:
+    """A spindle turns in the ground and drives a nut that a slide on the ground keeps from turning."""
+    return {
+        "links": {
+            "spindle": beam_in_space((0, 0, 0), (0.4, 0, 0), 4),
+            "nut": beam_in_space((0.2, 0, 0), (0.2, 0.1, 0), 2),
+        },
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "spindle"], "at": [0, 0, 0], "axis": [1, 0, 0]},
+            "S": {
+                "kind": "screw",
+                "links": ["nut", "spindle"],
+                "at": [0.2, 0, 0],
+                "axis": [1, 0, 0],
+                "lead": 0.02,
+            },
+            "G": {"kind": "prismatic", "links": ["nut", "ground"], "at": [0.2, 0.1, 0], "axis": [1, 0, 0]},
+        },
+        "drive": {"joint": "A", "motion": rising(3.0)},
+        "analysis": dict(TENTH),
+    }

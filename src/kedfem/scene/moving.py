@@ -1,4 +1,4 @@
-"""What an analysis needs where the directions of joints vary in time, as they slide or turn between moving links."""
+"""Joints whose directions vary in time, as they slide or turn between links that move: what they need."""
 
 from __future__ import annotations
 
