@@ -14,10 +14,12 @@ from kedfem.dynamics.first_rows import interface_values
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import in_space
+from kedfem.motion.linkage import linkage
 from kedfem.results.row_forces import RowForces
 from kedfem.results.row_work import deflections
 from kedfem.scene import scene_from, time_grid
@@ -364,6 +366,17 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
     raw["joints"]["S"]["bushing"]["stiffness"] = [1.0, 2.0]
     with pytest.raises(SceneError, match=r"joints\.S\.bushing\.stiffness: must be one number or three"):
         scene_from(raw)
+
+
+def test_a_rigid_slider_bears_no_joint_with_rows() -> None:
+    raw = inverted("beam", "slot")
+    raw["links"]["shoe"] = {"fidelity": "rigid", "mass": 1.0}
+    raw["joints"]["G"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.5, 0], "axis": "x"}
+    raw["joints"]["T"] = {"kind": "slot", "links": ["shoe", "arm"], "at": [0.5, 0], "axis": "y"}
+    scene = scene_from(raw)
+    wanted = r"joints\.T\.links: must join links with a shape by a slot joint .*, got 'shoe', a rigid slider"
+    with pytest.raises(SceneError, match=wanted):
+        elastic_model(scene, linkage(scene))
 
 
 def test_a_light_block_on_a_pin_and_the_pin_itself_in_a_slot_press_alike() -> None:

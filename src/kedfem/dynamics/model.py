@@ -332,6 +332,12 @@ def _wide_seat(link: Link) -> str:
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     guide = next(key for key, joint in joints.items() if joint.kind == "prismatic")
+    for key, joint in joints.items():
+        if key != guide and needs_rows(scene, key):
+            raise SceneError(
+                f"joints.{key}.links: must join links with a shape by a {joint.kind} joint that moves with both, "
+                f"got '{name}', a rigid slider: give it a shape"
+            )
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from kedfem.scene.checks import fidelity, is_slide, link_names
 from kedfem.scene.drives import Drive
 from kedfem.scene.free import any_following
 from kedfem.scene.links import GROUND, Joint
@@ -39,7 +38,7 @@ def moving_joints(parts: Parts) -> list[Entry]:
 
 
 def moving_faults(parts: Parts) -> Iterator[str]:
-    """Frames, stiffening and numerical damping that do not suit such joints, sliders without a shape on them, shafts."""
+    """Frames, stiffening and numerical damping that do not suit such joints; shafts of slides."""
     for joint in moving_joints(parts):
         got = f"got a {'driven ' if joint.word('kind') in SHARED else ''}{joint.word('kind')} joint"
         if joint.record.bushing is not None:
@@ -54,22 +53,9 @@ def moving_faults(parts: Parts) -> Iterator[str]:
         if parts.analysis.record is not None and parts.analysis.record.rho_inf == 1.0:
             wanted = f"must be less than 1 with joints.{joint.name} (its force would swing from step to step, and grow)"
             yield parts.analysis.fault("rho_inf", f"{wanted}: take 0.95, got 1")
-        yield from slider_faults(joint, parts)
     for drive in parts.all_drives:
         driven = parts.joints.get(drive.word("joint") or "")
         if drive.has("shaft_stiffness") and driven is not None and driven.word("kind") == "prismatic":
             yield drive.fault(
                 "shaft_stiffness", f"must be given for a hinge, got {driven.name!r}, which is prismatic"
             )
-
-
-def slider_faults(joint: Entry, parts: Parts) -> Iterator[str]:
-    """Rigid links without a shape on other joints than their own guide."""
-    names = link_names(joint)
-    for name in names:
-        link = parts.links.get(name)
-        slides = any(is_slide(other) and name in link_names(other) for other in parts.joints.values())
-        bare = link is not None and fidelity(link) == "rigid" and not link.has("shape")
-        if bare and slides and not is_slide(joint):
-            wanted = f"must join links with a shape by a {joint.word('kind')} joint"
-            yield joint.fault("links", f"{wanted}, got {name!r}, a rigid slider: give it a shape")
