@@ -224,8 +224,8 @@ def bench(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="One of: accuracy, beams, elements, following, growth, plane, ports, reduction, solvers, start, steps, "
-            "suite.",
+            help="One of: accuracy, beams, elements, following, growth, kinematics, plane, ports, reduction, solvers, "
+            "start, steps, suite.",
         ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),

@@ -9,6 +9,7 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
 from tests.linkages import Z, body, cardan, four_bar, linkage_scene, motion_at, place, turned
+from tests.moving import inverted
 from tests.rooms.test_dynamics import four_bar as elastic_four_bar
 
 from .cases import Outcome, Right, case, refused
@@ -163,6 +164,26 @@ def stiffness_ratio() -> list[Outcome]:
         Right("torque, fast against literal steps", apart(fast, literal, "drive/torque"), 1e-5),
         Right("torque against that with a rigid coupler", apart(fast, rigid, "drive/torque"), 1e-4),
     ]
+
+
+@case("A slot whose direction varies in time", long=True)
+def turning_rows() -> list[Outcome]:
+    """An index-3 constraint: a pin slides along an elastic arm that it turns, 100,000 undamped steps. What one step
+    cannot resolve must neither grow nor swing from step to step in the joint's force.
+    """
+    outcomes: list[Outcome] = []
+    for rho_inf in (0.5, 0.95):
+        raw = inverted("beam", "slot", turns=278, steps_per_turn=360, rho_inf=rho_inf)
+        force = run(raw).channels["joints/S/force"][1][1:].reshape(278, 360, -1)
+        size = float(np.abs(force[9]).max())
+        grown = float(np.abs(force[-1]).max()) / size - 1
+        swing = np.abs(np.diff(force[-1], n=4, axis=0)).max() / 16 / size  # of ±1 from step to step: 1
+        outcomes += [
+            Right(f"ρ∞ = {rho_inf}: the force in turn 278 above that in turn 10", abs(grown), 1e-4),
+            Right(f"ρ∞ = {rho_inf}: its swing from step to step", float(swing), 1e-5),
+        ]
+    raw = inverted("beam", "slot", rho_inf=1.0)
+    return [*outcomes, refused("ρ∞ = 1", lambda: scene_from(raw), "analysis.rho_inf")]
 
 
 @case("Ten thousand turns", long=True)
