@@ -14,6 +14,7 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.scene import scene_from
+from tests.moving import inverted, ran
 
 FOUR_BAR = Path(__file__).parents[2] / "examples" / "four_bar_beams" / "scene.toml"
 L, SIDE, E, RHO = 1.0, 0.01, 2.1e11, 7850.0  # an arm [m] of steel
@@ -175,3 +176,14 @@ def test_what_stiffening_leaves_is_said_without_advising_it_again() -> None:
         stiffened.add(block)
     assert_allclose(stiffened.estimate, 0.4 * plain.estimate)  # measured: 0.25 to 0.4 is left
     assert "stiffening" not in geometric_warning(stiffened)[0]
+
+
+def test_what_helps_where_a_joint_knows_nominal_frames_only() -> None:
+    ready, blocks = ran(inverted("beam", "slot", rho_inf=0.8, turns=0.01))
+    found = GeometricError(ready.model)
+    for block in blocks:
+        found.add(block)
+    found.turn = 0.5  # rad: as of links that bend far
+    (warning,) = geometric_warning(found)
+    assert "stiffer links or a slower drive help (frames that follow do not know joints.S yet)" in warning
+    assert "analysis.frames" not in warning

@@ -164,16 +164,24 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
     error = found.estimate
     if error < LARGE:
         return ()
-    following = 'analysis.frames = "following" is right at any deflection'
-    stiffening = "analysis.stiffening = true leaves about a third of it, " if not found.stiffened else ""
-    remedy = (
-        f"{stiffening}{following}" if error < MODERATE else f"take {following.replace(' is', ', which is')}"
-    )
+    remedy = _remedy(found, error)
     return (
         f"links turn by up to {np.degrees(found.turn):.2g} deg against their rigid motion, which the linear equation "
-        f"takes as small: it is off by about {100 * min(error, 1.0):.2g} % of the peak stress"
+        f"takes as small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % of the peak stress"
         f"{' or more' if error > 1 else ''}; {remedy}",
     )
+
+
+def _remedy(found: GeometricError, error: float) -> str:
+    """What is right where the linear equation is not."""
+    if found.model.rows:
+        names = ", ".join(f"joints.{name}" for name in dict.fromkeys(row.name for row in found.model.rows))
+        return f"stiffer links or a slower drive help (frames that follow do not know {names} yet)"
+    following = 'analysis.frames = "following"'
+    if error >= MODERATE:
+        return f"take {following}, which is right at any deflection"
+    stiffening = "analysis.stiffening = true leaves about a third of it, " if not found.stiffened else ""
+    return f"{stiffening}{following} is right at any deflection"
 
 
 def _projected(

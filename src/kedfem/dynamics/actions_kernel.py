@@ -19,14 +19,10 @@ A : actions; every array has a row per action
     at, height : (c,) the curves, one after the other
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
+from kedfem.compiled import compiled_in_order as compiled
 from kedfem.dynamics.action import ANGLE, FOLLOW, PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
-
-compiled: Any = njit(cache=True, error_model="numpy")
 
 STIFFNESS, DAMPING, FREE, AXIS, E1, E2, DRAWN = 0, 1, 2, 3, 6, 9, 12
 

@@ -16,12 +16,9 @@ exactly what `dynamics.frames` finds with a frame at each point, see `links.segm
 One call does all segments: a call costs as much as a short beam.
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+from kedfem.compiled import compiled
 
 SMALL_TURN = 0.05  # tan of half the angle: up to here the series is exact to rounding
 

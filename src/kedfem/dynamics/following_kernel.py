@@ -25,17 +25,13 @@ Imported when it is first needed. Plain loops, so that nothing is allocated in a
 change is found once in it.
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
+from kedfem.compiled import compiled
 from kedfem.dynamics.actions_kernel import external
 from kedfem.dynamics.beams_kernel import begun, bent, ended
 from kedfem.dynamics.frames_kernel import elastic_energy, held_together, mean_rotation, oriented
 from kedfem.dynamics.mixing_kernel import factored, mixed, solved
-
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 SWEEPS, PATIENCE, EASIER = 40, 12, 100.0  # as in `dynamics.following`
 

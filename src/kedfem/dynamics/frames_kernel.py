@@ -1,11 +1,8 @@
 """Segments with one frame that follows them, or a nominal one, compiled by numba: as `dynamics.frames` has it."""
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+from kedfem.compiled import compiled
 
 SPACE, PLANE, BEAM = 0, 1, 2
 TURNS = 50

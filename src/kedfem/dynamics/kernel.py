@@ -15,14 +15,11 @@ N = D·S coordinates (component first), P ports, Q = D·P port components; k int
 Imported when it is first needed: numba takes a while to load. Plain loops, so that nothing is allocated in a step.
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
+
+from kedfem.compiled import compiled
 
 DEPENDENT = 1e-11  # as in `interface`
-
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 
 @compiled

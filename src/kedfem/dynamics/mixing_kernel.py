@@ -5,12 +5,9 @@ products (m, m) : of the latter with each other
 last (2, N) : step taken and change asked for, of the sweep before
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+from kedfem.compiled import compiled
 
 RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 

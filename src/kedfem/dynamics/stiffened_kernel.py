@@ -6,9 +6,9 @@ stressed : factors s (T, L, m); stress stiffness k (L, m, S, S); P (L, D, D)
 
 import numpy as np
 
+from kedfem.compiled import compiled
 from kedfem.dynamics.kernel import (
     add_transposed,
-    compiled,
     end_of_step,
     gathered,
     right_hand_side,

@@ -1,13 +1,9 @@
 """Distortion of hexahedra of 27 nodes and its gradient, compiled by numba."""
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
+from kedfem.compiled import compiled
 from kedfem.mesh.hexahedra import HEX27
-
-compiled: Any = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 
 #: LINES[q, j]: the three nodes of the line through node q in direction j; SLOPES[c + 1]: ∂/∂ξ at ξ = c from them.
 LINES = np.array(
