@@ -21,6 +21,7 @@ from kedfem.dynamics.model import Model, segments, ways
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
+from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
@@ -84,6 +85,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     """
     clock = Clock(watch)
     folder = ready_folder(scene.results_folder)
+    scene, assembly = assembled(scene)
     plan = None if scene.analysis.accuracy is None else planned(scene, clock.stage)
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
@@ -99,6 +101,7 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     nominal = any(link.fit is None for link in ready.model.links)
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     warnings = (
+        *assembly_warning(assembly),
         *stability_warning(scene),
         *(geometric_warning(geometric) if nominal else ()),
         *reduction_warning(reduction),

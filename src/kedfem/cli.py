@@ -66,10 +66,11 @@ def check(scene: ScenePath) -> None:
     """Show what would be modelled and its cost; solve nothing."""
     from kedfem.accuracy.plan import planned
     from kedfem.accuracy.reduction import prepared
-    from kedfem.report import check_tables
+    from kedfem.motion.assembly import assembled
+    from kedfem.report import assembly_tables, check_tables
     from kedfem.scene import read_scene
 
-    loaded = read_scene(scene)
+    loaded, assembly = assembled(read_scene(scene))
     with _progress() as watch:
 
         def stage(name: str) -> None:
@@ -77,7 +78,7 @@ def check(scene: ScenePath) -> None:
 
         plan = None if loaded.analysis.accuracy is None else planned(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
-    for table in check_tables(ready, reduction, plan):
+    for table in [*assembly_tables(assembly), *check_tables(ready, reduction, plan)]:
         out.print(table)
 
 

@@ -15,6 +15,7 @@ from kedfem.dynamics.transient import motions
 from kedfem.errors import MeshError, MotionError
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link
+from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -66,6 +67,7 @@ def kinematics(
             "(kedfem run moves it by its forces)"
         )
     clock = Clock(watch)
+    scene, assembly = assembled(scene)
     linked, along = clock.timed("motion", lambda: moving(scene))
     links = clock.timed("masses", lambda: rigid_links(scene))
     masses = inertias_of_links(scene, linked, links)
@@ -77,7 +79,11 @@ def kinematics(
     clock.timed("table", lambda: write_csv(results, target / TABLE))
     if scene.output.plots:
         clock.timed("plots", lambda: write_plots(results, target / PLOTS))
-    warnings = (*_missing(scene, linked, masses), *_transmission(results, recorded))
+    warnings = (
+        *assembly_warning(assembly),
+        *_missing(scene, linked, masses),
+        *_transmission(results, recorded),
+    )
     return Moved(target, results, recorded, clock.seconds, warnings)
 
 

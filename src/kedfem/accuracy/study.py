@@ -22,6 +22,7 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.cost import estimated_cost
 from kedfem.errors import KedfemError, SceneError
+from kedfem.motion.assembly import assembled
 from kedfem.scene import Scene, time_grid
 
 Watch = Callable[[str, int, int], None]
@@ -196,6 +197,7 @@ def studied(
     KedfemError
         If no variant can be run, with the reason of the first.
     """
+    scene, _ = assembled(scene)
     bench = _Bench(scene, most, repeats, watch)
     first = first_variants(scene)
     if not first:

@@ -27,6 +27,7 @@ from kedfem.scene import (
     Cad,
     LinkScene,
     Material,
+    MeshFile,
     Part,
     PlateLink,
     Polyline,
@@ -55,7 +56,7 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
     match link.shape:
         case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
             return line_axes(np.asarray(a), np.asarray(b))
-        case Cad(origin=a, towards=b) if b is not None:
+        case Cad(origin=a, towards=b) | MeshFile(origin=a, towards=b) if b is not None:
             return line_axes(np.asarray(a), np.asarray(b))
         case Polyline(points=points):
             return line_axes(np.asarray(points[0]), np.asarray(points[-1]))

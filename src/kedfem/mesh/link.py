@@ -9,13 +9,13 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.file import mesh_from_file
 from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, rectangle_quads
+from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, placed, rectangle_quads
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
 from kedfem.mesh.quads import quad_mesh
 from kedfem.mesh.quality import checked_mesh
-from kedfem.mesh.ways import cad_mesh
+from kedfem.mesh.ways import cad_mesh, file_axes
 from kedfem.scene import (
     Arc,
     Bar,
@@ -59,7 +59,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
     where = f"links.{name}"
     match link.shape:
         case MeshFile() as shape:
-            mesh = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
+            read = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
+            mesh = placed(read, np.array(shape.origin), file_axes(shape))
         case Cad() as shape:
             key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
             mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder)

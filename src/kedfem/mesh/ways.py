@@ -20,7 +20,7 @@ from kedfem.mesh.cut.subdivided import subdivided_mesh
 from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
-from kedfem.scene import Cad, LinkScene, Meshing
+from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
 ENOUGH = 0.3  # worst scaled Jacobian with which the next way is not tried
@@ -98,7 +98,7 @@ def _made(keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path) -> 
     return placed(mesh, np.array(shape.origin), file_axes(shape))
 
 
-def file_axes(shape: Cad) -> Float[np.ndarray, "3 3"]:
+def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
     """Where the x, y, z axes of a file go, as rows."""
     along = (1.0, 0.0, 0.0) if shape.towards is None else np.subtract(shape.towards, shape.origin)
     return frame_along(np.array(along), None if shape.z is None else np.array(shape.z))

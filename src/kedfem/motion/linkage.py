@@ -17,6 +17,7 @@ from kedfem.motion.freedom import remedy as held_by
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.rows import (
     ANGLE,
+    GAP,
     Row,
     Rows,
     coupled,
@@ -71,6 +72,8 @@ def linkage(scene: Scene) -> Linkage:
     MotionError
         If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
     """
+    if any(joint.open for joint in scene.joints.values()):
+        raise ValueError("a scene whose links are drawn apart must be assembled first")
     rows, driven, drawn = _drawn(scene)
     J, bodies, size = drawn.J, (GROUND, *drawn.links), drawn.size
     if driven:
@@ -89,15 +92,20 @@ def linkage(scene: Scene) -> Linkage:
 def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
     """All rows of joints, couplings and drives, and their derivatives as drawn."""
     bodies = (GROUND, *scene.links)
-    points, centre = joint_points(scene), scene_centre(scene)
-    size = (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
+    centre, size = scene_centre(scene), scene_size(scene)
     driven = drives(scene, size)
-    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
-    rows += [_gear_row(scene, name, bodies) for name in scene.gears]
+    rows = passive_rows(scene)
     rows += [_drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
     J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
     return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
+
+
+def passive_rows(scene: Scene) -> list[Row]:
+    """Rows of joints and couplings, without the drives'."""
+    bodies, centre = (GROUND, *scene.links), scene_centre(scene)
+    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
+    return rows + [_gear_row(scene, name, bodies) for name in scene.gears]
 
 
 def drawn_linkage(scene: Scene) -> Drawn:
@@ -134,6 +142,12 @@ def scene_centre(scene: Scene) -> Float[np.ndarray, "3"]:
     return np.asarray(points.mean(axis=0)) if len(points) else np.zeros(3)
 
 
+def scene_size(scene: Scene) -> float:
+    """Characteristic length [m]: the longest side of the box of all joints."""
+    points = joint_points(scene)
+    return (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
+
+
 def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
     """A direction made a unit vector."""
     return np.asarray(np.asarray(axis) / np.linalg.norm(axis))
@@ -155,10 +169,20 @@ def _rows_of(
         one, other = (unit(each) for each in joint.axes)
         axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
     rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
+    if joint.open:
+        rows = [_reaching(row, joint, bodies, centre) for row in rows]
     if joint.lead is not None:
         travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
         rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
     return rows
+
+
+def _reaching(row: Row, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray) -> Row:
+    """A row of a joint whose links are drawn apart: gaps are between their own points."""
+    if row.kind != GAP:
+        return row
+    one, other = (np.asarray(joint.on(bodies[body])) - centre for body in (row.i, row.j))
+    return replace(row, a=one, a_j=other)
 
 
 def moving_pair(joint: Joint) -> tuple[str, str]:

@@ -1,5 +1,6 @@
 """Summary tables of what the commands find, for the terminal."""
 
+from kedfem.report.assembly import assembly_tables
 from kedfem.report.check import check_tables
 from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import face_kind, mesh_tables
@@ -8,6 +9,7 @@ from kedfem.report.study import study_tables
 from kedfem.report.words import moment
 
 __all__ = [
+    "assembly_tables",
     "check_tables",
     "face_kind",
     "kinematics_tables",

@@ -364,9 +364,15 @@ def flywheel_faults(body: Entry, parts: Parts) -> Iterator[str]:
     if any(joint.record is None for joint in hinges):
         return
     turning = [
-        joint.record.at for joint in hinges if joint.record.kind in {"revolute", "cylindrical", "screw"}
+        joint.record.on(link_name)
+        for joint in hinges
+        if joint.record.kind in {"revolute", "cylindrical", "screw"}
     ]
-    apart = [math.dist(joint.record.at, body.record.at) for joint in parts.joints.values() if joint.record]
+    apart = [
+        math.dist(joint.record.on(link_name), body.record.at)
+        for joint in parts.joints.values()
+        if joint.record
+    ]
     near = 1e-9 + 1e-7 * max(apart, default=0.0)
     if not any(not math.dist(at, body.record.at) > near for at in turning):
         at = ", ".join(f"{part:.6g}" for part in body.record.at)

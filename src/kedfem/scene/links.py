@@ -8,14 +8,15 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
+from kedfem.scene.apart import Apart, JointPoint, apart
 from kedfem.scene.base import FileName, Record, refuse
 from kedfem.scene.bushings import Bushing
 from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
-from kedfem.scene.points import Axis, Point
+from kedfem.scene.points import XYZ, Axis
 from kedfem.scene.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
-from kedfem.scene.wording import shown
+from kedfem.scene.wording import shown, unknown_name
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
@@ -186,8 +187,9 @@ class Joint(Record):
     the second"""
     links: tuple[str, str]
     """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
-    at: Point
-    """its centre"""
+    at: JointPoint
+    """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
+    `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
     axis: Axis | None = None
     """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), the direction of what slides, the normal of a
     planar joint (required for those); for a ball or a weld the axis of the bore that holds it"""
@@ -208,6 +210,34 @@ class Joint(Record):
     def stiff(self, link: str) -> bool:
         """Whether the seat on a link keeps its shape."""
         return (self.port.get(link) if isinstance(self.port, dict) else self.port) == "stiff"
+
+    @property
+    def points(self) -> dict[str, XYZ]:
+        """Its points by link [m], where it has one for each."""
+        return self.at.points if isinstance(self.at, Apart) else {}
+
+    @property
+    def open(self) -> bool:
+        """Whether its links are drawn apart."""
+        return len(set(self.points.values())) > 1
+
+    def on(self, link: str) -> XYZ:
+        """Its point on a link [m]."""
+        return self.points.get(link, self.at)
+
+    @model_validator(mode="after")
+    def _point_of_each_link(self) -> Self:
+        if not isinstance(self.at, Apart):
+            return self
+        given, names = self.at.points, list(self.links)
+        wrong = [
+            (("at", name), unknown_name("a link of the joint", name, names))
+            for name in given
+            if name not in names
+        ]
+        lacking = [(("at", name), "is required [m], got nothing") for name in names if name not in given]
+        refuse([*wrong, *lacking])
+        return self.fill(at=apart({name: given[name] for name in names}))
 
     @model_validator(mode="after")
     def _hinge_along_z(self) -> Self:

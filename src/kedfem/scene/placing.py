@@ -49,6 +49,8 @@ class Placement(Mapping[str, XYZ]):
         if self._unknown:  # the points are no table, which is a fault of its own
             return UNPLACED
         where, value = self._raw[name]
+        if where[0] == "joints" and isinstance(value, Mapping) and isinstance(value.get("at"), Mapping):
+            raise fault(f"must be one point, got {name!r}, which has one for each of its links")
         if name in self._pending:
             circle = " → ".join([*self._pending[self._pending.index(name) :], name])
             raise fault(f"must not be defined by itself, got {circle}")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from kedfem.scene.apart import Apart
 from kedfem.scene.checks import fidelity, link_names
 from kedfem.scene.parts import NONE, Entry, Parts
 from kedfem.scene.points import XYZ
@@ -183,6 +184,9 @@ def points_of(record: Any) -> Iterator[tuple[Key, XYZ]]:
             yield ("shape", key, i), point
     for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
         yield ("shape", "outline", i), getattr(item, "to", item)
+    at = getattr(record, "at", None)
+    for name, point in at.points.items() if isinstance(at, Apart) else ():
+        yield ("at", name), point
     for key in ("at", "centre"):
         if getattr(record, key, None) is not None:
             yield (key,), getattr(record, key)

@@ -16,6 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from kedfem.scene import (
     analysis,
+    apart,
     bushings,
     damping,
     drives,
@@ -47,7 +48,7 @@ as *where: what was wanted, what was got*.
   `joints.NAME` for the place of a joint. **Axes** are `"x"`, `"y"`, `"z"` or a vector of any length.
   **Vectors** are two or three components; the third is 0 if left out.
 * **One reference position:** all points, shapes and axes hold where the linkage is drawn; the drive's angle
-  counts from there.
+  counts from there. Where joints have points of their own on each link, this position is the closed one.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
@@ -105,6 +106,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
 
 NAMED = {
     points.Point: ("point", "m"),
+    apart.JointPoint: ("point, or points by link", "m"),
     points.Axis: ("axis", ""),
     points.AccelerationVector: ("vector", "m/s²"),
     loads.ForceVector: ("vector", "N"),

@@ -163,13 +163,19 @@ class Polyline(Record):
 
 
 class MeshFile(Record):
-    """A mesh of hexahedra (8, 20 or 27 nodes) in a file that meshio reads, in the scene's coordinates; solid."""
+    """A mesh of hexahedra (8, 20 or 27 nodes) in a file that meshio reads; solid."""
 
     kind: Literal["mesh"] = "mesh"
     file: FileName
     """the mesh file, relative to the scene file"""
     scale: Annotated[float, Quantity("1", above=0.0)] = 1.0
     """metres per unit of the file: 0.001 for a file in millimetres"""
+    origin: Point = (0.0, 0.0, 0.0)
+    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the mesh is drawn in its place"""
+    towards: Point | None = None
+    """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
+    z: Axis | None = None
+    """`"x"`, `"y"`, `"z"` or a vector: where the file's z axis goes, as near as its x axis allows; z if not given"""
 
 
 class Cad(Record):

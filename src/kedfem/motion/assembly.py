@@ -1,0 +1,186 @@
+"""Links that are drawn a little apart: the least rigid motions that close all joints, and the scene drawn so."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.motion.freedom import RANK_TOLERANCE
+from kedfem.motion.linkage import GROUND, passive_rows, scene_centre, scene_size
+from kedfem.motion.newton import cross_matrix, rotation
+from kedfem.motion.redrawn import Shift, redrawn
+from kedfem.motion.rows import GAP, Row, Rows, stacked
+from kedfem.motion.values import Poses, features, jacobian, residuals
+from kedfem.scene import Scene
+
+MOST = 0.01  # of the linkage's size: larger misfits are faults of the drawing
+CLOSED = 1e-12  # of the size, and in radians: what rows may keep
+ROUNDING = 1e-13  # of the size, and in radians: motions that are none, such as those out of a linkage's plane
+SWEEPS = 60
+Change = Float[np.ndarray, "n 6"]
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """How links that were drawn apart have been closed; nothing where none were.
+
+    misfits : by joint [m], how far its links were drawn apart in the directions that it holds
+    moved : by link, how far the farthest of its joints' points went [m] and how far it turned [rad]
+    """
+
+    misfits: dict[str, float] = field(default_factory=dict)
+    moved: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The joint whose links were drawn farthest apart, and how far [m]."""
+        return max(self.misfits.items(), key=lambda each: each[1])
+
+
+def assembled(scene: Scene) -> tuple[Scene, Assembly]:
+    """A scene with all joints closed, and what that took; the scene itself where no links are drawn apart.
+
+    Links are moved as rigid bodies, with all that is on them: of all motions that close the rows of joints and couplings
+    those of the least Σ |d|²/size² + |θ|², d the displacement of the mean of a link's joints, θ its turn. The drive's
+    joint moves with the others; its angle then counts from the closed position.
+
+    Raises
+    ------
+    MotionError
+        A misfit above 1 % of the linkage's size, joints that no small motions close, or shapes that cannot be turned
+        out of their plane and would have to be.
+    """
+    if not any(joint.open for joint in scene.joints.values()):
+        return scene, Assembly()
+    rows, size = passive_rows(scene), scene_size(scene)
+    misfits = _misfits(scene, rows)
+    if too_far := [name for name, misfit in misfits.items() if misfit > MOST * size]:
+        wanted = f"must be one point for both links, up to 1 % of the linkage's size {size:.6g} [m]"
+        raise MotionError("\n".join(_told(scene, name, wanted, misfits[name]) for name in too_far))
+    centres = _centres(scene)
+    change, left = least_change(stacked(rows), centres, size)
+    open_rows = np.flatnonzero(~(left <= CLOSED))
+    if len(open_rows):
+        still = ", ".join(dict.fromkeys(rows[k].joint for k in open_rows))
+        wanted = f"must be a point to which small motions of the links bring both [m] (open still: {still})"
+        raise MotionError("\n".join(_told(scene, name, wanted, misfit) for name, misfit in misfits.items()))
+    middle = scene_centre(scene)
+    shifts = {
+        name: Shift(c + middle, size * x[:3], x[3:])
+        for name, c, x in zip(scene.links, centres, change, strict=True)
+    }
+    return redrawn(scene, shifts), Assembly(
+        misfits, {name: _way(scene, name, shifts[name]) for name in shifts}
+    )
+
+
+def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
+    """That links were moved, in a line; nothing where none were."""
+    if not assembly.misfits:
+        return ()
+    (joint, misfit), way = assembly.worst, max(assembly.moved.values())[0]
+    several = "" if len(assembly.misfits) == 1 else f", the most of {len(assembly.misfits)} joints"
+    return (
+        f"joints.{joint}: its links are drawn {misfit:.3g} m apart{several}; "
+        f"closed by moving links up to {way:.3g} m (kedfem check tells which)",
+    )
+
+
+def least_change(
+    rows: Rows, centres: Float[np.ndarray, "n 3"], size: float
+) -> tuple[Change, Float[np.ndarray, " m"]]:
+    """Displacements (of centres, in units of size) and rotation vectors of n bodies that close rows, of the least norm.
+
+    Each sweep solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. Where that settles, r = 0 and x is in the span of Jᵀ: no
+    change of first order makes it less.
+
+    Returns
+    -------
+    (n, 6); and (m,) what rows keep, in units of size and radians, infinite where sweeps have not settled
+    """
+    x, scale = np.zeros((len(centres), 6)), rows.scale(size)[: rows.count]
+    for _ in range(SWEEPS):
+        J, r = _linearised(rows, x, centres, size)
+        if not np.isfinite(J).all() or np.abs(x).max() > 1:
+            return x, np.full(rows.count, np.inf)
+        new = scipy.linalg.lstsq(J, J @ x.ravel() - r, cond=RANK_TOLERANCE)[0].reshape(x.shape)
+        step, x = float(np.abs(new - x).max()), new
+        if step <= ROUNDING / 100:
+            break
+    x = np.where(np.abs(x) < ROUNDING, 0.0, x)
+    f = features(rows, _poses(x, centres, size), np.zeros((1, len(rows.angles))))
+    return x, np.asarray(np.abs(residuals(rows, f, np.zeros((1, 0)))[0] * scale))
+
+
+def _linearised(
+    rows: Rows, x: Change, centres: Float[np.ndarray, "n 3"], size: float
+) -> tuple[Float[np.ndarray, "m k"], Float[np.ndarray, " m"]]:
+    """Derivatives of scaled rows by displacements and rotation vectors, and their values."""
+    poses = _poses(x, centres, size)
+    f = features(rows, poses, np.zeros((1, len(rows.angles))))
+    J = jacobian(rows, f, len(x) + 1, size)[0].reshape(rows.count, len(x), 6)
+    turning = _turning(x[:, 3:])  # ω = T θ', and v = d' − ω × R c
+    arms = cross_matrix((poses[0][0, 1:] @ centres[..., None])[..., 0] / size)
+    by_theta = np.einsum("mbi,bij->mbj", J[..., :3], arms @ turning)
+    by_theta += np.einsum("mbi,bij->mbj", J[..., 3:], turning)
+    values = residuals(rows, f, np.zeros((1, 0)))[0] * rows.scale(size)[: rows.count]
+    return np.concatenate([J[..., :3], by_theta], axis=2).reshape(rows.count, -1), values
+
+
+def _poses(x: Change, centres: Float[np.ndarray, "n 3"], size: float) -> Poses:
+    """Of all bodies, the ground first."""
+    R = np.concatenate([np.eye(3)[None], rotation(x[:, 3:])])
+    p = np.zeros((len(x) + 1, 3))
+    p[1:] = size * x[:, :3] - ((R[1:] - np.eye(3)) @ centres[..., None])[..., 0]
+    return R[None], p[None]
+
+
+def _turning(theta: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
+    """T of ω = T θ', for exp([θ]×): I + (1 − cos θ)/θ² [θ]× + (θ − sin θ)/θ³ [θ]×²."""
+    angle, W = np.linalg.norm(theta, axis=1)[:, None, None], cross_matrix(theta)
+    safe = np.maximum(angle, 1e-3)
+    one = np.where(angle < 1e-3, 1 / 2 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
+    two = np.where(angle < 1e-3, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
+    return np.asarray(np.eye(3) + one * W + two * (W @ W))
+
+
+def _centres(scene: Scene) -> Float[np.ndarray, "n 3"]:
+    """Mean of the points of each link's joints, from the linkage's centre [m]."""
+    points = [list(_points(scene, name)) for name in scene.links]
+    middle = scene_centre(scene)
+    return np.array([np.mean(each, axis=0) - middle if each else np.zeros(3) for each in points])
+
+
+def _points(scene: Scene, link: str) -> Iterator[tuple[float, float, float]]:
+    """Where the joints of a link are on it [m]."""
+    return (joint.on(link) for joint in scene.joints.values() if link in joint.links)
+
+
+def _misfits(scene: Scene, rows: list[Row]) -> dict[str, float]:
+    """How far each joint whose links are drawn apart is open, in the directions that it holds [m]."""
+    bodies, square = (GROUND, *scene.links), {name: 0.0 for name, joint in scene.joints.items() if joint.open}
+    for row in rows:
+        if row.joint in square and row.kind == GAP and not row.plus:
+            joint = scene.joints[row.joint]
+            square[row.joint] += (
+                float(np.subtract(joint.on(bodies[row.i]), joint.on(bodies[row.j])) @ row.b) ** 2
+            )
+    return {name: float(np.sqrt(each)) for name, each in square.items()}
+
+
+def _told(scene: Scene, name: str, wanted: str, misfit: float) -> str:
+    """The refusal of one joint, with both of its points."""
+    points = (
+        f"({', '.join(f'{part:.6g}' for part in point)}) on {link!r}"
+        for link, point in scene.joints[name].points.items()
+    )
+    return f"joints.{name}.at: {wanted}, got {' and '.join(points)}, {misfit:.4g} apart"
+
+
+def _way(scene: Scene, name: str, shift: Shift) -> tuple[float, float]:
+    """How far a link moves [m] and turns [rad]."""
+    went = [float(np.linalg.norm(np.subtract(shift.point(at), at))) for at in _points(scene, name)]
+    return max(went, default=0.0), float(np.linalg.norm(shift.theta))

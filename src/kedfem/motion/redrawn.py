@@ -1,0 +1,240 @@
+"""A scene drawn anew after small rigid motions of its links: everything on a link goes with it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.motion.linkage import moving_pair
+from kedfem.motion.newton import rotation
+from kedfem.scene import (
+    GROUND,
+    Arc,
+    Bar,
+    Cad,
+    Extrusion,
+    Joint,
+    LineSpring,
+    LinkScene,
+    MeshFile,
+    Part,
+    PlateLink,
+    Polyline,
+    RigidBody,
+    Scene,
+    Spring,
+    inertia_tensor,
+)
+from kedfem.scene.base import Record
+
+TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding
+FREELY = (
+    "prismatic",
+    "cylindrical",
+    "screw",
+    "planar",
+    "slot",
+)  # whose points may part along what they leave free
+XYZ = tuple[float, float, float]
+AnyRecord = TypeVar("AnyRecord", bound=Record)
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """A rigid motion: x goes to x + d + (R − I)(x − c), R = exp([θ]×).
+
+    centre, d : (3,) c and d [m]
+    theta : (3,) θ [rad]
+    """
+
+    centre: Float[np.ndarray, "3"]
+    d: Float[np.ndarray, "3"]
+    theta: Float[np.ndarray, "3"]
+
+    @property
+    def R(self) -> Float[np.ndarray, "3 3"]:
+        """The rotation."""
+        return rotation(self.theta)
+
+    def point(self, x: XYZ) -> XYZ:
+        """Where a point goes; coordinates that do not change stay as they are to the last digit."""
+        moved = np.asarray(x) + self.d + (self.R - np.eye(3)) @ (np.asarray(x) - self.centre)
+        return _three(moved)
+
+    def turned(self, a: XYZ) -> XYZ:
+        """A direction, or a vector."""
+        return _three(np.asarray(a) + (self.R - np.eye(3)) @ np.asarray(a))
+
+
+def _three(x: Float[np.ndarray, "3"]) -> XYZ:
+    return float(x[0]), float(x[1]), float(x[2])
+
+
+STILL = Shift(np.zeros(3), np.zeros(3), np.zeros(3))
+
+
+def redrawn(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
+    """A scene whose links have moved; joints have one point again, the ground stays.
+
+    Raises
+    ------
+    MotionError
+        Shapes that cannot be drawn in their new place, all of them.
+    """
+    links, faults = {}, []
+    for name, link in scene.links.items():
+        try:
+            links[name] = _link(name, link, shifts[name])
+        except MotionError as error:
+            faults.append(str(error))
+    if faults:
+        raise MotionError("\n".join(faults))
+    return scene.model_copy(
+        update={
+            "links": links,
+            "joints": {
+                name: _joint(joint, {**shifts, GROUND: STILL}) for name, joint in scene.joints.items()
+            },
+            "loads": {name: _carried(load, shifts[load.link]) for name, load in scene.loads.items()},
+            "bodies": {name: _carried(body, shifts[body.link]) for name, body in scene.bodies.items()},
+            "springs": {name: _spring(spring, shifts) for name, spring in scene.springs.items()},
+            "output": scene.output.model_copy(
+                update={"probes": {k: _carried(x, shifts[x.link]) for k, x in scene.output.probes.items()}}
+            ),
+            "analysis": scene.analysis.model_copy(
+                update={
+                    "initial_motions": {
+                        name: _carried(motion, shifts[name])
+                        for name, motion in scene.analysis.initial_motions.items()
+                    }
+                }
+            ),
+        }
+    )
+
+
+def _carried(record: AnyRecord, shift: Shift) -> AnyRecord:
+    """What is on a link: its points, a vector in the link's frame, inertia."""
+    change: dict[str, Any] = {
+        key: shift.point(getattr(record, key))
+        for key in ("at", "centre")
+        if getattr(record, key, None) is not None
+    }
+    if getattr(record, "frame", None) == "link" and hasattr(record, "vector"):
+        change["vector"] = shift.turned(record.vector)
+    if isinstance(record, RigidBody):
+        J = shift.R @ inertia_tensor(record.inertia) @ shift.R.T
+        change["inertia"] = tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)))
+    return record.model_copy(update=change)
+
+
+def _spring(spring: Spring, shifts: Mapping[str, Shift]) -> Spring:
+    """Ends on links go with them."""
+    if not isinstance(spring, LineSpring) or spring.between is None:
+        return spring
+    ends = tuple(_carried(end, shifts.get(end.link, STILL)) for end in spring.between)
+    return spring.model_copy(update={"between": ends})
+
+
+def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
+    """A closed joint: its point is the ground's, of what slides that of the moving link; its axis likewise."""
+    first, moving = joint.links[0], moving_pair(joint)[0]
+    still = GROUND if GROUND in joint.links else first
+    of = {"slot": first}.get(joint.kind, moving if joint.kind in FREELY else still)
+    along = {"slot": joint.links[1], "spherical": moving}.get(joint.kind, still)
+    change: dict[str, Any] = {"at": shifts[of].point(joint.on(of))}
+    if joint.axis is not None:
+        change["axis"] = shifts[along].turned(joint.axis)
+    if joint.axes is not None:
+        change["axes"] = tuple(shifts[x].turned(a) for x, a in zip(joint.links, joint.axes, strict=True))
+    return joint.model_copy(update=change)
+
+
+def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
+    """A link with its shape moved."""
+    where = f"links.{name}.shape"
+    change: dict[str, Any] = {}
+    if link.shape is None or not (shift.d.any() or shift.theta.any()):
+        return link
+    match link.shape:
+        case Polyline() as line:
+            points = tuple(shift.point(x) for x in line.points)
+            change = {"points": points, "up": _up(where, line.up, _directions(line), shift)}
+        case Bar() as bar if link.fidelity == "beam":
+            if _tilt(shift, *_defaults([bar.between])) > 0.0:
+                line = Polyline(points=bar.between, width=bar.width, thickness=bar.thickness)
+                return _link(name, link.model_copy(update={"shape": line}), shift)
+            change = {"between": tuple(shift.point(x) for x in bar.between)}
+        case Bar() | PlateLink() | Part() as shape:
+            _check_level(where, shape.kind, shift)
+            change = {"between": tuple(shift.point(x) for x in shape.between)}
+        case Extrusion() as plate:
+            _check_level(where, plate.kind, shift)
+            change = {
+                "outline": tuple(_item(item, shift) for item in plate.outline),
+                "holes": tuple(_carried(hole, shift) for hole in plate.holes),
+            }
+        case Cad() | MeshFile() as file:
+            change = _placing(file, shift)
+    return link.model_copy(update={"shape": link.shape.model_copy(update=change)})
+
+
+def _item(item: XYZ | Arc, shift: Shift) -> XYZ | Arc:
+    """A corner or an arc of an outline."""
+    if isinstance(item, Arc):
+        return item.model_copy(update={"via": shift.point(item.via), "to": shift.point(item.to)})
+    return shift.point(item)
+
+
+def _placing(shape: Cad | MeshFile, shift: Shift) -> dict[str, Any]:
+    """Where a file's origin and axes go."""
+    along = (1.0, 0.0, 0.0) if shape.towards is None else _three(np.subtract(shape.towards, shape.origin))
+    flat = math.hypot(*along[:2]) / math.hypot(*along)
+    z = shape.z or ((0.0, 0.0, 1.0) if flat > 1e-9 else (1.0, 0.0, 0.0))
+    origin, turned = shift.point(shape.origin), shift.turned(z)
+    return {
+        "origin": origin,
+        "towards": _three(np.add(origin, shift.turned(along))),
+        "z": shape.z if turned == z else turned,
+    }
+
+
+def _directions(line: Polyline) -> list[tuple[XYZ, XYZ]]:
+    """The segments whose direction decides where a section is up."""
+    return list(pairwise(line.points))[: 1 if line.smooth else None]
+
+
+def _defaults(segments: list[tuple[XYZ, XYZ]]) -> list[XYZ]:
+    """Where sections of segments are up if nothing is said: z, of steep ones x."""
+    steep = {abs(Q[2] - P[2]) >= 0.9 * math.dist(P, Q) for P, Q in segments}
+    return [(1.0, 0.0, 0.0) if each else (0.0, 0.0, 1.0) for each in sorted(steep)]
+
+
+def _tilt(shift: Shift, *ups: XYZ) -> float:
+    """How far a motion turns directions [rad]."""
+    return max(math.dist(shift.turned(up), up) for up in ups)
+
+
+def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shift) -> XYZ | None:
+    """Where the sections of a polyline are up after a motion."""
+    ups = _defaults(segments) if up is None else [up]
+    if _tilt(shift, *ups) == 0.0:
+        return up
+    if len(ups) > 1:
+        raise MotionError(
+            f"{where}.up: is required where closing the joints turns a line with steep parts, got nothing"
+        )
+    return shift.turned(ups[0])
+
+
+def _check_level(where: str, kind: str, shift: Shift) -> None:
+    """Shapes that are level with the xy plane stay so."""
+    tilt = _tilt(shift, (0.0, 0.0, 1.0))
+    if tilt > TILTED:
+        wanted = "must be a polyline, a part from CAD or a mesh where closing the joints tilts it"
+        raise MotionError(f"{where}: {wanted}, got a {kind} tilted by {math.degrees(tilt):.3g} deg")
