@@ -73,7 +73,9 @@ def known(model: Model, name: str) -> tuple[bool, bool]:
     null = U[:, int((s > DEPENDENT).sum()) :]
     joint, here = of_joint(model.rows, name)
     loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
-    if any(link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)):
+    if any(
+        link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)
+    ):
         loose &= rows.C[0, here].any(axis=1) | in_plane(joint.gap, joint.turn)
     force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
     return not bool((loose & force).any()), not bool((loose & moment).any())
