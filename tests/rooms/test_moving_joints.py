@@ -356,6 +356,10 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
         scene_from(inverted(frames="following"))
     with pytest.raises(SceneError, match=r"joints\.S\.kind: must stand without analysis\.stiffening"):
         scene_from(inverted(stiffening=True))
+    for key, value in (("frames", "following"), ("stiffening", True)):
+        raw = bushed(1.0, **{key: value})
+        with pytest.raises(SceneError, match=r"joints\.S\.bushing: must .* got one"):
+            scene_from(raw)
     raw = driven_slide()
     raw["drive"]["shaft_stiffness"] = 1.0
     with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for a hinge, got 'A'"):
@@ -363,6 +367,13 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
     raw = bushed(1.0)
     raw["joints"]["S"]["bushing"]["stiffness"] = [1.0, 2.0]
     with pytest.raises(SceneError, match=r"joints\.S\.bushing\.stiffness: must be one number or three"):
+        scene_from(raw)
+    raw["joints"]["S"]["bushing"]["stiffness"] = -1.0
+    with pytest.raises(SceneError, match=r"joints\.S\.bushing\.stiffness: must be positive \[N/m\], got -1$"):
+        scene_from(raw)
+    raw = inverted("beam", "slot")
+    raw["joints"]["S"]["bushing"] = {"turning_stiffness": 1.0}
+    with pytest.raises(SceneError, match=r"joints\.S\.bushing\.turning_stiffness: must .* got a slot joint"):
         scene_from(raw)
 
 
