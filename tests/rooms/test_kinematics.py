@@ -293,6 +293,58 @@ def test_a_sketch_of_joints_alone_is_enough(run_kedfem: Command, tmp_path: Path)
     assert run_kedfem("run", path).code == USER_ERROR  # which needs shapes
 
 
+BLOCK = """
+[points]
+A = [0, 0]
+B = [0, 0.1]
+D = [-0.3, 0]
+
+[links]
+crank = {{}}
+block = {{ fidelity = "rigid"{mass} }}
+rocker = {{ fidelity = "rigid"{other} }}
+
+[joints]
+A = {{ kind = "revolute", links = ["ground", "crank"], at = "A" }}
+B = {{ kind = "revolute", links = ["crank", "block"], at = "B" }}
+slide = {{ kind = "prismatic", links = ["rocker", "block"], at = "B", axis = [3, 1] }}
+D = {{ kind = "revolute", links = ["rocker", "ground"], at = "D" }}
+
+[drive]
+joint = "A"
+motion = {{ kind = "constant_speed", speed = "60 rpm" }}
+
+[analysis]
+turns = 1
+
+[output]
+plots = false
+"""
+
+
+def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(
+    run_kedfem: Command, tmp_path: Path
+) -> None:
+    """The rocker bears nothing, so the crank's pin holds the block on its circle."""
+    path = tmp_path / "block.toml"
+    path.write_text(BLOCK.format(mass=", mass = 0.2", other=""), encoding="utf-8")
+    said = run_kedfem("kinematics", path)
+    assert said.code == 0, said.err
+    channels = read_results(tmp_path / "block-kinematics" / "results.h5").channels
+    force = np.linalg.norm(channels["joints/B/rigid_force"][1], axis=1)
+    assert_allclose(force, 0.2 * 0.1 * (2 * np.pi) ** 2, rtol=1e-9)
+    pin = 0.1 * np.exp(1j * (np.pi / 2 + channels["joints/A/angle"][1][:, 0])) + 0.3
+    assert_allclose(channels["joints/D/angle"][1][:, 0], np.angle(pin) - np.arctan2(1, 3), atol=1e-10)
+    path.write_text(
+        BLOCK.format(mass="", other="").replace("crank = {}", 'crank = { fidelity = "rigid", mass = 1 }')
+    )
+    said = run_kedfem("kinematics", path)
+    assert said.code == USER_ERROR
+    assert "links.crank.mass: must be that of what slides [kg], got 1 without a prismatic joint" in " ".join(
+        said.err.split()
+    )
+
+
 def test_a_coupler_that_jams_is_warned_of(run_kedfem: Command, tmp_path: Path) -> None:
     path = tmp_path / "sketch.toml"
     path.write_text(

@@ -358,6 +358,10 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
         scene_from(inverted(frames="following"))
     with pytest.raises(SceneError, match=r"joints\.S\.kind: must stand without analysis\.stiffening"):
         scene_from(inverted(stiffening=True))
+    for key, value in (("frames", "following"), ("stiffening", True)):
+        raw = bushed(1.0, **{key: value})
+        with pytest.raises(SceneError, match=r"joints\.S\.bushing: must .* got one"):
+            scene_from(raw)
     raw = driven_slide()
     raw["drive"]["shaft_stiffness"] = 1.0
     with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for a hinge, got 'A'"):
@@ -365,6 +369,13 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
     raw = bushed(1.0)
     raw["joints"]["S"]["bushing"]["stiffness"] = [1.0, 2.0]
     with pytest.raises(SceneError, match=r"joints\.S\.bushing\.stiffness: must be one number or three"):
+        scene_from(raw)
+    raw["joints"]["S"]["bushing"]["stiffness"] = -1.0
+    with pytest.raises(SceneError, match=r"joints\.S\.bushing\.stiffness: must be positive \[N/m\], got -1$"):
+        scene_from(raw)
+    raw = inverted("beam", "slot")
+    raw["joints"]["S"]["bushing"] = {"turning_stiffness": 1.0}
+    with pytest.raises(SceneError, match=r"joints\.S\.bushing\.turning_stiffness: must .* got a slot joint"):
         scene_from(raw)
 
 
@@ -390,3 +401,15 @@ def test_a_light_block_on_a_pin_and_the_pin_itself_in_a_slot_press_alike() -> No
             link["material"] = "feather" if name == "block" else "stiff"
         found.append(channels(*ran(raw))["joints/S/force" if kind == "slot" else "joints/C/force"])
     assert_allclose(found[0], found[1], atol=1e-3 * np.abs(found[1]).max())
+
+
+def test_a_solid_block_on_a_planar_beam_tells_its_force() -> None:
+    """What the beam, which moves in its plane only, cannot bear of the block is not left open: nothing loads it there."""
+    light = {"density": 1e-3, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}
+    found = []
+    for block in ({}, RIGID):
+        raw = with_links(inverted("beam", "prismatic", turns=0.1, steps_per_turn=360), block=block)
+        raw["links"]["block"]["material"] = "light"
+        found.append(channels(*ran(raw | {"materials": {"light": light}})))
+    for name in ("joints/S/force", "joints/S/moment", "joints/B/force"):
+        assert_allclose(found[1][name], found[0][name], atol=0.02 * np.abs(found[0][name]).max())

@@ -175,7 +175,8 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
 def _remedy(found: GeometricError, error: float) -> str:
     """What is right where the linear equation is not."""
     if found.model.rows:
-        names = ", ".join(f"joints.{name}" for name in dict.fromkeys(row.name for row in found.model.rows))
+        of = dict.fromkeys(row.name for row in found.model.rows)
+        names = ", ".join(name if name.startswith("gears.") else f"joints.{name}" for name in of)
         return f"stiffer links or a slower drive help (frames that follow do not know {names} yet)"
     following = 'analysis.frames = "following"'
     if error >= MODERATE:

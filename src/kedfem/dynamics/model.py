@@ -341,7 +341,9 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:
-        raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none")
+        raise MeshError(
+            f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape"
+        )
     key, other = held[0]
     carrier, seat = part_seat(scene, key, links, other)
     weights = port_weights(seat, np.array([joints[key].at]))[0]

@@ -20,8 +20,8 @@ def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
     if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
         return None
-    joint = next(j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links)
-    return joint_axis(joint)
+    joint = next((j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links), None)
+    return None if joint is None else joint_axis(joint)
 
 
 def seat_of(scene: Scene, name: str, link: Link) -> Seat:

@@ -19,7 +19,8 @@ from kedfem.report.links import link_table, way_tables
 from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
 from kedfem.report.words import NOTHING, with_prefix
-from kedfem.scene import LineSpring, Motor, Spring, time_grid
+from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
+from kedfem.scene.timing import turn_steps
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
@@ -28,7 +29,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
     second = [] if reduction is None else [reduction_table(reduction)]
     cost = _cost(ready, estimated_cost(ready.scene, ready.model))
     found = resolution(ready)
-    third = [] if found is None else [resolution_table(found)]
+    third = [] if found is None else [resolution_table(found, ready.scene)]
     return [
         *first,
         link_table(ready.model),
@@ -42,13 +43,12 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
     ]
 
 
-def resolution_table(found: Resolution) -> Table:
+def resolution_table(found: Resolution, scene: Scene) -> Table:
     """First frequency of the linkage against step and drive."""
+    span = "over the last turn" if turn_steps(scene) else "over the analysis"
     table = Table(title="First frequency (drive held, of what the loads excite)", show_header=False)
     low, high = found.first.min(), found.first.max()
-    table.add_row(
-        "over the last turn", f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"
-    )
+    table.add_row(span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz")
     table.add_row("steps in a period", f"{found.steps_per_period:.3g} at least")
     for each in found.meetings:
         angle = np.degrees(each.angle) % 360

@@ -10,7 +10,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joint_rows import directions, joint_rows, port_rows
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import turned_ports
-from kedfem.dynamics.row_joints import RowJoint
+from kedfem.dynamics.row_joints import RowJoint, in_plane
 from kedfem.motion.rigid import resting
 
 DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say
@@ -61,7 +61,10 @@ def of_joint(joints: Sequence[RowJoint], name: str) -> tuple[RowJoint, slice]:
 
 
 def known(model: Model, name: str) -> tuple[bool, bool]:
-    """Whether statics tell the force and the moment of a joint that holds by rows, as drawn."""
+    """Whether statics tell the force and the moment of a joint that holds by rows, as drawn.
+
+    What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
+    """
     bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
     rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
     if rows is None:
@@ -70,6 +73,10 @@ def known(model: Model, name: str) -> tuple[bool, bool]:
     null = U[:, int((s > DEPENDENT).sum()) :]
     joint, here = of_joint(model.rows, name)
     loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
+    if any(
+        link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)
+    ):
+        loose &= rows.C[0, here].any(axis=1) | in_plane(joint.gap, joint.turn)
     force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
     return not bool((loose & force).any()), not bool((loose & moment).any())
 

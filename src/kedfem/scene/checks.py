@@ -83,7 +83,8 @@ def link_faults(parts: Parts) -> Iterator[str]:
 
 def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
     """A rigid link without a shape that is not a slider, or keys of an elastic one."""
-    slides = any(is_slide(joint) and link.name in link_names(joint) for joint in parts.joints.values())
+    on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
+    slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
     if link.has("shape"):
         if not link.has("material"):
             yield link.fault("material", "is required for a rigid link with a shape, got nothing")
@@ -91,9 +92,12 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
             got = f"got {link.record.mass:.6g} for a link with a shape"
             yield link.fault("mass", f"must be given for a rigid slider only [kg], {got}")
     else:
-        if not slides:
+        if not slides and not sketched.get():
             wanted = "is required for a rigid link that is not a slider (a prismatic joint to the ground)"
             yield link.fault("shape", f"{wanted}, got nothing")
+        if sketched.get() and not rides and link.record is not None and link.record.mass:
+            got = f"got {link.record.mass:.6g} without a prismatic joint"
+            yield link.fault("mass", f"must be that of what slides [kg], {got}")
         for key in ("material", "element"):
             if link.has(key):
                 got = link.word(key) or "one"

@@ -21,6 +21,9 @@ def for_both(value: Any) -> Any:
     return value if value is None else (value, value)
 
 
+Ratios = Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(for_both)]
+
+
 class Damping(Record):
     """Proportional damping C = α M + β K, [KED, eq. (20)]: α and β, or damping ratios at two frequencies."""
 
@@ -28,7 +31,7 @@ class Damping(Record):
     """mass-proportional α"""
     beta: Annotated[float, Quantity("s", least=0.0)] = 0.0
     """stiffness-proportional β"""
-    ratio: Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(for_both)] = None
+    ratio: Ratios = None
     """instead of α and β: part of the critical damping at the two frequencies, one number for both or two"""
     frequencies: tuple[Frequency, Frequency] | None = None
     """the two frequencies of `ratio`"""

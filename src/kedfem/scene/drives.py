@@ -55,6 +55,9 @@ class Ramp(Record):
     """smooth: the speed rises as ½ (1 − cos πt/T), acceleration without jumps; linear: as t/T"""
 
 
+Smoothing = Annotated[Any, "of angles or travels"]
+
+
 class Table(Record):
     """An angle or a travel given over time: a cubic spline (twice continuously differentiable, not-a-knot ends)."""
 
@@ -68,7 +71,7 @@ class Table(Record):
     file: FileName | None = None
     """CSV file with two columns, time and angle (or travel), instead of the two lists; a heading may give the units:
     `time [s], angle [deg]`"""
-    smooth: Annotated[Any, Field()] = None
+    smooth: Smoothing = None
     """how far a smoother curve may pass from the values, in the mean square; for values that are rounded or measured"""
 
     @model_validator(mode="after")

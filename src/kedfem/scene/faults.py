@@ -57,7 +57,10 @@ def fault_lines(error: ValidationError, hint: Any, raw: Any, prefix: Where = ())
 def described(detail: ErrorDetails, hint: Any, raw: Any) -> tuple[Where, str]:
     """Place and message of one of pydantic's errors."""
     where, here, _ = walked(detail["loc"], hint, raw)
-    if detail["type"] == "missing" and isinstance(where[-1], int):
+    _, _, holder = walked(detail["loc"][:-1], hint, raw)
+    if where and isinstance(where[-1], int) and isinstance(holder, (str, int, float)):
+        where = where[:-1]  # one number given for each of several
+    if where and detail["type"] == "missing" and isinstance(where[-1], int):
         _, above, _ = walked(detail["loc"][:-1], hint, raw)
         return where[:-1], f"must hold {length_of(above)} values, got {len(detail['input'])}"
     if detail["type"] in {"union_tag_not_found", "union_tag_invalid"}:

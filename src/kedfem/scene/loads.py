@@ -28,6 +28,9 @@ BodyVector = Annotated[tuple[ForcePerVolume, ForcePerVolume, ForcePerVolume], Be
 SurfaceVector = Annotated[tuple[Pressure, Pressure, Pressure], BeforeValidator(as_vector)]
 
 
+Period = Annotated[Any, "of times or angles"]
+
+
 class Factor(Record):
     """What a load is multiplied by: linear between the points of a table, held outside or repeated."""
 
@@ -39,7 +42,7 @@ class Factor(Record):
     """times or angles, increasing"""
     value: tuple[Number, ...] = ()
     """factor there"""
-    period: Annotated[Any, Field()] = None
+    period: Period = None
     """time or angle after which the table repeats itself, such as `"360 deg"`; if not given it is held outside"""
     file: FileName | None = None
     """CSV file with two columns, time or angle and factor, instead of the two lists; a heading may give the unit:

@@ -40,22 +40,37 @@ def moving_joints(parts: Parts) -> list[Entry]:
 def moving_faults(parts: Parts) -> Iterator[str]:
     """Frames, stiffening and numerical damping that do not suit such joints; shafts of slides."""
     for joint in moving_joints(parts):
-        got = f"got a {'driven ' if joint.word('kind') in SHARED else ''}{joint.word('kind')} joint"
+        key, got = (
+            "kind",
+            f"got a {'driven ' if joint.word('kind') in SHARED else ''}{joint.word('kind')} joint",
+        )
         if joint.record.bushing is not None:
-            got = "got a joint with a bushing"
+            key, got = "bushing", "got one"
         if any_following(parts):
-            wanted = (
-                "must be revolute, spherical, weld, or prismatic on the ground, undriven and without bushing"
-            )
-            yield joint.fault("kind", f'{wanted}, with frames = "following", {got}')
+            wanted = "must be revolute, spherical, weld, or prismatic on the ground, and undriven,"
+            if key == "bushing":
+                wanted = "must be left out"
+            yield joint.fault(key, f'{wanted} with frames = "following", {got}')
         if parts.analysis.raw.get("stiffening") is True:
-            yield joint.fault("kind", f"must stand without analysis.stiffening, {got}")
+            yield joint.fault(key, f"must stand without analysis.stiffening, {got}")
         if parts.analysis.record is not None and parts.analysis.record.rho_inf == 1.0:
             wanted = f"must be less than 1 with joints.{joint.name} (its force would swing from step to step, and grow)"
             yield parts.analysis.fault("rho_inf", f"{wanted}: take 0.95, got 1")
+        if joint.record.bushing is not None:
+            yield from bushing_faults(joint)
     for drive in parts.all_drives:
         driven = parts.joints.get(drive.word("joint") or "")
         if drive.has("shaft_stiffness") and driven is not None and driven.word("kind") == "prismatic":
             yield drive.fault(
                 "shaft_stiffness", f"must be given for a hinge, got {driven.name!r}, which is prismatic"
             )
+
+
+def bushing_faults(joint: Entry) -> Iterator[str]:
+    """Springs against turns of a joint that lets its links turn freely."""
+    kind = joint.word("kind")
+    if kind in {"spherical", "slot"} and joint.record.bushing.turning_stiffness is not None:
+        wanted = "must be given for a joint that holds turns"
+        yield joint.fault(
+            "bushing", f"{wanted}, got a {kind} joint, which leaves all free", "turning_stiffness"
+        )

@@ -84,7 +84,14 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
     ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
     ("[joints.NAME]", "", [links.Joint]),
-    ("bushing of a joint", "", [bushings.Bushing]),
+    (
+        "bushing of a joint",
+        "One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right "
+        "angles to z and to\nthat world axis which is farthest from it as drawn (of equals the first), y at right angles "
+        "to both. Without an `axis` they are\nthe world's as drawn. They are fixed in the joint's second link, or the "
+        "ground if that is one.",
+        [bushings.Bushing],
+    ),
     ("[gears.NAME]", "", [drives.Gear]),
     ("[drive]", "Or several, as `[drives.NAME]`.", [drives.Drive]),
     ("[drive.motion]", "", models(drives.MotionLaw)),
@@ -118,6 +125,13 @@ NAMED = {
     motors.ForceOver: ("number or table", "N"),
     loads.Abscissa: ("number", "s, rad/s, rad, m/s or m"),
     drives.DriveSpeed: ("number", "rad/s or m/s"),
+    drives.Smoothing: ("number", "rad or m"),
+    loads.Period: ("number", "s or rad"),
+    damping.Ratios: ("number or 2 × number ≥ 0, < 1", ""),
+    bushings.Rates: ("number or 3 × number > 0", "N/m"),
+    bushings.Dampers: ("number or 3 × number ≥ 0", "N·s/m"),
+    bushings.TurningRates: ("number or 3 × number > 0", "N·m/rad"),
+    bushings.TurningDampers: ("number or 3 × number ≥ 0", "N·m·s/rad"),
     initial.JointSpeed: ("number", "rad/s or m/s"),
     initial.VelocityVector: ("vector", "m/s"),
     initial.SpinVector: ("vector", "rad/s"),
