@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
 from kedfem.analysis import analyse
-from kedfem.errors import MotionError
+from kedfem.errors import MotionError, SceneError
 from kedfem.links.beam_axis import directions
 from kedfem.mesh import link_mesh
 from kedfem.mesh.ways import file_axes
@@ -254,6 +254,19 @@ def test_slides_may_be_drawn_apart_along_their_axis() -> None:
     assert_allclose(assembly.misfits["guide"], 1e-4, rtol=1e-9)
     assert_allclose(closed.joints["guide"].at[1:], [1e-4, 0.0], rtol=0, atol=1e-15)
     assert closed.joints["guide"].axis == (1.0, 0.0, 0.0)
+
+
+def test_a_flywheel_sits_at_the_point_of_its_own_link() -> None:
+    raw = apart_four_bar()
+    end = raw["joints"]["C"]["at"]["coupler"]
+    raw["bodies"] = {"disc": {"kind": "flywheel", "link": "coupler", "at": end, "inertia": 1e-3}}
+    closed, _ = assembled(scene_from(raw))
+    assert_allclose(closed.bodies["disc"].at, closed.joints["C"].at, rtol=0, atol=1e-12)
+    raw["bodies"]["disc"]["link"] = "rocker"
+    with pytest.raises(
+        SceneError, match=r"bodies\.disc\.at: must be the point of a revolute joint of links\.rocker"
+    ):
+        scene_from(raw)
 
 
 def test_gears_stay_in_mesh_as_drawn() -> None:
