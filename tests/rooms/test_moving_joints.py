@@ -20,6 +20,7 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import linkage
+from kedfem.report.words import clock, moment
 from kedfem.results.row_forces import RowForces
 from kedfem.results.row_work import deflections
 from kedfem.scene import scene_from, time_grid
@@ -413,3 +414,11 @@ def test_a_solid_block_on_a_planar_beam_tells_its_force() -> None:
         found.append(channels(*ran(raw | {"materials": {"light": light}})))
     for name in ("joints/S/force", "joints/S/moment", "joints/B/force"):
         assert_allclose(found[1][name], found[0][name], atol=0.02 * np.abs(found[0][name]).max())
+
+
+def test_moments_are_told_by_what_the_drive_does() -> None:
+    told = [
+        (clock(scene), moment(scene, 0.0123, 0.01))
+        for scene in map(scene_from, (inverted(), driven_slide(), two_drives()))
+    ]
+    assert told == [("drive angle", "0.6°"), ("drive travel", "10 mm"), ("time", "12.3 ms")]

@@ -12,7 +12,7 @@ import pytest
 from kedfem.errors import OutputError
 from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
 from kedfem.output.abscissa import abscissa
-from kedfem.output.plots import envelope
+from kedfem.output.plots import drawn_over, envelope
 from kedfem.output.rendering import shape_functions, sight
 from kedfem.output.units import prefixed
 from kedfem.results import Channel, Results
@@ -300,6 +300,19 @@ def test_what_curves_are_drawn_over() -> None:
     nothing_driven = abscissa(time, 0 * time)
     assert nothing_driven.over_time
     assert nothing_driven.degrees is None
+
+
+@pytest.mark.parametrize(
+    "names", [["drive/force"], ["drive/rigid_force"], ["drive/A/torque", "drive/B/torque"]]
+)
+def test_curves_of_slides_and_of_several_drives_are_over_time(names: list[str]) -> None:
+    time = np.linspace(0, 1, 11)
+    channels = {name: (Channel(name, ("x",), "N", "", ""), np.ones((11, 1))) for name in names}
+    along = drawn_over(Results(time, time, channels, "complete", "{}"))
+    assert along.over_time
+    assert along.degrees is None
+    torque = {"drive/torque": next(iter(channels.values()))}
+    assert not drawn_over(Results(time, time, torque, "complete", "{}")).over_time
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,8 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
     What there is of rigid links too is drawn with it, dashed. Angles are in degrees.
 
     Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
-    with the drive angle below. Plots that an earlier run left in the folder are removed.
+    with the drive angle below; over time alone where the drive slides, or there are several. Plots that an earlier run
+    left in the folder are removed.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
     remove_plots(ready_folder(Path(folder)))
     if not len(results.time):
         return []
-    along = abscissa(results.time, results.angle)
+    along = drawn_over(results)
     written = []
     for picture in pictures(results):
         path = Path(folder) / f"{picture.name}.png"
@@ -66,6 +67,14 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
             _draw_panels(figure, along, picture.panels)
         written.append(path)
     return written
+
+
+def drawn_over(results: Results) -> Abscissa:
+    """The drive angle or time; time alone where channels tell of a drive that slides, or of several."""
+    of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
+    if any(len(parts) > 1 or parts[0] in {"force", "rigid_force"} for parts in of_drives):
+        return Abscissa(results.time, over_time=True)
+    return abscissa(results.time, results.angle)
 
 
 def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarray, " k"]:

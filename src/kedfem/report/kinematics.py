@@ -4,8 +4,8 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.kinematics import Moved, first_largest, worst_angle
-from kedfem.report.words import NOTHING, with_prefix
+from kedfem.kinematics import Moved, first_largest
+from kedfem.report.words import NOTHING, clock, moment, with_prefix
 from kedfem.results.kinematic import transmission_key
 from kedfem.scene import Scene
 
@@ -16,7 +16,7 @@ def kinematics_tables(scene: Scene, moved: Moved) -> list[Table]:
     spent = Table(title=f"{len(found.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in moved.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    tables = [_coordinates(scene, moved), _transmissions(moved), _forces(moved)]
+    tables = [_coordinates(scene, moved), _transmissions(scene, moved), _forces(scene, moved)]
     return [*(table for table in tables if table.row_count), spent]
 
 
@@ -35,24 +35,22 @@ def _coordinates(scene: Scene, moved: Moved) -> Table:
     return table
 
 
-def _transmissions(moved: Moved) -> Table:
+def _transmissions(scene: Scene, moved: Moved) -> Table:
     table = Table(title="Transmission angles")
-    for column in ("coupler", "drives", "from", "to", "furthest from 90°", "at drive angle"):
+    for column in ("coupler", "drives", "from", "to", "furthest from 90°", f"at {clock(scene)}"):
         table.add_column(column, justify="left" if column in {"coupler", "drives"} else "right")
     for each in moved.recorded.transmissions:
         values = moved.results.channels[transmission_key(each.coupler)][1][:, 0]
-        words = (
-            f"{np.degrees(x):.2f}°"
-            for x in (values.min(), values.max(), *worst_angle(values, moved.results.angle))
-        )
-        table.add_row(each.coupler, each.driven, *words)
+        k = first_largest(np.abs(values - np.pi / 2))
+        words = (f"{np.degrees(x):.2f}°" for x in (values.min(), values.max(), values[k]))
+        table.add_row(each.coupler, each.driven, *words, _at(scene, moved, k))
     return table
 
 
-def _forces(moved: Moved) -> Table:
+def _forces(scene: Scene, moved: Moved) -> Table:
     """Largest sizes; what statics do not tell is not there."""
     table = Table(title="Largest forces were all links rigid")
-    for column in ("of", "largest", "at drive angle"):
+    for column in ("of", "largest", f"at {clock(scene)}"):
         table.add_column(column, justify="left" if column == "of" else "right")
     found = {name: x for name, x in moved.results.channels.items() if "/rigid_" in name}
     highest: dict[str, float] = {}
@@ -66,8 +64,12 @@ def _forces(moved: Moved) -> Table:
         if abs(shown) <= NOTHING * highest[channel.unit]:
             table.add_row(of, "≈ 0", "")
             continue
-        table.add_row(of, with_prefix(shown, channel.unit), f"{np.degrees(moved.results.angle[k]):.1f}°")
+        table.add_row(of, with_prefix(shown, channel.unit), _at(scene, moved, k))
     return table
+
+
+def _at(scene: Scene, moved: Moved, k: int) -> str:
+    return moment(scene, float(moved.results.time[k]), float(moved.results.angle[k]))
 
 
 def _length(x: float) -> str:

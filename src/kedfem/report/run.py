@@ -6,7 +6,7 @@ from rich.text import Text
 
 from kedfem.analysis import Run
 from kedfem.report.plan import plan_tables
-from kedfem.report.words import NOTHING, moment, percent, with_prefix
+from kedfem.report.words import NOTHING, clock, moment, percent, with_prefix
 from kedfem.results.audit import Balance
 from kedfem.scene import Scene
 
@@ -15,8 +15,7 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
     before = [] if done.plan is None else plan_tables(done.plan)
     table = Table(title=Text(scene.title or "Largest values"))
-    when = "time" if scene.driven is None else "drive angle"
-    for column in ("channel", "component", "largest", when):
+    for column in ("channel", "component", "largest", clock(scene)):
         left = column in ("channel", "component")
         table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
     channels = done.results.channels.values()

@@ -19,9 +19,22 @@ def with_prefix(value: float, unit: str) -> str:
     return f"{value / factor:.4g} {prefix}{unit}"
 
 
+def clock(scene: Scene) -> str:
+    """What tells a moment: the only drive's angle or travel; without one, or with several, the time."""
+    if len(scene.driven_joints) != 1:
+        return "time"
+    (name,) = scene.driven_joints
+    return "drive travel" if scene.joints[name].kind == "prismatic" else "drive angle"
+
+
 def moment(scene: Scene, time: float, angle: float) -> str:
-    """A drive angle [rad] in degrees; without a drive the time [s]."""
-    return with_prefix(time, "s") if scene.driven is None else f"{np.degrees(angle):.1f}°"
+    """A drive angle [rad] in degrees, a drive's travel [m], or the time [s], as `clock` says."""
+    match clock(scene):
+        case "time":
+            return with_prefix(time, "s")
+        case "drive travel":
+            return with_prefix(angle, "m")
+    return f"{np.degrees(angle):.1f}°"
 
 
 def percent(x: float) -> str:
