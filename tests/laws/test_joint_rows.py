@@ -171,7 +171,7 @@ def test_the_literal_steps_agree(kind: str) -> None:
     raw = shortened(EVERY[kind](), 0.01 if kind in BEAMS else 0.002)
     (ready, wanted), (_, got) = ran(raw, LiteralSteps), ran(raw)
     links = range(len(ready.model.links))
-    digits = ROUNDING["beams" if kind in BEAMS else "solids"]
+    digits = 1e-7 if kind in BEAMS else 1e-8  # solids hardly move in four steps
     for name in ("u", "v"):
         size = max(np.abs(state(wanted, k, name)).max() for k in links)
         for k in links:
