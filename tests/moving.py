@@ -157,24 +157,29 @@ def geared() -> dict[str, Any]:
     }
 
 
-def turned(raw: dict[str, Any], R: np.ndarray) -> dict[str, Any]:
-    """A scene of beams in space, turned as a whole."""
+def turned(raw: dict[str, Any], R: np.ndarray, shift: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:
+    """A scene of beams in space, turned and shifted as a whole; of other links only joints and gravity are."""
 
     def vector(x: Any) -> list[float]:
         return [float(c) for c in R @ np.asarray(x, float)]
 
-    links = {
-        name: {**link, "shape": {**link["shape"], "points": [vector(p) for p in link["shape"]["points"]],
-                                 "up": vector(link["shape"]["up"])}}
-        for name, link in raw["links"].items()
-    }  # fmt: skip
+    def point(x: Any) -> list[float]:
+        return [float(c) for c in R @ np.asarray(x, float) + shift]
+
+    def moved(shape: dict[str, Any]) -> dict[str, Any]:
+        if shape["kind"] != "polyline":
+            return shape
+        return {**shape, "points": [point(p) for p in shape["points"]], "up": vector(shape["up"])}
+
+    links = {name: {**link, "shape": moved(link["shape"])} for name, link in raw["links"].items()}
     joints = {
-        name: {**joint, "at": vector(joint["at"])}
+        name: {**joint, "at": point(joint["at"])}
         | ({"axis": vector(joint["axis"])} if "axis" in joint else {})
         | ({"axes": [vector(a) for a in joint["axes"]]} if "axes" in joint else {})
         for name, joint in raw["joints"].items()
     }
-    return {**raw, "links": links, "joints": joints}
+    gravity = {"gravity": vector(raw["gravity"])} if "gravity" in raw else {}
+    return {**raw, "links": links, "joints": joints, **gravity}
 
 
 def screwed() -> dict[str, Any]:

@@ -15,15 +15,14 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
-from kedfem.links.record import in_space
 from kedfem.motion.linkage import linkage
 from kedfem.report.words import clock, moment
 from kedfem.results.row_forces import RowForces
 from kedfem.results.row_work import deflections
-from kedfem.scene import scene_from, time_grid
+from kedfem.scene import scene_from
+from tests.joint_checks import unbalanced
 from tests.moving import (
     bar,
     cardan,
@@ -34,7 +33,6 @@ from tests.moving import (
     ran,
     screwed,
     state,
-    turned,
     two_drives,
 )
 
@@ -96,16 +94,15 @@ def test_stiffer_links_bear_what_rigid_ones_do() -> None:
 
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_condensed_and_dense_steps_are_the_literal_ones(kind: str) -> None:
-    """Three ways to one number; beams in space are left to the first two: their stiff hubs cost digits."""
+    """Three ways to one number."""
     found = []
     for solver in (LiteralSteps, CondensedSteps, DenseSteps):
         ready, blocks = ran(KINDS[kind](), solver)
         links = range(len(ready.model.links))
         found.append([state(blocks, k, name) for name in ("u", "v", "port_forces") for k in links])
-    tolerance = 2e-5 if kind in {"universal joint", "nut on a spindle"} else 1e-7
     for other in found[1:]:
         for x, y in zip(other, found[0], strict=True):
-            assert_allclose(x, y, atol=tolerance * np.abs(y).max())
+            assert_allclose(x, y, atol=1e-7 * np.abs(y).max())
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
@@ -162,19 +159,9 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
     assert_allclose(e[1] / e[0], 8, rtol=0.2)
 
 
-def balanced(ready: Prepared, a: np.ndarray) -> np.ndarray:
-    """The accelerations with which forces at the end of steps are in balance."""
-    scheme = generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf)
-    out = a.copy()
-    for k in range(1, len(a)):
-        both = (1 - scheme.alpha_m) * a[k] + scheme.alpha_m * a[k - 1]
-        out[k] = (both - scheme.alpha_f * out[k - 1]) / (1 - scheme.alpha_f)
-    return out
-
-
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None:
-    """Σ joint forces + Σ (P − M R0'') = Σ M δ'': K δ has no resultant, in any frame.
+    """Σ joint forces + Σ (P − M R0'') = Σ M δ'', and so of moments: K δ has no resultant, in any frame.
 
     Generalised-α's own δ'' is that of another instant; the one that balances the forces at a step's end follows from it,
     (1 − α_f) â1 + α_f â0 = (1 − α_m) a1 + α_m a0 (Arnold and Brüls 2007).
@@ -183,22 +170,10 @@ def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None
 
 
 def assert_balanced(ready: Prepared, blocks: list[Block]) -> None:
-    forces = channels(ready, blocks)
-    for k, link in enumerate(ready.model.links):
-        loads = np.einsum("tnd,n->td", state(blocks, k, "F"), link.one)
-        inertia = np.einsum("tnd,nd->td", balanced(ready, state(blocks, k, "a")), link.m1)
-        left = in_space(link, loads - inertia)
-        for name, joint in ready.scene.joints.items():
-            if link.name in joint.links:
-                on = joint.links[1] if joint.links[0] == "ground" else joint.links[0]
-                left = left + (1.0 if on == link.name else -1.0) * forces[f"joints/{name}/force"]
-        size = max(np.abs(forces[f"joints/{name}/force"]).max() for name in ready.scene.joints)
-        stiff = (
-            any(x.kind == "spatial_beam" for x in ready.model.links),
-            any(x.rigid for x in ready.model.links),
-        )
-        digits = 1e-6 if stiff[0] else 1e-7 if stiff[1] else 1e-8  # stiff hubs and rigid links cost some
-        assert np.abs(left).max() < digits * size
+    digits = (
+        5e-7 if any(link.rigid for link in ready.model.links) else 1e-8
+    )  # rigid links are very stiff ones
+    assert max(unbalanced(ready, blocks)) < digits
 
 
 def test_a_pin_that_does_not_move_along_its_slot_is_a_hinge_across_it() -> None:
@@ -233,7 +208,7 @@ def test_a_pin_that_leaves_its_link_is_refused() -> None:
 
 def bushed(stiffness: float, damping: float = 0.0, **analysis: Any) -> dict[str, Any]:
     """The block on its arm, in a bushing; and its hinge too."""
-    raw = inverted("beam", "prismatic", rho_inf=0.8, **analysis)
+    raw = inverted("beam", "prismatic", **{"rho_inf": 0.8, **analysis})
     turning = {"turning_stiffness": 1e-3 * stiffness, "turning_damping": 1e-3 * damping}
     raw["joints"]["S"]["bushing"] = {"stiffness": stiffness, "damping": damping, **turning}
     raw["joints"]["C"]["bushing"] = {"stiffness": [stiffness, 2 * stiffness, stiffness]}
@@ -261,15 +236,37 @@ def test_bushings_are_the_same_in_all_steps() -> None:
             assert_allclose(x, y, atol=1e-8 * np.abs(y).max())
 
 
-@pytest.mark.parametrize("make", [lambda n: bushed(1e5, turns=0.25, steps_per_turn=n),
-                                  lambda n: inverted("beam", "slot", turns=0.25, steps_per_turn=n)])  # fmt: skip
-def test_energy_is_kept_account_of_to_second_order(make: Any) -> None:
+def residual(raw: dict[str, Any]) -> np.ndarray:
+    return channels(*ran(raw))["energy/residual"][:, 0]
+
+
+ACCOUNTS = {
+    "bushings": lambda n: bushed(1e5, turns=0.25, steps_per_turn=n),
+    "damped bushings": lambda n: bushed(1e5, 1e2, turns=0.25, steps_per_turn=n, rho_inf=0.95),
+    "slot": lambda n: inverted("beam", "slot", turns=0.25, steps_per_turn=n),
+    "universal joint": lambda n: cardan(turns=0.1, steps_per_turn=n),
+}
+
+
+@pytest.mark.parametrize("kind", list(ACCOUNTS))
+def test_energy_is_kept_account_of_to_second_order(kind: str) -> None:
     """Half the step leaves a quarter over, also where more than one block of steps is taken (1024)."""
-    left = []
-    for steps in (2880, 5760):
-        ready, blocks = ran(make(steps))
-        left.append(np.abs(channels(ready, blocks)["energy/residual"]).max())
+    left = [np.abs(residual(ACCOUNTS[kind](steps))).max() for steps in (2880, 5760)]
     assert_allclose(left[0] / left[1], 4, rtol=0.1)
+
+
+def test_what_numerical_damping_takes_from_damped_bushings_falls_as_the_cube_of_the_step() -> None:
+    """Vibration on bushings that steps hardly resolve loses energy to ρ∞ < 1, which counts as residual: a seventh to an
+    eighth of it is left with half the step, more than second order asks for, until the rest, a quarter, outweighs it.
+    """
+    taken = []
+    for steps in (1440, 2880):
+        much, little = (
+            residual(bushed(1e5, 1e2, turns=0.25, steps_per_turn=steps, rho_inf=rho_inf))
+            for rho_inf in (0.5, 0.95)
+        )
+        taken.append(np.abs(much - little)[:: steps // 1440].max())
+    assert_allclose(taken[0] / taken[1], 8, rtol=0.1)
 
 
 def test_two_rotors_on_shaft_and_bushing_swing_as_two_masses_on_springs() -> None:
@@ -299,21 +296,6 @@ def test_two_rotors_on_shaft_and_bushing_swing_as_two_masses_on_springs() -> Non
     modes = np.exp(np.outer(t[after], s))
     share = np.linalg.lstsq(modes, torque[after].astype(complex), rcond=None)[0]
     assert np.abs(modes @ share - torque[after]).max() < 2e-3 * np.abs(torque).max()
-
-
-def test_the_direction_of_the_scene_changes_no_elastic_answer() -> None:
-    """Link-frame deflections stay; joint forces turn with the scene. Stiff hubs of beams in space cost digits."""
-    random = np.random.default_rng(5)
-    R = np.linalg.qr(random.normal(size=(3, 3)))[0]
-    R *= np.linalg.det(R)
-    ready, blocks = ran(cardan(turns=0.1))
-    other, moved = ran(turned(cardan(turns=0.1), R))
-    for k in range(3):
-        g, g1 = state(blocks, k, "g"), state(moved, k, "g")
-        assert_allclose(g1 @ R, g, atol=5e-5 * np.abs(g).max())
-    here, there = channels(ready, blocks), channels(other, moved)
-    for name in ("joints/U/force", "joints/U/moment", "joints/B/force"):
-        assert_allclose(there[name] @ R, here[name], atol=5e-5 * np.abs(here[name]).max())
 
 
 def swung(kind: str, rho_inf: float, turns: float) -> None:

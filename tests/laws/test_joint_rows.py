@@ -1,0 +1,184 @@
+"""What every kind of joint must do, on beams in space and solids: hold, let free, bear what is in balance."""
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.row_joints import needs_rows
+from kedfem.motion.linkage import joint_axis
+from kedfem.scene import GROUND
+from tests.joint_checks import (
+    LENGTH,
+    bodies,
+    free_twists,
+    held_twists,
+    port_wrench,
+    seat_motion,
+    shared_gap,
+    sides,
+    twist,
+    unbalanced,
+)
+from tests.moving import channels, ran, state, turned
+from tests.spatial_joints import BEAMS, SOLIDS, as_mesh_files, bushed
+
+EVERY: dict[str, Callable[[], dict[str, Any]]] = {**BEAMS, **SOLIDS}
+#: of forces and deflections. A hub of a beam in space is 1e6 times as stiff as its link is heavy, which costs six digits
+#: of sixteen, and adds up over 40 steps; solids lose two less
+ROUNDING = {"beams": 1e-7, "solids": 1e-9}
+UNDAMPED: dict[str, Any] = {"stiffness": 1e6, "turning_stiffness": 2e3}
+
+
+@cache
+def run_of(kind: str) -> tuple[Prepared, list[Block]]:
+    return ran(EVERY[kind]())
+
+
+def moved(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(seed)
+    return Rotation.random(random_state=random).as_matrix(), random.normal(size=3)
+
+
+def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: float) -> None:
+    """Link-frame deflections of all links, forces, moments and torques of all joints, drives and gears, turned back."""
+    (ready, blocks), (_, again) = one, other
+    links = range(len(ready.model.links))
+    size = max(np.abs(state(blocks, k, "g")).max() for k in links)
+    for k in links:
+        # of the functions of a beam in space some are slopes, whose values turn with their own directions
+        assert_allclose(state(again, k, "g") @ R, state(blocks, k, "g"), atol=digits * size)
+    here, there = channels(*one), channels(*other)
+    loads = [name for name in here if name.split("/")[0] in {"joints", "drive", "gears"}]
+    assert len(loads) >= 2 * len(ready.scene.joints)
+    for what in ("force", "moment", "torque"):
+        these = [name for name in loads if name.endswith(what)]
+        most = max(np.abs(here[name]).max() for name in these) if these else 0.0
+        for name in these:
+            back = there[name] @ R if there[name].shape[1] == 3 else there[name]
+            assert_allclose(back, here[name], atol=digits * most, err_msg=name)
+
+
+@pytest.mark.parametrize("kind", list(BEAMS))
+def test_no_answer_depends_on_how_the_scene_lies(kind: str) -> None:
+    R, shift = moved(len(kind))
+    assert_the_same(kind, run_of(kind), ran(turned(BEAMS[kind](), R, shift)), R, ROUNDING["beams"])
+
+
+@pytest.mark.parametrize("kind", list(SOLIDS))
+def test_no_answer_of_solids_depends_on_how_the_scene_lies(kind: str, tmp_path: Path) -> None:
+    """All solids in mesh files, which may lie as they like; bores are found there."""
+    R, shift = moved(3)
+    drawn = run_of(kind)[0].model.links
+    other = ran(as_mesh_files(turned(SOLIDS[kind](), R, shift), drawn, tmp_path, R, shift))
+    assert_the_same(kind, run_of(kind), other, R, ROUNDING["solids"])
+
+
+@pytest.mark.parametrize("kind", list(EVERY))
+def test_forces_and_moments_balance_inertia_and_loads_of_every_link(kind: str) -> None:
+    """Joints, gears, gravity, rigid and elastic inertia: nothing is left, at no link and no step."""
+    force, moment = unbalanced(*run_of(kind))
+    assert max(force, moment) < (1e-8 if kind in BEAMS else 1e-9)
+
+
+@pytest.mark.parametrize("kind", list(EVERY))
+def test_what_joints_let_free_is_free(kind: str) -> None:
+    """Port forces, summed up, do no work along what a joint's kind leaves free; which does move, as turns and slides."""
+    ready, blocks = run_of(kind)
+    at, geared = bodies(ready, blocks), {name for gear in ready.scene.gears.values() for name in gear.joints}
+    for name, joint in ready.scene.joints.items():
+        free = free_twists(ready, at, name)
+        if name in geared or not free.shape[1]:
+            continue
+        on = [link for link in joint.links if link != GROUND]
+        for link in on:
+            wrench = port_wrench(ready, blocks, name, link)
+            work = np.einsum("tfk,tk->tf", free, wrench)
+            assert np.abs(work).max() < (1e-8 if kind in BEAMS else 1e-10) * np.abs(wrench).max()
+
+
+def deflection(ready: Prepared, blocks: list[Block]) -> float:
+    return max(float(np.abs(state(blocks, k, "u")).max()) for k in range(len(ready.model.links)))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in EVERY if kind != "bushings"])
+def test_what_joints_hold_is_held(kind: str) -> None:
+    """Relative displacement and turn of seats, from their ports, along all that a joint's kind does not leave free."""
+    ready, blocks = run_of(kind)
+    at, size = bodies(ready, blocks), deflection(ready, blocks)
+    for name, joint in ready.scene.joints.items():
+        if not needs_rows(ready.scene, name):
+            assert np.abs(shared_gap(ready, blocks, name)).max() < 1e-10 * size
+            continue
+        i, j = sides(joint)
+        apart = twist(ready, blocks, name, i) - twist(ready, blocks, name, j)
+        free = free_twists(ready, at, name)
+        assert np.abs(np.einsum("thk,tk->th", held_twists(free), apart)).max() < 1e-10 * size
+        if free.shape[1]:
+            assert np.abs(np.einsum("tfk,tk->tf", free, apart)).max() > 1e-4 * size
+
+
+def test_gears_tie_the_turns_of_their_wheels_and_a_rack() -> None:
+    """Wheel A, which the drive leads, leads B and the rack; all bend beside their seats."""
+    ready, blocks = run_of("gears, rack")
+    at, size = bodies(ready, blocks), deflection(ready, blocks)
+
+    def motion(name: str, gear: str) -> np.ndarray:
+        joint = ready.scene.joints[name]
+        i, j = sides(joint)
+        _, u, turn = seat_motion(ready, blocks, f"gears.{gear}", i)
+        z = at.of(j)[1] @ joint_axis(joint)
+        return np.asarray(np.einsum("tk,tk->t", z, u if joint.kind == "prismatic" else turn))
+
+    assert_allclose(motion("B", "bevel"), -1.5 * motion("A", "bevel"), atol=1e-10 * size / LENGTH)
+    assert_allclose(motion("J", "rack"), 0.08 * motion("B", "rack"), atol=1e-10 * size)
+
+
+def test_bushings_give_in_proportion_along_what_the_joint_holds_and_nowhere_else() -> None:
+    """Force −k times displacement, moment −k times turn, of the seats against each other."""
+    raw = bushed()
+    for joint in raw["joints"].values():
+        if "bushing" in joint:
+            joint["bushing"] = {key: UNDAMPED[key] for key in UNDAMPED if key in joint["bushing"]}
+    ready, blocks = ran(raw)
+    at = bodies(ready, blocks)
+    for name in ("P", "J", "G"):
+        i, j = sides(ready.scene.joints[name])
+        held = held_twists(free_twists(ready, at, name))
+        apart = twist(ready, blocks, name, i) - twist(ready, blocks, name, j)
+        k = np.repeat([UNDAMPED["stiffness"], UNDAMPED["turning_stiffness"] / LENGTH**2], 3)
+        e = np.einsum("thk,tk->th", held, apart)
+        wanted = -k * np.einsum("thk,th->tk", held, e)
+        got = port_wrench(ready, blocks, name, i)
+        assert_allclose(got, wanted, atol=1e-7 * np.abs(wanted).max())
+
+
+def shortened(raw: dict[str, Any], end: float) -> dict[str, Any]:
+    return {**raw, "analysis": {**raw["analysis"], "end_time": end}}
+
+
+@pytest.mark.parametrize("kind", list(EVERY))
+def test_the_literal_steps_agree(kind: str) -> None:
+    """Assembled at every step, with bordered rows and no condensation: displacements, rates, joint forces and torques."""
+    raw = shortened(EVERY[kind](), 0.01 if kind in BEAMS else 0.002)
+    (ready, wanted), (_, got) = ran(raw, LiteralSteps), ran(raw)
+    links = range(len(ready.model.links))
+    digits = 1e-7 if kind in BEAMS else 1e-8  # solids hardly move in four steps
+    for name in ("u", "v"):
+        size = max(np.abs(state(wanted, k, name)).max() for k in links)
+        for k in links:
+            assert_allclose(state(got, k, name), state(wanted, k, name), atol=digits * size)
+    one, other = channels(ready, got), channels(ready, wanted)
+    for what in ("force", "moment", "torque"):
+        these = [name for name in one if name.endswith(f"/{what}")]
+        size = max((np.abs(other[name]).max() for name in these), default=0.0)
+        for name in these:
+            assert_allclose(one[name], other[name], atol=digits * size, err_msg=name)
