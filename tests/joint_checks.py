@@ -66,7 +66,8 @@ def free_twists(ready: Prepared, at: Bodies, name: str) -> np.ndarray:
         "cylindrical": [(z, zero), (zero, z)], "planar": [(x, zero), (np.cross(z, x), zero), (zero, z)],
         "slot": [(z, zero), *along], "screw": [(pitch * z, z)],
     }[joint.kind]  # fmt: skip
-    if name in ready.scene.driven_joints:
+    drive = ready.scene.driven_joints.get(name)
+    if drive is not None and drive.shaft_stiffness is None:
         turns = []
     out = [np.hstack([Rj @ v, LENGTH * (Rj @ w)]) for v, w in turns]
     if joint.axes is not None:

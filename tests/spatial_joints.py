@@ -123,7 +123,9 @@ def geared() -> Raw:
         "J": {"kind": "prismatic", "links": ["rack", "ground"], "at": rack, "axis": [1.0, 0.1, 0.4]},
     }
     gears = {"bevel": {"joints": ["A", "B"], "ratio": -1.5}, "rack": {"joints": ["B", "J"], "radius": 0.08}}
-    return scene(links, joints, gears=gears)
+    raw = scene(links, joints, gears=gears)
+    raw["drive"]["shaft_stiffness"] = 500.0  # so that what the drive leads turns elastically too
+    return raw
 
 
 def robot() -> Raw:

@@ -127,7 +127,7 @@ def test_what_joints_hold_is_held(kind: str) -> None:
 
 
 def test_gears_tie_the_turns_of_their_wheels_and_a_rack() -> None:
-    """Wheel A, which the drive leads, leads B and the rack; all bend beside their seats."""
+    """Wheel A, on a shaft that gives, leads B and the rack in proportion, also where they swing."""
     ready, blocks = run_of("gears, rack")
     at, size = bodies(ready, blocks), deflection(ready, blocks)
 
@@ -138,6 +138,7 @@ def test_gears_tie_the_turns_of_their_wheels_and_a_rack() -> None:
         z = at.of(j)[1] @ joint_axis(joint)
         return np.asarray(np.einsum("tk,tk->t", z, u if joint.kind == "prismatic" else turn))
 
+    assert np.abs(motion("A", "bevel")).max() > 1e-3 * size / LENGTH
     assert_allclose(motion("B", "bevel"), -1.5 * motion("A", "bevel"), atol=1e-10 * size / LENGTH)
     assert_allclose(motion("J", "rack"), 0.08 * motion("B", "rack"), atol=1e-10 * size)
 
