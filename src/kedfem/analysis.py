@@ -26,6 +26,7 @@ from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
+from kedfem.output.words import clock, moment
 from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
@@ -268,7 +269,8 @@ def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath
     if not (scene.output.picture and peak):
         return ()
     title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s"
-    title += "" if scene.driven is None else f", drive {np.degrees(peak.angle):.1f}°"
+    if clock(scene) != "time":
+        title += f", drive {moment(scene, peak.time, peak.angle)}"
     animation = scene.output.animation
     if animation and animation.exaggeration != 1.0:
         title += f", deformation × {animation.exaggeration:g}"

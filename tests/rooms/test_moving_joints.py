@@ -18,7 +18,7 @@ from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
-from kedfem.report.words import clock, moment
+from kedfem.output.words import clock, moment
 from kedfem.results.row_forces import RowForces
 from kedfem.results.row_work import deflections
 from kedfem.scene import scene_from

@@ -1,12 +1,12 @@
 """Summary tables of what the commands find, for the terminal."""
 
+from kedfem.output.words import moment
 from kedfem.report.assembly import assembly_tables
 from kedfem.report.check import check_tables
 from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import face_kind, mesh_tables
 from kedfem.report.run import run_tables
 from kedfem.report.study import study_tables
-from kedfem.report.words import moment
 
 __all__ = [
     "assembly_tables",

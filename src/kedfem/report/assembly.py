@@ -4,7 +4,7 @@ import numpy as np
 from rich.table import Table
 
 from kedfem.motion.assembly import Assembly
-from kedfem.report.words import with_prefix
+from kedfem.output.words import with_prefix
 
 
 def assembly_tables(assembly: Assembly) -> list[Table]:

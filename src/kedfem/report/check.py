@@ -15,10 +15,10 @@ from kedfem.motion.initial import initial_twists
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
+from kedfem.output.words import NOTHING, with_prefix
 from kedfem.report.links import link_table, way_tables
 from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
-from kedfem.report.words import NOTHING, with_prefix
 from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
 

@@ -5,7 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.kinematics import Moved, first_largest
-from kedfem.report.words import NOTHING, clock, moment, with_prefix
+from kedfem.output.words import NOTHING, clock, moment, with_prefix
 from kedfem.results.kinematic import transmission_key
 from kedfem.scene import Scene
 

@@ -8,8 +8,8 @@ from rich.text import Text
 from kedfem.links.rounds import CLOSED
 from kedfem.mesh import HexMesh, mesh_quality
 from kedfem.mesh.hexahedra import Face
+from kedfem.output.words import with_prefix
 from kedfem.report.links import ELEMENTS
-from kedfem.report.words import with_prefix
 
 KINDS = ("bore", "journal", "ball seat", "ball", "plane", "part of a cylinder")
 

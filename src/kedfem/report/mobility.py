@@ -11,7 +11,7 @@ from kedfem.motion.freedom import remedy as held_by
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import Mobility
-from kedfem.report.words import with_prefix
+from kedfem.output.words import with_prefix
 from kedfem.scene import Scene
 
 CLOSE = np.radians(20.0)  # of a dead point: forces of three times the load and more

@@ -5,8 +5,8 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.analysis import Run
+from kedfem.output.words import NOTHING, clock, moment, percent, with_prefix
 from kedfem.report.plan import plan_tables
-from kedfem.report.words import NOTHING, clock, moment, percent, with_prefix
 from kedfem.results.audit import Balance
 from kedfem.scene import Scene
 

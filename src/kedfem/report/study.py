@@ -4,7 +4,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.accuracy.study import Measured, Study
-from kedfem.report.words import percent
+from kedfem.output.words import percent
 
 STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 
