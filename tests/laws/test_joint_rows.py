@@ -166,7 +166,9 @@ def shortened(raw: dict[str, Any], end: float) -> dict[str, Any]:
     return {**raw, "analysis": {**raw["analysis"], "end_time": end}}
 
 
-@pytest.mark.parametrize("kind", list(EVERY))
+@pytest.mark.parametrize(
+    "kind", [pytest.param(x, marks=pytest.mark.long if "bores" in x else ()) for x in EVERY]
+)
 def test_the_literal_steps_agree(kind: str) -> None:
     """Assembled at every step, with bordered rows and no condensation: displacements, rates, joint forces and torques."""
     raw = shortened(EVERY[kind](), 0.01 if kind in BEAMS else 0.002)

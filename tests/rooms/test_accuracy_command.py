@@ -138,6 +138,7 @@ def test_too_little_time_for_anything_is_said(run_kedfem: Command, whip: Path) -
     assert said.err.endswith("error: most: must leave time for a run, got 1e-06 s\n")
 
 
+@pytest.mark.long
 def test_a_fidelity_that_cannot_be_built_is_one_row_that_says_why(whip: Path) -> None:
     text = BEAM.replace("polyline", "bar").replace("points =", "between =").replace("\nfidelity", "\n#")
     # a surface load has no place on a beam

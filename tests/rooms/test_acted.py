@@ -132,6 +132,7 @@ def tied(k: float, **analysis: Any) -> dict[str, Any]:
     return four_bar("nominal", springs={"s": pull, "tie": tie}, steps=90, analysis=analysis)
 
 
+@pytest.mark.long
 def test_a_spring_may_be_far_stiffer_than_the_links() -> None:
     """One of 1e12 N/m keeps the ends of the coupler, E A / L = 1.4e8 N/m, apart as drawn."""
     soft, stiff = (np.ptp(channel(*run(tied(k)), "springs/tie/length")) for k in (1.0, 1e12))

@@ -403,7 +403,9 @@ def paths(table, above=""):
             yield from paths(value, f"{above}{key}/")
 
 
-@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize(
+    "base", [pytest.param(x, marks=pytest.mark.long if x == "solid" else ()) for x in BASES]
+)
 def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
     for path in paths(tomllib.loads(BASES[base])):
         for odd in ODD:

@@ -309,7 +309,9 @@ def spun(kind: str, load: dict[str, Any]) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.parametrize("name", SPUN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=pytest.mark.long if x == "force on a beam" else ()) for x in SPUN]
+)
 def test_a_load_turns_with_a_link_that_nothing_leads(name: str) -> None:
     """Its moment about the hinge does not change as the link turns: work M φ, all of it kinetic energy at last."""
     kind, load, moment = SPUN[name]

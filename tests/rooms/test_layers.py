@@ -466,7 +466,7 @@ SIZES = {
 
 
 class TestRandomLayers:
-    @settings(max_examples=8)
+    @settings(max_examples=4)
     @given(**SIZES)
     def test_are_meshed_well_or_refused_with_the_place(self, L, eyes, bores, web, rise, tilt):
         """Links with bosses of any height on both sides, in any position; a cusp or a sliver may be refused."""

@@ -93,6 +93,7 @@ def test_a_start_that_no_step_resolves_is_said() -> None:
     assert plan.finer <= 1.5  # no mesh helps then, so that none is tried in vain
 
 
+@pytest.mark.long
 def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
     raw = arm()
     raw["links"]["arm"]["shape"] = polyline_bar("polyline", [[0, 0], [0.3, 0], [0.5, 0.1]])

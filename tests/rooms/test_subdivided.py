@@ -227,7 +227,9 @@ class TestCentring:
 
 
 class TestParts:
-    @pytest.mark.parametrize("part", [ball_ended_rod, clevis, elbow, filleted_bracket])
+    @pytest.mark.parametrize(
+        "part", [ball_ended_rod, clevis, pytest.param(elbow, marks=pytest.mark.long), filleted_bracket]
+    )
     def test_good_hexahedra_with_the_exact_volume_centre_and_inertia(self, gmsh, part):
         solid = part(gmsh)
         mesh = subdivided_mesh(gmsh, solid, Sizing())

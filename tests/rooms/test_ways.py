@@ -124,7 +124,9 @@ class TestApart:
 
 
 class TestStiffness:
-    @pytest.mark.parametrize("file", ["crank.step", "ball_ended_rod.step"])
+    @pytest.mark.parametrize(
+        "file", ["crank.step", pytest.param("ball_ended_rod.step", marks=pytest.mark.long)]
+    )
     def test_rigid_motions_strain_nothing(self, file: str) -> None:
         """K0 u = 0 for the twelve fields 1, x, y, z along each axis that are rigid: [KED, App. A], to rounding."""
         record = solid_link(

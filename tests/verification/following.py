@@ -145,6 +145,7 @@ def kicked(mu: float) -> float:
 @case(
     "Rotating cantilever with frames that follow",
     "√(flap² − μ²), flap from Hamza-Cherif, Houmat: ICAS 2004, table 2",
+    long=True,
 )
 def turning() -> list[Row]:
     """Nothing added for the stiffening: L √(A/I) = 700, where the table's Coriolis forces and elongation vanish; the

@@ -144,7 +144,11 @@ def four_bar(fidelity: str, thickness: float) -> list[np.ndarray]:
     return histories(scene_from(raw, SCENE.parent), *CHANNELS.values())[1]
 
 
-@case("Four-bar of plates: plane against solid", "hex27 on the same quadrilaterals, one layer; 150 rpm")
+@case(
+    "Four-bar of plates: plane against solid",
+    "hex27 on the same quadrilaterals, one layer; 150 rpm",
+    long=True,
+)
 def against_solids() -> list[Row]:
     """Largest difference over a turn, for the example's plates, as thick as wide, and for thinner ones.
 

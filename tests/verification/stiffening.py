@@ -254,7 +254,7 @@ def vibration(scene: Scene, component: int) -> float:
     return float(scipy.optimize.minimize_scalar(left, bounds=near, method="bounded", options=options).x)
 
 
-@case("Rotating cantilever, through the transient solver", ROTATING)
+@case("Rotating cantilever, through the transient solver", ROTATING, long=True)
 def turning_by_steps() -> list[Row]:
     """μ = 6: a load on the tip, put on at once, 200 steps a period."""
     unit = np.sqrt(RUBBER.youngs_modulus * HEIGHT**2 / 12 / RUBBER.density) / LENGTH**2

@@ -72,7 +72,7 @@ def pair(**gear: object) -> tuple[JointTable, dict[str, object]]:
         ({"ratio": -2.5}, -2.5),
         ({"teeth": [20, 40]}, -0.5),
         ({"teeth": [17, 51], "internal": True}, 1 / 3),
-        ({"ratio": 61.7}, 61.7),
+        pytest.param({"ratio": 61.7}, 61.7, marks=pytest.mark.long),
     ],
 )
 def test_gears_turn_in_proportion(gear: dict[str, object], ratio: float) -> None:
