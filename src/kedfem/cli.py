@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -54,10 +54,7 @@ def run(scene: ScenePath) -> None:
             done = analyse(loaded, watch)
     except KeyboardInterrupt:
         _interrupted(file, _version(file) != before)
-    for table in run_tables(loaded, done):
-        out.print(table)
-    for warning in done.warnings:
-        err.print(f"warning: {warning}", style="yellow", markup=False)
+    _show(run_tables(loaded, done), done.warnings)
     _say_where(done.folder)
 
 
@@ -78,8 +75,7 @@ def check(scene: ScenePath) -> None:
 
         plan = None if loaded.analysis.accuracy is None else planned(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
-    for table in [*assembly_tables(assembly), *check_tables(ready, reduction, plan)]:
-        out.print(table)
+    _show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)])
 
 
 @app.command()
@@ -97,10 +93,7 @@ def kinematics(
     loaded = read_scene(scene, sketch=True)
     with _progress() as watch:
         done = moved_by(loaded, folder, watch)
-    for table in kinematics_tables(loaded, done):
-        out.print(table)
-    for warning in done.warnings:
-        err.print(f"warning: {warning}", style="yellow", markup=False)
+    _show(kinematics_tables(loaded, done), done.warnings)
     _say_where(done.folder)
 
 
@@ -139,8 +132,7 @@ def mesh(
     with _progress() as watch:
         watch("mesh", 0, 0)
         made = part_mesh(link, part.parent)
-    for table in mesh_tables(part.name, made):
-        out.print(table)
+    _show(mesh_tables(part.name, made))
     target = ready_folder(folder or part.parent)
     stem = part.stem if solid is None else f"{part.stem}-{solid}"
     write_mesh(made, target / f"{stem}-mesh.vtu")
@@ -188,8 +180,7 @@ def accuracy(
     except KeyboardInterrupt:
         err.print("interrupted; nothing was written", style="yellow")
         raise typer.Exit(INTERRUPTED) from None
-    for table in study_tables(study, machine()):
-        out.print(table)
+    _show(study_tables(study, machine()))
     for name, write in (("accuracy.csv", write_study), ("accuracy.png", write_study_plot)):
         write(study, target / name, machine())
         out.print(f"{target / name}", markup=False, soft_wrap=True)
@@ -291,6 +282,13 @@ def _interrupted(file: Path, begun: bool) -> NoReturn:
     kept = f"what was computed is readable in {file} (status: {status})" if begun else "nothing was written"
     err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
     raise typer.Exit(INTERRUPTED)
+
+
+def _show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
+    for table in tables:
+        out.print(table)
+    for warning in warnings:
+        err.print(f"warning: {warning}", style="yellow", markup=False)
 
 
 def _say_where(folder: Path) -> None:

@@ -16,7 +16,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.places import slider_axis
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
-from kedfem.motion.linkage import Linkage, unit
+from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
 from kedfem.scene import (
@@ -273,7 +273,6 @@ def _add_body(out: Inertias, scene: Scene, linkage: Linkage, body: Body) -> None
 
 def _axis_at(scene: Scene, body: Flywheel) -> Vector:
     """Axis of the hinge that a flywheel sits on."""
-    turning = [x for x in scene.joints.values() if body.link in x.links and x.kind in ROTARY]
-    hinges = [x for x in turning if x.axis]
+    hinges = [x for x in scene.joints.values() if body.link in x.links and x.kind in ROTARY]
     nearest = min(hinges, key=lambda x: float(np.linalg.norm(np.subtract(x.at, body.at))))
-    return unit(nearest.axis or (0.0, 0.0, 1.0))
+    return joint_axis(nearest)

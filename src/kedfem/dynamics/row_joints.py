@@ -16,6 +16,7 @@ from kedfem.links.record import Link
 from kedfem.links.seats import Seat
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import unit
+from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rows import perpendiculars
 from kedfem.scene import GROUND, Joint, Scene, holds_by_rows
 
@@ -205,7 +206,7 @@ def _turning(link: Link, directions: list[np.ndarray]) -> list[Float[np.ndarray,
         share = 1.0 if len(directions) == 1 else 0.5
         return [share * np.outer(z, np.cross(z, e)) for e in directions] or None
     if len(directions) == 3:
-        return [0.5 * _cross(e) for e in directions]
+        return [0.5 * cross_matrix(e) for e in directions]
     if len(directions) < 2:
         return None
     e1, e2 = directions
@@ -214,11 +215,6 @@ def _turning(link: Link, directions: list[np.ndarray]) -> list[Float[np.ndarray,
         -np.outer(e2, n) + 0.5 * np.outer(n, e2),
         np.outer(e1, n) - 0.5 * np.outer(n, e1),
     ]
-
-
-def _cross(a: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    x, y, z = a
-    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 def station_ports(found: Stations, link: Link) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:

@@ -13,6 +13,7 @@ from kedfem.errors import MotionError
 from kedfem.motion.linkage import moving_pair
 from kedfem.motion.newton import rotation
 from kedfem.scene import (
+    DIRECTED,
     GROUND,
     Arc,
     Bar,
@@ -31,16 +32,9 @@ from kedfem.scene import (
     inertia_tensor,
 )
 from kedfem.scene.base import Record
+from kedfem.scene.points import XYZ
 
 TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding
-FREELY = (
-    "prismatic",
-    "cylindrical",
-    "screw",
-    "planar",
-    "slot",
-)  # whose points may part along what they leave free
-XYZ = tuple[float, float, float]
 AnyRecord = TypeVar("AnyRecord", bound=Record)
 
 
@@ -145,7 +139,7 @@ def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
     """A closed joint: its point is the ground's, of what slides that of the moving link; its axis likewise."""
     first, moving = joint.links[0], moving_pair(joint)[0]
     still = GROUND if GROUND in joint.links else first
-    of = {"slot": first}.get(joint.kind, moving if joint.kind in FREELY else still)
+    of = {"slot": first}.get(joint.kind, moving if joint.kind in DIRECTED else still)
     along = {"slot": joint.links[1], "spherical": moving}.get(joint.kind, still)
     change: dict[str, Any] = {"at": shifts[of].point(joint.on(of))}
     if joint.axis is not None:

@@ -7,7 +7,7 @@ from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import following, following_links, link_frames
 from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, factor_table, load_factor, path_parameter
-from kedfem.scene.links import GROUND, ROTARY, Joint, LinkScene, Meshing
+from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
     Body,
     BodyLoad,
@@ -35,6 +35,7 @@ from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
 from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
 
 __all__ = [
+    "DIRECTED",
     "GROUND",
     "ROTARY",
     "Analysis",

@@ -7,8 +7,8 @@ from typing import Any, get_args
 
 from kedfem.scene.checks import fidelity, link_names
 from kedfem.scene.damping import rayleigh
+from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.frames import default_frames
-from kedfem.scene.initial import SLIDING, TURNING
 from kedfem.scene.links import GROUND, Joint
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.units import Quantity, si_number

@@ -8,10 +8,10 @@ from pydantic import BeforeValidator, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Record, refuse
+from kedfem.scene.drives import EitherSpeed
 from kedfem.scene.points import Point, as_vector
 from kedfem.scene.units import Quantity, Speed, fault
 
-TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
 Velocity = Annotated[float, Quantity("m/s")]
 VelocityVector = Annotated[tuple[Velocity, Velocity, Velocity], BeforeValidator(as_vector)]
 SpinVector = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vector)]
@@ -20,14 +20,11 @@ SpinVector = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vector)]
 def joint_speed(value: object) -> float:
     """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
     try:
-        return TURNING.number(value)
+        return EitherSpeed("rad/s").number(value)
     except PydanticCustomError as reason:
         if not isinstance(value, str):
             raise
-        try:
-            return SLIDING.number(value)
-        except PydanticCustomError:
-            raise fault(f"{reason.message()} (of a slider in m/s)") from None
+        raise fault(f"{reason.message()} (of a slider in m/s)") from None
 
 
 JointSpeed = Annotated[float, PlainValidator(joint_speed)]

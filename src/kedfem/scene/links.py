@@ -25,7 +25,7 @@ Count = Annotated[StrictInt, Field(ge=1)]
 JointKind = Literal[
     "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
 ]
-DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # joints that need an axis
+DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
 ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
 SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
 PORTS = ("averaged", "stiff")
