@@ -18,6 +18,18 @@ EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/run.p
 QUICK = {"spinning_bar"}  # below 10 s
 
 
+GENERATED = ("*-results", "*-kinematics", "*-accuracy", "*-mesh.*")
+
+
+def test_nothing_generated_is_committed() -> None:
+    """What .gitignore names, results of runs above all, is not in the repository."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a clone")
+    command = ["git", "-C", str(ROOT), "ls-files", "--cached", "--ignored", "--exclude-standard"]
+    kept = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert not kept
+
+
 def test_all_four_are_there_each_with_its_scene() -> None:
     assert {"four_bar_beams", "four_bar_solids", "slider_crank_solids", "spinning_bar"} <= set(EXAMPLES)
     assert sorted(path.parent.name for path in (ROOT / "examples").glob("*/scene.toml")) == EXAMPLES
@@ -43,7 +55,7 @@ def test_the_script_of_an_example_asserts_something(name: str) -> None:
 )
 def test_an_example_runs_and_its_assertions_hold(name: str, tmp_path: Path) -> None:
     for folder in (f"examples/{name}", "geometry"):
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("*-results"))
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns(*GENERATED))
     command = [sys.executable, "-W", "error", f"examples/{name}/run.py"]
     environment = os.environ | {"PYTHONPATH": str(SOURCE), "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
