@@ -171,7 +171,10 @@ def turned(raw: dict[str, Any], R: np.ndarray, shift: Any = (0.0, 0.0, 0.0)) -> 
             return shape
         return {**shape, "points": [point(p) for p in shape["points"]], "up": vector(shape["up"])}
 
-    links = {name: {**link, "shape": moved(link["shape"])} for name, link in raw["links"].items()}
+    links = {
+        name: link if "shape" not in link else {**link, "shape": moved(link["shape"])}
+        for name, link in raw["links"].items()
+    }
     joints = {
         name: {**joint, "at": point(joint["at"])}
         | ({"axis": vector(joint["axis"])} if "axis" in joint else {})

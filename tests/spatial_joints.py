@@ -141,6 +141,30 @@ def robot() -> Raw:
     return {**raw, "drives": drives | {"c": {"joint": "K", "motion": rising(0.05, "travel")}}}
 
 
+def rigid_in_space(a: Any, b: Any) -> Raw:
+    """A rod of round section that does not bend."""
+    return {key: x for key, x in beam_in_space(a, b, 2).items() if key != "beam"} | {"fidelity": "rigid"}
+
+
+def pushed(driven: bool, rod: str = "beam") -> Raw:
+    """A ram of mass alone on a guide of the ground, and a rocker: the one moves the other over a rod."""
+    links = {
+        "ram": {"fidelity": "rigid", "mass": 0.5},
+        "rod": beam_in_space(P, Q, 2) if rod == "beam" else rigid_in_space(P, Q),
+        "rocker": beam_in_space(Q, G, 2),
+    }
+    joints = {
+        "A": {"kind": "prismatic", "links": ["ram", "ground"], "at": list(P), "axis": [0.0, 0.0, 1.0]},
+        "P": ball("ram", "rod", P),
+        "J": cross("rod", "rocker", Q, ACROSS),
+        "G": hinge("ground", "rocker", G, (1.0, 0.0, 0.0)),
+    }
+    raw = scene(links, joints)
+    travel = {"joint": "A", "motion": rising(0.03, "travel")}
+    turn = {"joint": "G", "motion": {"kind": "cycloidal", "angle": 0.2, "rise": 0.03}}
+    return {**raw, "drive": travel if driven else turn}
+
+
 def bushed() -> Raw:
     """Slide, cross and hinge in bushings that are the same in all directions."""
     bushing = {"stiffness": 1e6, "damping": 300.0, "turning_stiffness": 2e3, "turning_damping": 0.3}
@@ -163,6 +187,11 @@ BEAMS: dict[str, Callable[[], Raw]] = {
     "gears, rack": geared,
     "driven hinge and slide": robot,
     "bushings": bushed,
+}
+SLIDERS: dict[str, Callable[[], Raw]] = {
+    "driven slider without a shape": lambda: pushed(driven=True),
+    "slider without a shape": lambda: pushed(driven=False),
+    "driven slider without a shape on a rigid rod": lambda: pushed(driven=True, rod="rigid"),
 }
 
 

@@ -28,19 +28,20 @@ from tests.joint_checks import (
     twist,
     unbalanced,
 )
-from tests.moving import channels, ran, state, turned
-from tests.spatial_joints import BEAMS, SOLIDS, as_mesh_files, bushed
+from tests.moving import bar, channels, ran, state, turned
+from tests.spatial_joints import BEAMS, SLIDERS, SOLIDS, as_mesh_files, bushed
 
 EVERY: dict[str, Callable[[], dict[str, Any]]] = {**BEAMS, **SOLIDS}
 #: of forces and deflections. A hub of a beam in space is 1e6 times as stiff as its link is heavy, which costs six digits
-#: of sixteen, and adds up over 40 steps; solids lose two less
-ROUNDING = {"beams": 1e-7, "solids": 1e-9}
+#: of sixteen, and adds up over 40 steps; solids lose two less, and rigid links,
+#: stiffer still, two more
+ROUNDING = {"beams": 1e-7, "solids": 1e-9, "rigid": 1e-5}
 UNDAMPED: dict[str, Any] = {"stiffness": 1e6, "turning_stiffness": 2e3}
 
 
 @cache
 def run_of(kind: str) -> tuple[Prepared, list[Block]]:
-    return ran(EVERY[kind]())
+    return ran((EVERY | SLIDERS)[kind]())
 
 
 def moved(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -48,17 +49,23 @@ def moved(seed: int) -> tuple[np.ndarray, np.ndarray]:
     return Rotation.random(random_state=random).as_matrix(), random.normal(size=3)
 
 
+def rounding(kind: str) -> float:
+    return ROUNDING["rigid" if "rigid" in kind else "beams"]
+
+
 def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: float) -> None:
     """Link-frame deflections of all links, forces, moments and torques of all joints, drives and gears, turned back."""
     (ready, blocks), (_, again) = one, other
-    links = range(len(ready.model.links))
+    links = [
+        k for k, link in enumerate(ready.model.links) if not link.rigid
+    ]  # whose functions lie as they do
     size = max(np.abs(state(blocks, k, "g")).max() for k in links)
     for k in links:
         # of the functions of a beam in space some are slopes, whose values turn with their own directions
         assert_allclose(state(again, k, "g") @ R, state(blocks, k, "g"), atol=digits * size)
     here, there = channels(*one), channels(*other)
     loads = [name for name in here if name.split("/")[0] in {"joints", "drive", "gears"}]
-    assert len(loads) >= 2 * len(ready.scene.joints)
+    assert len(loads) >= 2 * len(ready.scene.joints) - 1  # a slider's guide: statics may not tell its force
     for what in ("force", "moment", "torque"):
         these = [name for name in loads if name.endswith(what)]
         most = max(np.abs(here[name]).max() for name in these) if these else 0.0
@@ -67,10 +74,45 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
             assert_allclose(back, here[name], atol=digits * most, err_msg=name)
 
 
-@pytest.mark.parametrize("kind", list(BEAMS))
+@pytest.mark.parametrize("kind", list(BEAMS | SLIDERS))
 def test_no_answer_depends_on_how_the_scene_lies(kind: str) -> None:
     R, shift = moved(len(kind))
-    assert_the_same(kind, run_of(kind), ran(turned(BEAMS[kind](), R, shift)), R, ROUNDING["beams"])
+    assert_the_same(kind, run_of(kind), ran(turned((BEAMS | SLIDERS)[kind](), R, shift)), R, rounding(kind))
+
+
+@pytest.mark.parametrize("turn", [1, 2], ids=["z to x", "z to y"])
+@pytest.mark.parametrize("kind", list(BEAMS | SLIDERS))
+def test_no_answer_depends_on_which_axis_of_the_world_a_joint_lies_along(kind: str, turn: int) -> None:
+    """x, y and z change places: what is along an axis of the world, exactly, must be no special case."""
+    R = np.roll(np.eye(3), turn, axis=0)
+    raw = shortened((BEAMS | SLIDERS)[kind](), 0.002)
+    assert_the_same(kind, ran(raw), ran(turned(raw, R)), R, rounding(kind))
+
+
+@pytest.mark.parametrize("fidelity", ["beam", "plane", "solid"])
+def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_a_plane(
+    fidelity: str,
+) -> None:
+    """Along x, y and askew: a ram pushes a planar beam, a plane link, a solid; of which a bar lies as it likes."""
+    force = []
+    for angle in (0.0, np.pi / 2, 0.7):
+        c, s = np.cos(angle), np.sin(angle)
+        ends = [[0.2 * c, 0.2 * s], [0.2 * c - 0.2 * s, 0.2 * s + 0.2 * c]]
+        links = {"ram": {"fidelity": "rigid", "mass": 0.5}, "rod": bar(fidelity, [0.0, 0.0], ends[0], 2)}
+        joints: dict[str, Any] = {
+            "A": {"kind": "prismatic", "links": ["ram", "ground"], "at": [0.0, 0.0], "axis": [c, s, 0.0]},
+            "P": {"kind": "revolute", "links": ["ram", "rod"], "at": [0.0, 0.0]},
+            "Q": {"kind": "revolute", "links": ["rod", "arm"], "at": ends[0]},
+            "G": {"kind": "revolute", "links": ["arm", "ground"], "at": ends[1]},
+        }
+        links["arm"] = bar(fidelity, ends[0], ends[1], 2)
+        drive = {"joint": "A", "motion": {"kind": "cycloidal", "travel": 0.03, "rise": 0.03}}
+        analysis = {"end_time": 0.003, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static"}
+        one = ran({"links": links, "joints": joints, "drive": drive, "analysis": analysis})
+        force.append(channels(*one)["drive/force"])
+    assert np.abs(force[0]).max() > 1.0  # N: half a kilogram, and the rod, at 200 m/s²
+    for other in force[1:]:
+        assert_allclose(other, force[0], atol=1e-8 * np.abs(force[0]).max())
 
 
 @pytest.mark.parametrize("kind", list(SOLIDS))

@@ -94,7 +94,8 @@ def row_joint(
         a, b = (np.asarray(bore_axis(joint, link)) for link in (i, j))
         axes, turn[-1] = (a, b), np.cross(a, b)
     here = [link for link in links.values() if link.name in (i, j)]
-    kept = in_plane(gap, turn) if all(link.planar for link in here) else np.ones(len(gap), bool)
+    planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
+    kept = in_plane(gap, turn) if planar else np.ones(len(gap), bool)
     hard = np.full(len(gap), np.inf), np.zeros(len(gap))
     stiffness, damping = hard if only else springs(scene, name, gap, turn)
     return RowJoint(
