@@ -27,7 +27,7 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.output.words import clock, moment
-from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results import Channel, Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
@@ -84,8 +84,13 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
     KedfemError
         With a message for the user; rows and frames up to there are kept and marked as interrupted.
     """
+    with claimed(scene.results_folder) as folder:
+        return _analysed(scene, folder, watch)
+
+
+def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
+    """The stages of a run, in a folder of its own."""
     clock = Clock(watch)
-    folder = ready_folder(scene.results_folder)
     scene, assembly = assembled(scene)
     plan = None if scene.analysis.accuracy is None else planned(scene, clock.stage)
     scene = plan.scene if plan else scene

@@ -23,7 +23,7 @@ from kedfem.motion.transmission import LEAST
 from kedfem.output.plots import write_plots
 from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.output.vtu import AnimationWriter, remove_animation
-from kedfem.results import Results, ResultsWriter, read_results, ready_folder, write_csv
+from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.rigid import RigidForces, rigid_forces
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
@@ -66,6 +66,12 @@ def kinematics(
             "drive: is required for kinematics, got none: without one the linkage rests as drawn "
             "(kedfem run moves it by its forces)"
         )
+    with claimed(folder or kinematics_folder(scene)) as target:
+        return _moved(scene, target, watch)
+
+
+def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
+    """The stages, in a folder of their own."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
     linked, along = clock.timed("motion", lambda: moving(scene))
@@ -73,7 +79,6 @@ def kinematics(
     masses = inertias_of_links(scene, linked, links)
     forces = rigid_forces(scene, linked, masses, along)
     recorded = kinematics_of(scene, linked, along, masses)
-    target = ready_folder(folder or kinematics_folder(scene))
     clock.timed("steps", lambda: _stepped(scene, linked, along, (recorded, forces, links), target))
     results = read_results(target / "results.h5")
     clock.timed("table", lambda: write_csv(results, target / TABLE))
@@ -128,11 +133,11 @@ def _stepped(
     wanted, frames = set(frame_steps(scene).tolist()), AnimationWriter(folder, STEM)
     seen = sights(scene, linked, links)
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
-    if not wanted:
-        remove_animation(folder, STEM)
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:
+        if not wanted:
+            remove_animation(folder, STEM)
         for first, motion in _blocks(scene, linked, along):
             rows = recorded.rows(motion) | forces.rows(motion, first)
             writer.append(motion.t, motion.phi, rows)

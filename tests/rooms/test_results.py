@@ -3,6 +3,7 @@
 import csv
 import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,18 @@ import numpy as np
 import pytest
 
 from kedfem.errors import OutputError
-from kedfem.results import Channel, Results, ResultsWriter, read_results, ready_folder, replacing, write_csv
+from kedfem.results import (
+    Channel,
+    Results,
+    ResultsWriter,
+    claimed,
+    read_results,
+    ready_folder,
+    replacing,
+    write_csv,
+)
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 STRESS = Channel(
     "probes/rocker_mid/stress",
@@ -226,6 +238,89 @@ def test_two_runs_cannot_write_the_same_file(tmp_path: Path) -> None:
         second = run(code, path)
     assert "must not be in use, got another run that is writing it" in second.stderr
     assert read_results(path).status == "complete"
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_writer_that_is_refused_leaves_the_files_of_others(tmp_path: Path, count: int) -> None:
+    path = tmp_path / "results.h5"
+    code = (
+        "import sys; import numpy as np; from kedfem.results import *\n"
+        "with ResultsWriter(sys.argv[1], [Channel('a/b', ('x',), 'N', '', '')], '{}', None, {}) as w:\n"
+        "    print('open', flush=True); input()\n"
+        "    w.append(np.zeros(1), np.zeros(1), {'a/b': np.zeros((1, 1))})\n"
+    )
+    command, pipe = [sys.executable, "-c", code, str(path)], subprocess.PIPE
+    others = [
+        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) for _ in range(count)
+    ]
+    with writer(path) as first:
+        assert [each.stdout and each.stdout.readline() for each in others] == ["open\n"] * count
+        first.append(*rows(0, 4))
+        for other in others:
+            assert "must not be in use, got another run that is writing it" in other.communicate("go\n")[1]
+        first.append(*rows(4, 3))
+    read = read_results(path)
+    assert (read.status, len(read.time)) == ("complete", 7)
+    assert [p.name for p in tmp_path.iterdir()] == ["results.h5"]
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_folder_belongs_to_one_run_at_a_time(tmp_path: Path, count: int) -> None:
+    code = (
+        "import os, sys; from pathlib import Path\n"
+        "from kedfem.errors import OutputError\nfrom kedfem.results import claimed\n"
+        "folder, held = Path(sys.argv[1]), 0\n"
+        "while held < 100:\n"
+        "    try:\n"
+        "        with claimed(folder):\n"
+        "            os.close(os.open(folder / 'alone', os.O_CREAT | os.O_EXCL))\n"
+        "            (folder / 'alone').unlink(); held += 1\n"
+        "    except OutputError as refused: assert 'got another run that is writing there' in str(refused)\n"
+    )
+    started = [
+        subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stderr=subprocess.PIPE, text=True)
+        for _ in range(count)
+    ]
+    errors = [each.communicate()[1] for each in started]
+    assert [each.returncode for each in started] == [0] * count, errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_three_runs_at_once_leave_one_whole_result(tmp_path: Path) -> None:
+    shutil.copy(EXAMPLES / "four_bar_beams" / "scene.toml", tmp_path / "scene.toml")
+    code = (
+        "import sys, time; from pathlib import Path\nfrom kedfem.analysis import analyse\n"
+        "from kedfem.errors import OutputError\nfrom kedfem.scene import read_scene\n"
+        "folder = Path(sys.argv[1]); scene = read_scene(folder / 'scene.toml')\n"
+        "output = scene.output.model_copy(update={'csv': False, 'plots': False, 'picture': False, 'animation': None})\n"
+        "Path(folder / f'ready{sys.argv[2]}').touch()\n"
+        "while len(list(folder.glob('ready*'))) < 3: time.sleep(0.001)\n"
+        "analysis = scene.analysis.model_copy(update={'turns': 0.1})\n"
+        "try: analyse(scene.model_copy(update={'output': output, 'analysis': analysis}))\n"
+        "except OutputError as refused: print(refused)\n"
+    )
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code, str(tmp_path), str(k)],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )
+        for k in range(3)
+    ]  # fmt: skip
+    said, errors = zip(*[each.communicate() for each in started], strict=True)
+    assert not any(errors)
+    refused = [words for words in said if words]
+    assert len(refused) <= 2  # all of them, but on a machine that starts one when another has ended
+    assert all("must not be in use, got another run" in words for words in refused)
+    assert read_results(tmp_path / "scene-results" / "results.h5").status == "complete"
+    assert [p.name for p in (tmp_path / "scene-results").iterdir()] == ["results.h5"]
+
+
+def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path: Path) -> None:
+    (tmp_path / "results.0123abcd.part.h5").touch()
+    (tmp_path / "my.part.h5").touch()
+    with claimed(tmp_path):
+        assert not (tmp_path / "results.0123abcd.part.h5").exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["my.part.h5"]
 
 
 def corrupt(path: Path) -> None:

@@ -2,17 +2,28 @@
 
 Nothing half-done is ever taken for whole, and nothing old is lost for a run that does not start:
 
-* A run writes to ``NAME.part``; the first rows that reach the disk put it in place of an older ``NAME``.
+* A run claims its folder; a second run there is refused before it touches anything.
+* A run writes to a part file with a name of its own; the first rows that reach the disk put it in place of an
+  older ``NAME``.
   A run that fails earlier removes its own file and leaves the old one as it was.
 * The file says ``status = "running"`` from then on, ``"complete"`` only after a clean end, and
   ``"interrupted"`` (with the reason) after an error or Ctrl-C. A killed process leaves ``"running"``.
 * Whatever the status, all rows up to the last :meth:`ResultsWriter.append` can be read.
 """
 
-from kedfem.results.files import ready_folder, replacing
+from kedfem.results.files import claimed, ready_folder, replacing
 from kedfem.results.reader import read_results
 from kedfem.results.records import Channel, Results
 from kedfem.results.table import write_csv
 from kedfem.results.writer import ResultsWriter
 
-__all__ = ["Channel", "Results", "ResultsWriter", "read_results", "ready_folder", "replacing", "write_csv"]
+__all__ = [
+    "Channel",
+    "Results",
+    "ResultsWriter",
+    "claimed",
+    "read_results",
+    "ready_folder",
+    "replacing",
+    "write_csv",
+]

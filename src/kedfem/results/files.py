@@ -1,12 +1,17 @@
 """Folders and files that can be written, and files that appear only when they are whole."""
 
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 
 from kedfem.errors import OutputError
+
+LOCK = ".kedfem.lock"
+PART = re.compile(r".+\.[0-9a-f]{8}\.part(\.\w+)?")
 
 
 def reason(error: OSError | RuntimeError) -> str:
@@ -62,6 +67,43 @@ def require_space(folder: Path, size: int) -> None:
 
 
 @contextmanager
+def claimed(folder: Path) -> Iterator[Path]:
+    """A folder that belongs to one run until the block ends; what killed runs left of unfinished files is removed.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written, or another run is writing there: that run is left alone.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(ready_folder(folder) / LOCK, timeout=0.05)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        wanted = "must not be in use, got another run that is writing there"
+        raise OutputError(f"{folder}: {wanted}; wait for it, or give output.folder another name") from error
+    except OSError as error:
+        raise OutputError(f"{folder}: must be a folder that can be locked, got {reason(error)}") from error
+    try:
+        for path in folder.iterdir():
+            if PART.fullmatch(path.name):
+                path.unlink(missing_ok=True)
+        yield folder
+    finally:
+        with suppress(
+            OSError
+        ):  # while it is held: who waits for it sees that it is gone, and makes a new one
+            (folder / LOCK).unlink()
+        lock.release()
+
+
+def own_part(path: Path) -> Path:
+    """A name beside `path` that no other writer has, for a file that is not whole yet."""
+    return path.with_name(f"{path.stem}.{token_hex(4)}.part{path.suffix}")
+
+
+@contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place when the block ends without an error.
 
@@ -73,8 +115,9 @@ def replacing(path: Path) -> Iterator[Path]:
         The folder or the file cannot be written; the old file is left as it was.
     """
     ready_folder(path.parent)
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    part = own_part(path)
     try:
+        part.touch(exist_ok=False)
         yield part
         part.replace(path)
     except OSError as error:

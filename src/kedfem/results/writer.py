@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import OutputError
-from kedfem.results.files import ready_folder, reason, require_space
+from kedfem.results.files import own_part, ready_folder, reason, require_space
 from kedfem.results.records import Channel
 
 FORMAT = 1
@@ -37,7 +37,8 @@ def installed_version() -> str:
 class ResultsWriter:
     """Appends rows to a results file; a context manager that tells how the run ended.
 
-    See :mod:`kedfem.results` for what happens to an older file of the same name.
+    See :mod:`kedfem.results` for what happens to an older file of the same name. Until its first rows it writes to a
+    file with a name of its own; if another writer has put rows in place meanwhile, it is refused and leaves them alone.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ class ResultsWriter:
         self.rows = 0
         self._scene = {"json": scene_json} | ({} if scene_toml is None else {"toml": scene_toml})
         self._notes = dict(notes)
-        self._part = self.path.with_name(self.path.name + ".part")
+        self._part = own_part(self.path)
         self._published = False
         self._file: Any = None
 
@@ -91,7 +92,7 @@ class ResultsWriter:
         self._refuse_another_run()
         try:
             require_space(self.path.parent, SPARE_SPACE)
-            self._open(self._part, "w")
+            self._open(self._part, "x")
             self._lay_out()
         except OSError as error:
             self._discard()
@@ -163,12 +164,13 @@ class ResultsWriter:
 
     def _refuse_another_run(self) -> None:
         """An older file is only replaced when no run is at work on it."""
+        import h5py
+
         try:
             if self.path.is_dir():
                 raise IsADirectoryError(21, "a folder of that name")
             if self.path.exists():
-                self._open(self.path, "r")
-                self._file.close()
+                h5py.File(self.path, "r", locking="best-effort").close()
         except (BlockingIOError, IsADirectoryError) as error:
             raise self._fault(error) from error
         except OSError:
@@ -207,6 +209,7 @@ class ResultsWriter:
     def _publish(self) -> None:
         """Put the new file in the old one's place; closed meanwhile: not every system renames open files."""
         self._file.close()
+        self._refuse_another_run()
         self._part.replace(self.path)
         self._published = True
         self._open(self.path, "r+")
