@@ -1,9 +1,5 @@
-"""The compiled loop of small links: microseconds a step, with and without numba, and the least that they could be."""
+"""The compiled loop of small links: microseconds a step, and the least that they could be."""
 
-import json
-import subprocess
-import sys
-from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
@@ -13,12 +9,10 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.bench.machine import seconds
 from kedfem.bench.scenes import mechanisms
-from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import first_states, forcings, motions, steps_of
-from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, following, scene_from, time_grid
 
@@ -91,16 +85,6 @@ def machine_speed() -> tuple[float, float]:
     return 8 * len(a) / seconds(a.sum, 5), 2 * 800**3 / seconds(lambda: b @ b, 5)
 
 
-def without_numba(functions: int) -> float:
-    """`loop_time` where numba cannot be imported, in a process of its own."""
-    command = [sys.executable, "-m", "kedfem.bench.loop", str(functions)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        what: Sequence[str] = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
-        raise SolveError(f"bench reduction: must run without numba, got {what[0]}")
-    return float(json.loads(done.stdout))
-
-
 def preparation() -> tuple[int, float, float]:
     """An arm of 27-node hexahedra as `kedfem bench growth` makes them: unknowns, seconds to factor it, to reduce it."""
     from kedfem.dynamics.reduction import static_parts
@@ -122,11 +106,3 @@ def _thick_arm() -> Scene:
         "analysis": {"end_time": 0.6, "step": 1e-3},
         "output": {"probes": {"tip": {"link": "arm", "at": "B", "quantity": "displacement"}}},
     })  # fmt: skip
-
-
-if __name__ == "__main__":
-    sys.modules["numba"] = None  # type: ignore[assignment]
-    _, small = four_bar_with(int(sys.argv[1]))
-    if not isinstance(steps_of(small.scene, small.model), CondensedSteps):
-        raise SystemExit("numba is still there")
-    json.dump(loop_time(small, 3), sys.stdout)

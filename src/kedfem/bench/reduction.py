@@ -152,17 +152,16 @@ def _loop(folder: Path, counts: Sequence[int]) -> str:
         made.append(max(link.n for link in small.model.links))
         fast.append(loop.loop_time(small))
         limits.append(max(memory, arithmetic))
-        slow = f"{1e6 * loop.without_numba(count):.0f}" if count in {20, 40} else ""
-        rows.append((str(made[-1]), f"{1e6 * fast[-1]:.1f}", slow, f"{1e6 * memory:.1f}", f"{1e6 * arithmetic:.1f}",
+        rows.append((str(made[-1]), f"{1e6 * fast[-1]:.1f}", f"{1e6 * memory:.1f}", f"{1e6 * arithmetic:.1f}",
                      f"{fast[-1] / limits[-1]:.1f}", f"{loop.recorded_rate(small):,.0f}"))  # fmt: skip
     curves = {"step": (made, fast), "limit": (made, limits)}
     write_loglog(folder, "reduction_loop", curves, ("functions per link", "seconds per step"))
-    header = ("functions per link", "a step [µs]", "without numba [µs]", "matrices from memory [µs]",
+    header = ("functions per link", "a step [µs]", "matrices from memory [µs]",
               "flops at BLAS speed [µs]", "step / limit", "steps a second, recorded")  # fmt: skip
     said = (
         "Three links. The limit is the greater of reading G, Y, S, W once from main memory and their flops at the speed "
-        "of a large matrix product; small matrices stay in the cache and may beat the first. Without numba small links "
-        f"go the way of large ones. Speeds: {speed[0] / 1e9:.1f} GB/s, {speed[1] / 1e9:.1f} Gflop/s. Recorded: three "
+        "of a large matrix product; small matrices stay in the cache and may beat the first. "
+        f"Speeds: {speed[0] / 1e9:.1f} GB/s, {speed[1] / 1e9:.1f} Gflop/s. Recorded: three "
         "probes and all joint forces at every step, loads included, rigid motion apart.\n\n"
         "![reduction_loop](reduction_loop.png)"
     )

@@ -1,4 +1,4 @@
-"""Steps of small links: dense constant matrices and one compiled loop over a block of time points. Needs numba."""
+"""Steps of small links: dense constant matrices and one compiled loop over a block of time points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Steps of small segments whose frames follow them: dense constant matrices and one compiled loop. Needs numba."""
+"""Steps of small segments whose frames follow them: dense constant matrices and one compiled loop."""
 
 from collections.abc import Sequence
 from dataclasses import replace

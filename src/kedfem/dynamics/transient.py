@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -59,13 +58,13 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if following(scene):
-        dense = all(link.unknowns <= SMALL for link in model.links) and find_spec("numba")
+        dense = all(link.unknowns <= SMALL for link in model.links)
         follower = FollowingDense if dense else FollowingSteps
         tolerance = FREE if scene.driven is None else CONVERGED
         every = (*actions(scene, model), *followers(model))
         return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
     every = actions(scene, model)
-    small = all(map(_is_small, model.links)) and find_spec("numba") and not every
+    small = all(map(_is_small, model.links)) and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
         solver = LiteralSteps
