@@ -118,11 +118,19 @@ def curved_error(radius: float, axis: str) -> Callable[[int], float]:
     return lambda n: tip_displacement(curved_cantilever(radius, FLAT, n + 1), np.eye(3)[k])[k] / exact - 1
 
 
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_curved_beams_converge_to_castigliano(axis: str):
-    found, last = slopes(curved_error(0.5, axis), [16, 32, 64])
-    assert ((found > 3.4) & (found < 4.4)).all()  # element's and spline's error, in part against each other
-    assert last < 3e-8
+@pytest.mark.parametrize(
+    ("axis", "counts", "cap"), [("x", [8, 16, 32], 3e-7), ("y", [8, 16, 32], 3e-7), ("z", [16, 24, 32], 7e-8)]
+)
+def test_curved_beams_converge_to_castigliano(axis: str, counts: list[int], cap: float):
+    """Element's and spline's error, along z against each other: they pass zero between 6 and 12 elements.
+
+    Rounding is 2e-10 with 32 elements, where the order is judged, and 1e-9 with 64, where only a cap holds.
+    """
+    error = curved_error(0.5, axis)
+    found, last = slopes(error, counts)
+    assert ((found > 3.2) & (found < 4.2)).all()
+    assert last < cap
+    assert abs(error(64)) < 3e-8
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
