@@ -16,7 +16,9 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.links.build import bare_link
 from kedfem.mesh import HexMesh, mesh_quality
 from kedfem.scene import scene_from
+from tests import scenes
 from tests.rooms.test_dynamics import four_bar
+from tests.scenes import bar, constant_speed, material
 
 E, RHO, L = 2.1e11, 7850.0, 0.5
 
@@ -30,17 +32,15 @@ def arm(
     fidelity: str, elements: list[int], *, height: float = 0.01, nu: float = 0.3, **analysis: Any
 ) -> dict[str, Any]:
     """A cantilever with a drive that stands still but for a hair, under its weight, and a probe at its tip."""
-    shape = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": height, "thickness": height}
     mesh = {"elements": elements[0] if fidelity == "beam" else elements[: 2 if fidelity == "plane" else 3]}
-    return {
-        "gravity": [0, -9.81, 0],
-        "materials": {"m": {"density": RHO, "youngs_modulus": E, "poisson_ratio": nu}},
-        "links": {"arm": {"fidelity": fidelity, "material": "m", "shape": shape, "mesh": mesh}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-6}},
-        "analysis": {"initial": "quasi-static", "end_time": 0.1, "step": 1e-3, **analysis},
-        "output": {"probes": {"tip": {"link": "arm", "at": [L, 0], "quantity": "displacement"}}},
-    }
+    return scenes.arm(
+        bar(L, height, height, fidelity=fidelity, mesh=mesh),
+        constant_speed(1e-6),
+        gravity=[0, -9.81, 0],
+        materials={"steel": material(RHO, E, nu)},
+        analysis={"initial": "quasi-static", "end_time": 0.1, "step": 1e-3, **analysis},
+        output={"probes": {"tip": {"link": "arm", "at": [L, 0], "quantity": "displacement"}}},
+    )
 
 
 def reduced(raw: dict[str, Any], **keys: Any) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def test_badly_shaped_elements(tmp_path: Any) -> None:
     assert 0.1 < quality < 0.35
     used, numbers = np.unique(cells, return_inverse=True)
     meshio.write(tmp_path / "arm.vtu", meshio.Mesh(X[used], [("hexahedron", numbers.reshape(cells.shape))]))
-    raw["links"]["arm"] = {"material": "m", "shape": {"kind": "mesh", "file": "arm.vtu"}}
+    raw["links"]["arm"] = {"material": "steel", "shape": {"kind": "mesh", "file": "arm.vtu"}}
     full, small = (histories(prepared(scene_from(each, tmp_path))[0]) for each in (raw, reduced(raw)))
     assert worst(relative_errors(small, full)) < 1e-3
 

@@ -19,6 +19,7 @@ from kedfem.links.segments import Segments, beam_segments, segmented, space_segm
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
 from tests.runs import Ran, ran
+from tests.scenes import arm, constant_speed
 from tests.verification.mechanisms import four_bar
 from tests.verification.meshes import mapped_link, mapped_plane
 
@@ -232,16 +233,16 @@ def elbow(fidelity: str, load: float, following: bool = True, **analysis: Any) -
         del link["beam"]
         link |= {"fidelity": fidelity, "shape": {"kind": "extrusion", "outline": out, "thickness": 0.01}}
         link["mesh"] = {"size": 0.01}
-    return {
-        "materials": {"m": ALLOY},
-        "links": {"arm": link},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-4}},
-        "loads": {"F": {"kind": "force", "link": "arm", "at": [0.3, 0.2], "vector": [0.6 * load, load],
-                        "factor": {"time": [0, 5e-3], "value": [0, 1]}}},
-        "analysis": {"end_time": 0.02, "step": 2e-4, "initial": "rest",
-                     **({"frames": "following"} if following else {}), **analysis},
-    }  # fmt: skip
+    factor = {"time": [0, 5e-3], "value": [0, 1]}
+    force = {"kind": "force", "link": "arm", "at": [0.3, 0.2], "vector": [0.6 * load, load], "factor": factor}
+    frames = {"frames": "following"} if following else {}
+    return arm(
+        link,
+        constant_speed(1e-4),
+        materials={"m": ALLOY},
+        loads={"F": force},
+        analysis={"end_time": 0.02, "step": 2e-4, "initial": "rest", **frames, **analysis},
+    )
 
 
 def tip(made: Ran) -> np.ndarray:

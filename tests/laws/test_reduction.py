@@ -19,7 +19,9 @@ from kedfem.dynamics.substructure import coupled
 from kedfem.dynamics.transient import instants, snapshots, steps_of
 from kedfem.links.reduced import rigid, rigid_modes
 from kedfem.scene import scene_from
+from tests import scenes
 from tests.rooms.test_dynamics import four_bar
+from tests.scenes import bar, cycloidal
 
 KINDS = ["beam", "bar", "plane", "spatial"]
 TURNED = 0.7  # rad
@@ -32,32 +34,21 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def arm(kind: str, **analysis: Any) -> dict[str, Any]:
     """A cantilever that swings under its weight; spatial: a bent beam under weight across its plane."""
-    shape: dict[str, Any] = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.03}
-    link: dict[str, Any] = {
-        "material": "steel",
-        "shape": shape,
-        "fidelity": "solid",
-        "mesh": {"elements": [10, 2, 1]},
-    }
+    link = bar(0.5, 0.02, 0.03, fidelity="solid", mesh={"elements": [10, 2, 1]})
     if kind == "plane":
         link |= {"fidelity": "plane", "mesh": {"elements": [10, 2]}}
     if kind in {"beam", "spatial"}:
         link |= {"fidelity": "beam", "mesh": {"elements": 10}}
     if kind == "spatial":
-        link["shape"] = {
-            "kind": "polyline",
-            "points": [[0, 0], [0.3, 0.1], [0.5, 0]],
-            "width": 0.02,
-            "thickness": 0.03,
-        }
-    return {
-        "gravity": [0, 0, -9.81] if kind == "spatial" else [0, -9.81, 0],
-        "links": {"arm": link},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.1}},
-        "damping": {"beta": 1e-5},
-        "analysis": {"end_time": 0.1, "step": 1e-3, **analysis},
-    }
+        points = [[0, 0], [0.3, 0.1], [0.5, 0]]
+        link["shape"] = {"kind": "polyline", "points": points, "width": 0.02, "thickness": 0.03}
+    return scenes.arm(
+        link,
+        cycloidal(1, 0.1),
+        gravity=[0, 0, -9.81] if kind == "spatial" else [0, -9.81, 0],
+        damping={"beta": 1e-5},
+        analysis={"end_time": 0.1, "step": 1e-3, **analysis},
+    )
 
 
 def found_bases(full: Prepared) -> list[Basis]:

@@ -8,21 +8,23 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.scene import scene_from
+from tests import scenes
+from tests.scenes import bar, constant_speed
 
 
 def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
-    return {
-        "gravity": [1.0, -9.81],
-        "links": {"arm": {"material": "steel", "fidelity": fidelity,
-                          "shape": {"kind": "bar", "between": [[0, 0], [0.4, 0]], "width": 0.02, "thickness": 0.01},
-                          **({"segments": 4} if analysis.get("frames") else {})}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1.0}},
-        "loads": {"top": {"kind": "surface", "link": "arm", "at": [0.11, 0.01], "vector": [0, -1e4]},
-                  "all": {"kind": "body", "link": "arm", "vector": [2e3, 0]},
-                  "tip": {"kind": "force", "link": "arm", "at": [0.4, 0], "vector": [3, 4]}},
-        "analysis": {"end_time": 0.1, "step": 1e-3, **analysis},
-    }  # fmt: skip
+    segments = {"segments": 4} if analysis.get("frames") else {}
+    return scenes.arm(
+        bar(0.4, 0.02, 0.01, fidelity=fidelity, **segments),
+        constant_speed(1.0),
+        gravity=[1.0, -9.81],
+        loads={
+            "top": {"kind": "surface", "link": "arm", "at": [0.11, 0.01], "vector": [0, -1e4]},
+            "all": {"kind": "body", "link": "arm", "vector": [2e3, 0]},
+            "tip": {"kind": "force", "link": "arm", "at": [0.4, 0], "vector": [3, 4]},
+        },
+        analysis={"end_time": 0.1, "step": 1e-3, **analysis},
+    )
 
 
 @pytest.mark.parametrize("fidelity", ["plane", "solid"])

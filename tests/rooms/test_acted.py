@@ -16,6 +16,7 @@ from kedfem.errors import SolveError
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
+from tests import scenes
 
 E, RHO = 2.1e11, 7850.0
 LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "ground", "at": [0.1, 0.4]}]}
@@ -25,32 +26,15 @@ def four_bar(frames: str, fidelity: str = "beam", steps: int = 180, **rest: Any)
     """A slow four-bar of steel, a quarter of a turn."""
     analysis = {"turns": 0.25, "steps_per_turn": steps, "frames": frames, "initial": "quasi-static"}
     mesh = {"elements": 2} if fidelity == "beam" else {}
-    bars = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
-    joints = {
-        "A": ["ground", "crank"],
-        "B": ["crank", "coupler"],
-        "C": ["coupler", "rocker"],
-        "D": ["rocker", "ground"],
-    }
-    return {
-        "points": {
-            "A": [0, 0], "D": [0.3, 0],
-            "B": {"from": "A", "distance": 0.1, "angle": "60 deg"},
-            "C": {"from": ["B", "D"], "distances": [0.3, 0.25]},
-        },
-        "materials": {"m": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.3}},
-        "links": {
-            name: {
-                "material": "m", "fidelity": fidelity, "mesh": mesh,
-                "shape": {"kind": "bar", "between": ends, "width": 0.02, "thickness": 0.01},
-            }
-            for name, ends in bars.items()
-        },
-        "joints": {name: {"kind": "revolute", "links": links, "at": name} for name, links in joints.items()},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}},
-        "analysis": {**analysis, **rest.pop("analysis", {})},
+    shape = {"kind": "bar", "width": 0.02, "thickness": 0.01}
+    return scenes.four_bar(
+        (0.1, 0.3, 0.25, 0.3),
+        {"material": "m", "fidelity": fidelity, "mesh": mesh, "shape": shape},
+        scenes.constant_speed("60 rpm"),
+        materials={"m": scenes.material(RHO, E)},
+        analysis={**analysis, **rest.pop("analysis", {})},
         **rest,
-    }  # fmt: skip
+    )
 
 
 def run(raw: dict[str, Any]) -> tuple[Prepared, list[Block]]:

@@ -34,6 +34,7 @@ from kedfem.motion.rigid import resting
 from kedfem.motion.rows import perpendiculars
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from
+from tests.scenes import bar
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -243,7 +244,7 @@ def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
 
 # -- on links -----------------------------------------------------------------------------------------------
 
-BAR = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.04, "thickness": 0.02}
+BAR = bar(1, 0.04, 0.02)["shape"]
 PLATE = {
     "kind": "plate_link",
     "between": [[0, 0], [1, 0]],

@@ -1,6 +1,5 @@
 """The energy and momentum of a run: every kind of link, second order in the step, and what known laws say."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,8 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.report import run_tables
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.scene import read_scene, scene_from
+from tests import scenes
+from tests.scenes import bar, material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 L, SIDE, E, RHO = 0.5, 0.02, 2.1e11, 7850.0  # an arm [m] of steel
@@ -38,7 +39,7 @@ def audited(raw: dict[str, Any]) -> tuple[Balance, dict[str, np.ndarray]]:
 
 def example(name: str, steps: int, links: dict[str, Any] | None = None, **analysis: Any) -> dict[str, Any]:
     """A quarter of a turn of an example."""
-    raw = tomllib.loads((EXAMPLES / name / "scene.toml").read_text())
+    raw = scenes.example(name)
     raw["analysis"] = {"turns": 0.25, "steps_per_turn": steps, "initial": "quasi-static", **analysis}
     for link in raw["links"].values():
         link.update(links or {})
@@ -46,14 +47,7 @@ def example(name: str, steps: int, links: dict[str, Any] | None = None, **analys
 
 
 def arm(link: dict[str, Any], motion: dict[str, Any], **rest: Any) -> dict[str, Any]:
-    shape = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": SIDE, "thickness": SIDE}
-    return {
-        "materials": {"steel": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.3}},
-        "links": {"arm": {"material": "steel", "shape": shape, **link}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": motion},
-        **rest,
-    }
+    return scenes.arm(bar(L, SIDE, SIDE, **link), motion, materials={"steel": material(RHO, E)}, **rest)
 
 
 KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {

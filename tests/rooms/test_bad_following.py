@@ -7,17 +7,14 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.errors import KedfemError
 from kedfem.scene import scene_from
+from tests import scenes
+from tests.scenes import bar, constant_speed
 
 
 def arm(**analysis: Any) -> dict[str, Any]:
     """A solid bar on a drive, four elements long."""
-    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
-    return {
-        "links": {"arm": {"material": "steel", "shape": shape, "mesh": {"elements": [4, 1, 1]}}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 10}},
-        "analysis": {"end_time": 0.1, "step": 1e-3, "frames": "following", **analysis},
-    }
+    analysis = {"end_time": 0.1, "step": 1e-3, "frames": "following", **analysis}
+    return scenes.arm(bar(mesh={"elements": [4, 1, 1]}), constant_speed(10), analysis=analysis)
 
 
 def fault(raw: dict[str, Any]) -> str:

@@ -12,6 +12,8 @@ from kedfem.errors import KedfemError, SolveError
 from kedfem.motion.linkage import linkage
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
+from tests import scenes
+from tests.scenes import bar, constant_speed
 
 from .test_dynamics import four_bar
 
@@ -19,15 +21,8 @@ from .test_dynamics import four_bar
 def arm(fidelity: str = "solid") -> dict[str, Any]:
     """One bar, 0.5 m along x, hinged at its left end face."""
     elements = [4, 1, 1] if fidelity == "solid" else 2
-    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
-    return {
-        "links": {
-            "arm": {"fidelity": fidelity, "material": "steel", "shape": shape, "mesh": {"elements": elements}}
-        },
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 10}},
-        "analysis": {"turns": 0.1},
-    }
+    link = bar(fidelity=fidelity, mesh={"elements": elements})
+    return scenes.arm(link, constant_speed(10), analysis={"turns": 0.1})
 
 
 def fault(raw: dict[str, Any]) -> str:

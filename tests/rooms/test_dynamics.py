@@ -23,6 +23,8 @@ from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import scene_from
+from tests import scenes
+from tests.scenes import arm, bar, constant_speed
 
 BAR = {"width": 0.0254, "thickness": 0.0254}
 PLATE = {
@@ -40,31 +42,15 @@ def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
     fidelity = {"fidelity": kind} if kind in {"beam", "plane"} else {}
     across = {"elements_across": 1}
     mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": across, "plane": across}[kind]
-    ends = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
-    pairs = {
-        "A": ["ground", "crank"],
-        "B": ["crank", "coupler"],
-        "C": ["coupler", "rocker"],
-        "D": ["rocker", "ground"],
-    }
-    return {
-        "points": {
-            "A": [0, 0],
-            "D": [0.9144, 0],
-            "B": {"from": "A", "distance": 0.3048, "angle": "60 deg"},
-            "C": {"from": ["B", "D"], "distances": [0.9144, 0.762], "side": "left"},
-        },
-        "materials": {"alloy": {"density": 2796, "youngs_modulus": 7.031e10, "shear_modulus": 2.712e10}},
-        "links": {
-            name: {"material": "alloy", "shape": {**shape, "between": between}, "mesh": mesh, **fidelity}
-            for name, between in ends.items()
-        },
-        "joints": {name: {"kind": "revolute", "links": pair, "at": name} for name, pair in pairs.items()},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "600 rpm"}},
-        "bodies": {"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
-        "damping": {"alpha": 0.5, "beta": 1e-5},
-        "analysis": {"turns": 1, "steps_per_turn": 120, "rho_inf": 1.0, **analysis},
-    }
+    return scenes.four_bar(
+        (0.3048, 0.9144, 0.762, 0.9144),
+        {"material": "alloy", "shape": shape, "mesh": mesh, **fidelity},
+        constant_speed("600 rpm"),
+        materials={"alloy": {"density": 2796, "youngs_modulus": 7.031e10, "shear_modulus": 2.712e10}},
+        bodies={"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
+        damping={"alpha": 0.5, "beta": 1e-5},
+        analysis={"turns": 1, "steps_per_turn": 120, "rho_inf": 1.0, **analysis},
+    )
 
 
 def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
@@ -181,13 +167,8 @@ def test_damping_takes_nothing_from_a_bent_link_that_turns() -> None:
 
 
 def spinning_beam() -> dict[str, Any]:
-    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
-    return {
-        "links": {"arm": {"fidelity": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 4}}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 100}},
-        "analysis": {"turns": 1, "steps_per_turn": 720, "initial": "quasi-static"},
-    }
+    analysis = {"turns": 1, "steps_per_turn": 720, "initial": "quasi-static"}
+    return arm(bar(fidelity="beam", mesh={"elements": 4}), constant_speed(100), analysis=analysis)
 
 
 def test_quasi_static_start_does_not_vibrate() -> None:

@@ -17,9 +17,11 @@ from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results.recording import recording
 from kedfem.scene import drive_angle, factor_table, load_factor, scene_from
+from tests import scenes
+from tests.scenes import constant_speed
 
 L, W, T, E, NU = 0.2, 0.02, 0.01, 2.0e11, 0.3
-BAR = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": W, "thickness": T}
+BAR = scenes.bar(L, W, T)["shape"]
 PLATE = {
     "kind": "plate_link",
     "between": [[0, 0], [L, 0]],
@@ -38,19 +40,18 @@ KINDS: dict[str, dict[str, Any]] = {
     "rigid": {"fidelity": "rigid", "shape": PLATE},
 }
 PLANAR = {"plane", "edge", "beam"}
-MATERIAL = {"density": 7850.0, "youngs_modulus": E, "poisson_ratio": NU}
+MATERIAL = scenes.material(7850.0, E, NU)
 
 
 def arm(kind: str, loads: dict[str, Any], speed: float = 1e-6, **analysis: Any) -> dict[str, Any]:
     """A cantilever on the driven hinge at the origin, standing nearly still."""
-    return {
-        "materials": {"m": MATERIAL},
-        "links": {"arm": {"material": "m", **KINDS[kind]}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
-        "loads": loads,
-        "analysis": {"end_time": 1e-4, "step": 1e-5, "initial": "quasi-static", **analysis},
-    }
+    return scenes.arm(
+        {"material": "m", **KINDS[kind]},
+        constant_speed(speed),
+        materials={"m": MATERIAL},
+        loads=loads,
+        analysis={"end_time": 1e-4, "step": 1e-5, "initial": "quasi-static", **analysis},
+    )
 
 
 def wrench(link: Link, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

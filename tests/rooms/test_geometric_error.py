@@ -1,6 +1,5 @@
 """The linear equation's own geometric error, estimated from its deflections, against what is known of it."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,9 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.scene import scene_from
+from tests import scenes
 from tests.moving import inverted, ran
+from tests.scenes import bar, constant_speed, material
 
 FOUR_BAR = Path(__file__).parents[2] / "examples" / "four_bar_beams" / "scene.toml"
 L, SIDE, E, RHO = 1.0, 0.01, 2.1e11, 7850.0  # an arm [m] of steel
@@ -38,7 +39,7 @@ def estimated(raw: dict[str, Any]) -> GeometricError:
 
 def four_bar(rpm: float, elements: int = 4, **link: Any) -> dict[str, Any]:
     """Three turns of the source's example from rest."""
-    raw = tomllib.loads(FOUR_BAR.read_text())
+    raw = scenes.example("four_bar_beams")
     raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
     raw["analysis"] = {"turns": 3, "steps_per_turn": 360 if rpm >= 300 else 720, "initial": "rest"}
     for x in raw["links"].values():
@@ -48,15 +49,13 @@ def four_bar(rpm: float, elements: int = 4, **link: Any) -> dict[str, Any]:
 
 def arm(speed: float = 1e-4, link: dict[str, Any] = BEAM, **loads: Any) -> dict[str, Any]:
     """A bar on a drive, quasi-static."""
-    shape = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": SIDE, "thickness": SIDE}
-    return {
-        "materials": {"steel": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.0}},
-        "links": {"arm": {"material": "steel", "shape": shape, **link}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
-        "loads": loads,
-        "analysis": {"end_time": 1e-3, "step": 5e-4, "initial": "quasi-static"},
-    }
+    return scenes.arm(
+        bar(L, SIDE, SIDE, **link),
+        constant_speed(speed),
+        materials={"steel": material(RHO, E, 0.0)},
+        loads=loads,
+        analysis={"end_time": 1e-3, "step": 5e-4, "initial": "quasi-static"},
+    )
 
 
 def tip(*force: float) -> dict[str, Any]:

@@ -15,6 +15,8 @@ from kedfem.bench.accuracy import kept
 from kedfem.bench.mechanisms import MECHANISMS
 from kedfem.cli import app
 from kedfem.scene import scene_from, time_grid
+from tests import scenes
+from tests.scenes import bar, cycloidal
 
 from .test_dynamics import four_bar, slider_crank
 
@@ -25,14 +27,12 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def arm(accuracy: float = 0.05, **link: Any) -> dict[str, Any]:
-    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
-    return {
-        "links": {"arm": {"material": "steel", "shape": shape, **link}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.2}},
-        "damping": {"ratio": 0.02, "frequencies": [50, 500]},
-        "analysis": {"end_time": 0.2, "accuracy": accuracy},
-    }
+    return scenes.arm(
+        bar(**link),
+        cycloidal(1, 0.2),
+        damping={"ratio": 0.02, "frequencies": [50, 500]},
+        analysis={"end_time": 0.2, "accuracy": accuracy},
+    )
 
 
 def polyline_bar(kind: str, points: list[list[float]]) -> dict[str, Any]:

@@ -19,6 +19,8 @@ from kedfem.accuracy.resolution import (
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.scene import scene_from
+from tests import scenes
+from tests.scenes import bar, constant_speed, material
 
 L, B, H, E, RHO = 0.5, 0.02, 0.01, 2.1e11, 7850.0  # an arm [m], B along z, of steel
 FIRST = (
@@ -27,18 +29,14 @@ FIRST = (
 
 
 def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
-    mesh = {"beam": {"elements": 8}, "solid": {"elements": [12, 1, 1]}, "plane": {"elements": [12, 1]}}[
-        fidelity
-    ]
-    shape = {"kind": "bar", "between": [[0, 0], [L, 0]], "width": H, "thickness": B}
-    return {
-        "materials": {"steel": {"density": RHO, "youngs_modulus": E, "poisson_ratio": 0.3}},
-        "links": {"arm": {"fidelity": fidelity, "material": "steel", "shape": shape, "mesh": mesh}},
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
-        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 20}},
-        "gravity": [0, -9.81, 0],
-        "analysis": {"turns": 1, "steps_per_turn": 720, **analysis},
-    }
+    elements: dict[str, Any] = {"beam": 8, "solid": [12, 1, 1], "plane": [12, 1]}
+    return scenes.arm(
+        bar(L, H, B, fidelity=fidelity, mesh={"elements": elements[fidelity]}),
+        constant_speed(20),
+        materials={"steel": material(RHO, E)},
+        gravity=[0, -9.81, 0],
+        analysis={"turns": 1, "steps_per_turn": 720, **analysis},
+    )
 
 
 @pytest.mark.parametrize("fidelity", ["beam", "solid", "plane"])

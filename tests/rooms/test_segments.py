@@ -24,6 +24,7 @@ from kedfem.links.recovery import stress_recovery
 from kedfem.output.frames import link_fields
 from kedfem.report import check_tables
 from kedfem.scene import scene_from
+from tests.scenes import arm, bar
 
 from .test_dynamics import four_bar
 
@@ -79,16 +80,8 @@ def test_beams_with_frames_that_follow_stay_in_full() -> None:
 
 
 def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
-    bar = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}
-    arm = {
-        "fidelity": "plane",
-        "material": "steel",
-        "reduced": True,
-        "shape": bar,
-        "mesh": {"elements": [4, 1]},
-    }
-    joint = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}
-    raw = {"links": {"arm": arm}, "joints": {"A": joint}, "analysis": {"end_time": 0.1, "step": 0.01}}
+    link = bar(1, fidelity="plane", reduced=True, mesh={"elements": [4, 1]})
+    raw = arm(link, None, analysis={"end_time": 0.1, "step": 0.01})
     with pytest.raises(
         SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"
     ):

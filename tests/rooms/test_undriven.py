@@ -30,6 +30,7 @@ from kedfem.scene import (
     time_grid,
     turn_steps,
 )
+from tests.scenes import arm, bar
 
 ARM = """
 gravity = [0, -9.81]
@@ -156,12 +157,8 @@ def test_links_start_with_velocities_that_close_the_joints() -> None:
 @pytest.mark.parametrize("fidelity", ["beam", "plane", "solid", "rigid"])
 def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
     """½ J ω² of a bar about its end, J = m (4 L² + h²)/12."""
-    raw = {
-        "links": {"arm": {"fidelity": fidelity, "material": "aluminium",
-                          "shape": {"kind": "bar", "between": [[0, 0], [0.6, 0]], "width": 0.03, "thickness": 0.02}}},
-        "joints": {"A": {"kind": "revolute", "links": ["arm", "ground"], "at": [0, 0]}},
-        "analysis": {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}},
-    }  # fmt: skip
+    raw = arm(bar(0.6, 0.03, 0.02, fidelity=fidelity) | {"material": "aluminium"}, None)
+    raw["analysis"] = {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}}
     ready = meshed(scene_from(raw))
     rates, links = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
     m = sum(float(link.one @ link.m1[:, 0]) for link in links)
@@ -171,8 +168,7 @@ def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
 
 def test_a_scene_without_any_joint_can_be_built() -> None:
     raw = {
-        "links": {"arm": {"fidelity": "beam", "material": "steel", "mesh": {"elements": 3},
-                          "shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.03, "thickness": 0.02}}},
+        "links": {"arm": bar(1, 0.03, 0.02, fidelity="beam", mesh={"elements": 3})},
         "analysis": {"end_time": 1, "step": 0.01,
                      "initial_motions": {"arm": {"at": [0.5, 0], "velocity": [1, 2], "spin": [0, 0, 30]}}},
     }  # fmt: skip

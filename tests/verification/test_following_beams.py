@@ -1,8 +1,6 @@
 """Planar beams whose frames follow: few elements of many nodes against closed forms and converged solutions."""
 
-import tomllib
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +16,7 @@ from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle
 from kedfem.links.segments import beam_segments
 from kedfem.scene import Material, Scene, scene_from
+from tests.scenes import example
 
 from .large_deflection import ELASTICA, history
 
@@ -88,7 +87,7 @@ def test_few_elements_of_many_nodes_bend_into_the_elastica(elements: int, nodes:
 
 def four_bar(element: str, elements: int, steps: int, turns: float = 3.0) -> Scene:
     """The source's four-bar from rest at 600 rpm, 2 % damping, frames that follow."""
-    raw = tomllib.loads(Path("examples/four_bar_beams/scene.toml").read_text(encoding="utf-8"))
+    raw = example("four_bar_beams")
     for link in raw["links"].values():
         link |= {"element": element, "mesh": {"elements": elements}}
     raw["analysis"] = {"turns": turns, "steps_per_turn": steps, "initial": "rest", "frames": "following"}

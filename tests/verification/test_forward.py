@@ -11,6 +11,7 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
+from tests import scenes
 
 LENGTH, WIDTH, THICKNESS, DENSITY = 0.5, 0.03, 0.02, 7850.0
 MASS = DENSITY * LENGTH * WIDTH * THICKNESS
@@ -20,16 +21,14 @@ Run = tuple[np.ndarray, dict[str, np.ndarray], Account]
 
 
 def bar(fidelity: str, x: float = 0.0) -> dict[str, Any]:
-    shape = {"kind": "bar", "between": [[x, 0], [x + LENGTH, 0]], "width": WIDTH, "thickness": THICKNESS}
-    return {"fidelity": fidelity, "material": "steel", "shape": shape}
+    link = scenes.bar(LENGTH, WIDTH, THICKNESS, fidelity=fidelity)
+    link["shape"]["between"] = [[x, 0], [x + LENGTH, 0]]
+    return link
 
 
 def arm(fidelity: str, end_time: float, step: float, **more: Any) -> dict[str, Any]:
     analysis = {"end_time": end_time, "step": step, **more.pop("analysis", {})}
-    return {
-        "links": {"arm": bar(fidelity)}, "analysis": analysis,
-        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}}, **more,
-    }  # fmt: skip
+    return scenes.arm(bar(fidelity), None, analysis=analysis, **more)
 
 
 def ran(raw: dict[str, Any]) -> Run:
