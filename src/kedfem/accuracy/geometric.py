@@ -25,7 +25,7 @@ displacements of slices across the link's axis; so both take scalar weights only
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block, LinkHistory
@@ -35,6 +35,8 @@ from kedfem.links.record import Link, in_space
 from kedfem.motion.rigid import RigidMotion
 
 SLICES = 8  # of a link along its axis, if it has so many nodes
+SAME = 1e-6  # of a slice: nodes of one cross-section, which rounding places differently along the link
+APART = 0.5  # of a slice's length, between middles: the slope between nearer ones would be that of rounding or warping
 INSTANTS = 256  # of a block that are looked at
 AXIAL = 3.0  # error of the peak stress in units of e, measured
 TURN = 0.4  # and of ψ²: elastica, load across the tip, 0.42 of its deflection, 0.24 of the stress at its root
@@ -67,13 +69,15 @@ class Slices:
 
 
 def slices(link: Link, joint: Attachment) -> Slices:
-    """Cut a link between its nodes into slices of equal length; those without nodes are left out."""
+    """Cut a link between its nodes into slices of about equal length, whose middles are well apart.
+
+    Nodes that are as far along but for rounding are one cross-section: no cut parts them.
+    """
     full, axis = link.full or link, link.axes[:, 0]
     nodes = np.flatnonzero(full.one)
     s = full.X[nodes] @ axis
-    of = np.minimum((SLICES * (s - s.min()) / np.ptp(s)).astype(int), SLICES - 1)
-    used, of = np.unique(of, return_inverse=True)
-    inside = np.zeros((len(used), full.n))
+    of = _numbers(s)
+    inside = np.zeros((of.max() + 1, full.n))
     inside[of, nodes] = 1.0
     means = inside / inside.sum(axis=1, keepdims=True)
     middles = means[:, nodes] @ s
@@ -87,6 +91,19 @@ def slices(link: Link, joint: Attachment) -> Slices:
         axis, means if link.Q is None else means @ link.Q, beyond, (link.mass[0] @ beyond.T).T, mended,
         (ports > cuts[:, None]).astype(float), np.diff(middles), np.diff(bounds),
     )  # fmt: skip
+
+
+def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
+    """The slice of each node, from its place along the link; slices too near to the one before are joined to it."""
+    length = float(np.ptp(s)) or 1.0
+    of = np.clip(np.floor(SLICES * (s - s.min()) / length + SAME).astype(int), 0, SLICES - 1)
+    used, of = np.unique(of, return_inverse=True)
+    middles = np.bincount(of, s) / np.bincount(of)
+    first = [0]
+    for k in range(1, len(used)):
+        if middles[k] - middles[first[-1]] >= APART * length / SLICES:
+            first.append(k)
+    return np.asarray(np.searchsorted(first, of, side="right") - 1)
 
 
 @dataclass
@@ -166,8 +183,8 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
         return ()
     remedy = _remedy(found, error)
     return (
-        f"links turn by up to {np.degrees(found.turn):.2g} deg against their rigid motion, which the linear equation "
-        f"takes as small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % of the peak stress"
+        f"the elastic rotation of links is up to {np.degrees(found.turn):.2g} deg, which the linear equation takes as "
+        f"small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % of the peak stress"
         f"{' or more' if error > 1 else ''}; {remedy}",
     )
 
