@@ -72,7 +72,7 @@ def state(blocks: list[Block], k: int, name: str) -> np.ndarray:
 
 def channels(ready: Prepared, blocks: list[Block]) -> dict[str, np.ndarray]:
     """All channels over time."""
-    every = recording(ready.scene, ready.model)
+    every = recording(ready.scene, ready.model, along=ready.path)
     return {each.channel.name: np.concatenate([each.rows(block) for block in blocks]) for each in every}
 
 

@@ -28,6 +28,7 @@ from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.output.words import clock, moment
 from kedfem.results import Channel, Results, ResultsWriter, claimed, read_results, write_csv
+from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
@@ -96,7 +97,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
-    account = Account(ready.model)
+    account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))

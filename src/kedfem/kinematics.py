@@ -161,8 +161,6 @@ def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
         yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
     if linked.mobility:
         yield f"free motions ({linked.mobility}) are held as drawn; forces of joints are left out"
-    if scene.motors or scene.springs:
-        yield "rigid forces: motors and springs are not in them"
 
 
 def _transmission(results: Results, recorded: Kinematics) -> Iterator[str]:

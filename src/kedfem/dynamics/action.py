@@ -35,6 +35,7 @@ class End:
     X : (m, 3) the vectors as drawn [m; -]
     mask : (3,) which components of the state's rows the vectors are made of; forces on them likewise
     offset : (3,) from the point of the link, to which X belongs, to the end itself; does not turn [m]
+    link : name of the link in the scene, where that is not the model's: a slider, what the drive carries
     """
 
     k: int
@@ -44,6 +45,7 @@ class End:
     X: Float[np.ndarray, "m 3"]
     mask: tuple[float, float, float] = IN_SPACE
     offset: Vector = field(default_factory=lambda: np.zeros(3))
+    link: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,6 @@
 """Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -40,9 +41,22 @@ def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
     MeshError, SceneError
         If a point or joint is not on its link.
     """
-    find = _Ends(scene, model)
-    motors = [_motor(find, name, motor) for name, motor in scene.motors.items()]
-    springs = [_spring(find, name, spring) for name, spring in scene.springs.items()]
+    return _all(_Ends(scene, model))
+
+
+def rigid_actions(scene: Scene, bodies: Sequence[str]) -> tuple[Action, ...]:
+    """The same on links that do not deform, moving as given.
+
+    Parameters
+    ----------
+    bodies : their names by number in the linkage
+    """
+    return _all(_RigidEnds(scene, bodies))
+
+
+def _all(find: "_Ends | _RigidEnds") -> tuple[Action, ...]:
+    motors = [_motor(find, name, motor) for name, motor in find.scene.motors.items()]
+    springs = [_spring(find, name, spring) for name, spring in find.scene.springs.items()]
     return (*motors, *springs)
 
 
@@ -110,7 +124,7 @@ class _Ends:
             return self.on_slider(slider, at)
         body = self.body(name)
         if body is not None:
-            return End(-1, body, POINT, np.zeros((1, 0)), at[None])
+            return End(-1, body, POINT, np.zeros((1, 0)), at[None], link=name)
         k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
         link = self.model.links[k]
         beside = float(np.linalg.norm(rows.X - at))
@@ -123,8 +137,8 @@ class _Ends:
         port = np.asarray(self.scene.joints[slider.joint].at)
         k, link = slider.carrier, self.model.links[slider.carrier]
         return End(
-            k, self.model.bodies[k], POINT, slider.weights[None], port[None], _plane(link), offset=at - port
-        )
+            k, self.model.bodies[k], POINT, slider.weights[None], port[None], _plane(link), at - port, slider.name
+        )  # fmt: skip
 
     def across(self, joint: str, name: str) -> End:
         """Directions of a link across the axis of a hinge."""
@@ -132,7 +146,7 @@ class _Ends:
         both = np.array(perpendiculars(axis))
         body = self.body(name)
         if body is not None:
-            return End(-1, body, PAIR, np.zeros((2, 0)), both)
+            return End(-1, body, PAIR, np.zeros((2, 0)), both, link=name)
         k, seat = on_segment(self.model, name, at, lambda link: seat_of(self.scene, joint, link))
         link, here = self.model.links[k], self.model.bodies[k]
         if link.kind == "beam":
@@ -141,6 +155,27 @@ class _Ends:
             return End(k, here, PAIR, both @ seat.fit[1:], both, _plane(link))
         known = np.array([_in_face(f"joints.{joint}", link, seat, axis), axis])
         return End(k, here, SINGLE, known @ seat.fit[1:], known, _plane(link))
+
+
+@dataclass(frozen=True, slots=True)
+class _RigidEnds:
+    """Where ends are on links that only move as given."""
+
+    scene: Scene
+    bodies: Sequence[str]
+
+    def body(self, name: str) -> int:
+        """The number of a link."""
+        return list(self.bodies).index(name)
+
+    def point(self, where: str, name: str, at: Vector) -> End:
+        """A point of a link or the ground."""
+        return End(-1, self.body(name), POINT, np.zeros((1, 0)), at[None], link=name)
+
+    def across(self, joint: str, name: str) -> End:
+        """Directions of a link across the axis of a hinge."""
+        both = np.array(perpendiculars(joint_axis(self.scene.joints[joint])))
+        return End(-1, self.body(name), PAIR, np.zeros((2, 0)), both, link=name)
 
 
 def _plane(link: Link) -> tuple[float, float, float]:
@@ -163,14 +198,14 @@ def _ordered(links: tuple[str, str]) -> tuple[str, str]:
     return (links[1], links[0]) if links[0] == GROUND else links
 
 
-def _hinge(find: _Ends, name: str, joint: str) -> Action:
+def _hinge(find: _Ends | _RigidEnds, name: str, joint: str) -> Action:
     """An action on the turn of a hinge, without a force yet."""
     one, other = _ordered(find.scene.joints[joint].links)
     ends = (find.across(joint, one), find.across(joint, other))
     return Action(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
 
 
-def _slide(find: _Ends, name: str, joint: str) -> Action:
+def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> Action:
     """An action on the travel of a slide, without a force yet: the port of its link against the ground."""
     at = np.asarray(find.scene.joints[joint].at)
     one, other = _ordered(find.scene.joints[joint].links)
@@ -178,22 +213,22 @@ def _slide(find: _Ends, name: str, joint: str) -> Action:
     return Action(name, SLIDE, ends, axis=joint_axis(find.scene.joints[joint]))
 
 
-def _port(find: _Ends, joint: str, name: str, at: Vector) -> End:
+def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:
     """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
-    if find.body(name) is not None:
+    if isinstance(find, _RigidEnds) or find.body(name) is not None:
         return find.point(f"joints.{joint}", name, at)
     k, seat = on_segment(find.model, name, at, lambda link: seat_of(find.scene, joint, link))
     link, weights = find.model.links[k], port_weights(seat, at[None])
     return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
 
 
-def _motor(find: _Ends, name: str, motor: Motor) -> Action:
+def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> Action:
     curve = motor.curve
     made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
     return replace(made, over=OVER[curve.over], at=curve.at, value=curve.value)
 
 
-def _spring(find: _Ends, name: str, spring: Spring) -> Action:
+def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> Action:
     law: dict[str, Any] = {"stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free}
     if not isinstance(spring, LineSpring) or spring.between is None:
         made = _slide if isinstance(spring, LineSpring) else _hinge

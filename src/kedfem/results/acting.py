@@ -1,16 +1,17 @@
 """Channels of motors and springs, and of how far hinges have turned."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.action import DISTANCE, TURN, Action, Table, kernel_table, vectors
+from kedfem.dynamics.action import ANGLE, DISTANCE, POINT, TURN, Action, End, Table, kernel_table, vectors
 from kedfem.dynamics.actions import actions, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
+from kedfem.motion.rows import cross
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Scene
@@ -27,22 +28,59 @@ class Measured:
     turned: Float[np.ndarray, " A"] = field(default_factory=lambda: np.zeros(0))
     block: Block | None = None
     values: Float[np.ndarray, "T A 4"] = field(default_factory=lambda: np.zeros((0, 0, 4)))
+    places: Float[np.ndarray, "T A 2 2 3"] = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
+    forces: Float[np.ndarray, "T A 2 2 3"] = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
+
+    def wrenches(self, block: Block) -> Iterator[tuple[End, Rows, Rows]]:
+        """Force and moment about the world's origin (T, 3) of every end of all actions."""
+        if self.every:
+            self.of(block)
+        for i, action in enumerate(self.every):
+            for e, end in enumerate(action.ends):
+                x, f = self.places[:, i, e], self.forces[:, i, e]
+                if end.form == POINT:
+                    yield end, f[:, 0], cross(x[:, 0], f[:, 0])
+                else:
+                    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
+                    yield end, np.zeros_like(moment), np.asarray(moment)
+
+    def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
+        """Force and moment of all actions on a link that has no unknowns of its own: a slider, what the drive carries.
+
+        Parameters
+        ----------
+        about : (T, 3) the point that the moment is about
+        """
+        force, moment = np.zeros((2, len(block), 3))
+        for end, f, m in self.wrenches(block):
+            if end.link == link:
+                force, moment = force + f, moment + m - cross(about, f)
+        return force, moment
+
+    def power(self, links: Collection[str], block: Block) -> Float[np.ndarray, " T"]:
+        """Power of all actions on links that move as given [W]."""
+        out, motion = np.zeros(len(block)), block.motion
+        for end, f, m in self.wrenches(block):
+            if end.link in links:
+                v, omega = motion.v[:, end.body], motion.omega[:, end.body]
+                out += (f * (v - cross(omega, motion.p[:, end.body])) + m * omega).sum(axis=1)
+        return out
 
     def of(self, block: Block) -> Float[np.ndarray, "T A 4"]:
         """Coordinate, rate, force and stored energy of all actions; blocks in the order of time."""
         if block is not self.block:
             from kedfem.dynamics.actions_kernel import evaluate_all
 
-            before = np.zeros(len(self.every)) if block.step == 0 else self.turned
+            before = np.zeros(len(self.every)) if block.step == 0 or not self.turned.size else self.turned
             self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
             x, v = vectors(self.every, block)
-            evaluate_all(block.motion.t, x, v, self.turned, self.table, np.zeros_like(x), self.values)
-            self.block = block
+            self.places, self.forces, self.block = x, np.zeros_like(x), block
+            evaluate_all(block.motion.t, x, v, self.turned, self.table, self.forces, self.values)
         return self.values
 
 
-def acting(scene: Scene, model: Model) -> list[Recorded]:
-    """How motors, springs and, without a drive, hinges move, and what force they exert.
+def measured_actions(scene: Scene, model: Model) -> Measured:
+    """Motors and springs of a scene and, without a drive, the turns of its hinges.
 
     Raises
     ------
@@ -51,12 +89,14 @@ def acting(scene: Scene, model: Model) -> list[Recorded]:
     """
     turns = () if scene.driven is not None else hinges(scene, model)
     every = (*actions(scene, model), *turns)
-    if not every:
-        return []
-    measured = Measured(every, kernel_table(every))
+    return Measured(every, kernel_table(every))
+
+
+def acting(scene: Scene, measured: Measured) -> list[Recorded]:
+    """How motors, springs and, without a drive, hinges move, and what force they exert."""
     return [
         Recorded(channel, partial(_column, measured, i, which, sign))
-        for i, action in enumerate(every)
+        for i, action in enumerate(measured.every)
         for channel, which, sign in _channels(scene, action)
     ]
 

@@ -15,7 +15,7 @@ Work is the trapezoidal sum of powers; damping's is that of the means over a ste
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -26,6 +26,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
+from kedfem.results.acting import Measured
 from kedfem.results.balance import Flow, carried_fields, fields_of, flow
 from kedfem.results.moments import Constants, Nominal, constants, nominal
 from kedfem.results.records import Channel
@@ -98,8 +99,8 @@ class _Sums:
 class Account:
     """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    def __init__(self, model: Model, actions: Measured | None = None) -> None:
+        self.model, self.actions = model, actions
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
@@ -181,7 +182,11 @@ class Account:
             of, loaded = [self.carried[i] for i in group], [self.model.carried[i] for i in group]
             forces = [applied(x.link, x.loads, motion, x.body) for x in loaded]
             flows.append(flow(of, carried_fields(of, forces), at.of(_bodies(of), of[0].k)))
-        return sum(flows[1:], start=flows[0]), taken
+        found = sum(flows[1:], start=flows[0])
+        if self.actions is not None and self.carried:
+            power = self.actions.power({x.link.name for x in self.model.carried}, block)
+            found = replace(found, loads=found.loads + power, supports=found.supports - power)
+        return found, taken
 
     def _flow_of(
         self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: Nominal

@@ -1,36 +1,28 @@
 """From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import inertias_of_model
-from kedfem.dynamics.loads import applied
-from kedfem.dynamics.model import Carried, Model, Slider, on_segment
-from kedfem.dynamics.ports import turned_ports
-from kedfem.dynamics.row_joints import ordered
+from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError
-from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
-from kedfem.motion.linkage import joint_axis, linkage
+from kedfem.motion.linkage import linkage
 from kedfem.motion.path import Path
-from kedfem.motion.rows import cross
-from kedfem.results.acting import acting
+from kedfem.results.acting import acting, measured_actions
 from kedfem.results.audit import Account, energy_channels
+from kedfem.results.joint_forces import XYZ, Forces, drive_channels, gear_channel, joint_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.results.rigid import rigid_forces
-from kedfem.results.row_forces import RowForces, known, of_joint
-from kedfem.scene import GROUND, ForceLoad, Probe, Scene, TorqueLoad
+from kedfem.results.row_forces import RowForces
+from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
 
-XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
-INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
@@ -50,12 +42,24 @@ def recording(
         If a probe is outside its link.
     """
     probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
-    forces = RowForces(model)
-    joints = [channel for name in scene.joints for channel in _joint(scene, model, name, forces)]
-    drive = [channel for name in scene.driven_joints for channel in _torque(scene, model, name, forces)]
-    gears = [_gear(model, name, forces) for name in scene.gears]
-    energies = [Recorded(*each) for each in energy_channels(account or Account(model))]
-    return [*probes, *joints, *drive, *gears, *_rigid(scene, model, along), *acting(scene, model), *energies]
+    actions = account.actions if account else None
+    forces = Forces(RowForces(model), actions or measured_actions(scene, model))
+    account = account or Account(model, forces.actions)
+    joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
+    drive = [
+        channel for name in scene.driven_joints for channel in drive_channels(scene, model, name, forces)
+    ]
+    gears = [gear_channel(model, name, forces) for name in scene.gears]
+    energies = [Recorded(*each) for each in energy_channels(account)]
+    return [
+        *probes,
+        *joints,
+        *drive,
+        *gears,
+        *_rigid(scene, model, along),
+        *acting(scene, forces.actions),
+        *energies,
+    ]
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
@@ -122,289 +126,6 @@ def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
     single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]
     forces = [load.at for load in single if load.at is not None]
     return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
-
-
-def _joint(scene: Scene, model: Model, name: str, forces: RowForces) -> list[Recorded]:
-    """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
-    if any(row.name == name for row in model.rows):
-        return _row_joint(scene, model, name, forces)
-    slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
-    if slider is not None:
-        return _slider_force(scene, model, slider, name, forces)
-    hub = next((x for x in model.carried if x.hub == name), None)
-    if hub is not None:
-        return _hub(scene, model, hub, forces)
-    held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
-    if not held:
-        return []
-    k = _holder(model, held[0], name)
-    first, second = scene.joints[name].links
-    opposite = first in {x.link.name for x in model.carried}  # it has no ports of its own
-    on, other = (first, second) if held[0] == first or opposite else (second, first)
-    sign = -1.0 if opposite else 1.0
-    label = f"of joint {name} on link {on} from {other}"
-    at = np.asarray(scene.joints[name].at)
-    wrench = _wrench(model, k, name, at, forces)
-    return [
-        Recorded(channel, partial(_part_of, wrench, which, sign))
-        for which, (channel, told) in enumerate(
-            zip(_force_and_moment(name, label), _determinate(model, k, name, at), strict=True)
-        )
-        if told
-    ]
-
-
-def _row_joint(scene: Scene, model: Model, name: str, forces: RowForces) -> list[Recorded]:
-    """Of a joint that holds by rows, about its point on the first link, of a slot the pin."""
-    first, second = scene.joints[name].links
-    on, other = (second, first) if first == GROUND else (first, second)
-    sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
-    label = f"of joint {name} on link {on} from {other}"
-    channels = zip(_force_and_moment(name, label), known(model, name), strict=True)
-    return [
-        Recorded(channel, partial(_row_part, forces, name, which, sign))
-        for which, (channel, told) in enumerate(channels)
-        if told
-    ]
-
-
-def _row_part(forces: RowForces, name: str, which: int, sign: float, block: Block) -> Rows:
-    """Force (0) or moment (1)."""
-    return sign * forces.wrench(name, block)[which]
-
-
-Wrench = Callable[[Block], tuple[Rows, Rows]]
-
-
-def _part_of(wrench: Wrench, which: int, sign: float, block: Block) -> Rows:
-    """Force (0) or moment (1)."""
-    return sign * wrench(block)[which]
-
-
-def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
-    about = f"moment {label}, about the joint's nominal point"
-    return (
-        Channel(f"joints/{joint}/force", XYZ, "N", "world", f"force {label}"),
-        Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
-    )
-
-
-def _hub(scene: Scene, model: Model, carried: Carried, forces: RowForces) -> list[Recorded]:
-    """Force and moment that the driven joint exerts on a rigid link that moves with it."""
-    wrench, others = _hub_wrench(scene, model, carried, forces)
-    told = [all(_small(_loose(model, *x)[which]) for x in others) for which in (0, 1)]
-    rows = [known(model, name) for name in _row_joints_of(scene, model, carried)]
-    told = [told[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
-    label = f"of joint {carried.hub} on link {carried.link.name} from ground"
-    channels = enumerate(_force_and_moment(carried.hub, label))
-    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if told[k]]
-
-
-Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
-
-
-def _row_joints_of(scene: Scene, model: Model, carried: Carried) -> list[str]:
-    """Joints of a carried link that hold by rows."""
-    return [row.name for row in model.rows if carried.link.name in scene.joints[row.name].links]
-
-
-def _hub_wrench(scene: Scene, model: Model, carried: Carried, forces: RowForces) -> tuple[Wrench, list[Held]]:
-    """What holds a carried link in balance: P − M R0'', the forces of its other joints, and the hub's; these joints."""
-    link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
-    held: list[Held] = []
-    sliding = _row_joints_of(scene, model, carried)
-    for name, joint in scene.joints.items():
-        elastic = [x.name for x in model.links if x.name in joint.links]
-        if link.name in joint.links and elastic and name not in sliding:
-            held.append((_holder(model, elastic[0], name), name, np.asarray(joint.at)))
-    others = [(_wrench(model, *each, forces), each[2]) for each in held]
-
-    def wrench(block: Block) -> tuple[Rows, Rows]:
-        F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
-        arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
-        force = -in_space(link, np.tensordot(F, link.one, (1, 0)))
-        moment = -_resultant(link, arms, F)[1]
-        for other, at in others:
-            f, m = other(block)
-            force = force + f
-            moment = moment + m + cross((R @ (at - hub)), f)
-        for name in sliding:
-            f, m, point = forces.wrench(name, block)
-            sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
-            centre = block.motion.p[:, carried.body] + R @ hub
-            force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
-        return force, moment
-
-    return wrench, held
-
-
-def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
-    """P − M R0'' of a carried link."""
-    return applied(carried.link, carried.loads, block.motion, carried.body)
-
-
-def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: RowForces) -> Wrench:
-    """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
-    attachment, link = model.joints[k], model.links[k]
-    rows = _rows_of(attachment, joint)
-    arms = _arms(attachment, joint, at)
-    shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
-    from_rows = attachment.from_rows[rows]
-
-    def wrench(block: Block) -> tuple[Rows, Rows]:
-        f = np.zeros((len(block), len(rows)))
-        for j, share in shares:
-            history = block.links[j]
-            f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
-        if from_rows.any():
-            f += forces.on_ports(block) @ from_rows.T
-        R = np.tile(np.eye(3), (len(block), 1, 1))
-        R[:, : link.d, : link.d] = block.links[k].R
-        return _resultant(link, arms @ R.transpose(0, 2, 1), f.reshape(len(f), len(arms), link.d))
-
-    return wrench
-
-
-def _determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
-    """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
-    force, moment = _loose(model, k, joint, at)
-    return _small(force), _small(force) and _small(moment)
-
-
-def _loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
-    """Forces and moments of a joint that statics leave open, as drawn."""
-    attachment = model.joints[k]
-    arms, link = _arms(attachment, joint, at), model.links[k]
-    loose = attachment.loose[_rows_of(attachment, joint)].T
-    return _resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
-
-
-def _small(loose: Float[np.ndarray, "..."]) -> bool:
-    return bool(np.abs(loose).max(initial=0.0) < INDETERMINATE)
-
-
-def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
-    """All components of all ports of a joint."""
-    here = np.flatnonzero([name == joint for name in attachment.joints])
-    return (attachment.components * here[:, None] + np.arange(attachment.components)).ravel()
-
-
-def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "p 3"]:
-    """From a point to the ports of a joint, as drawn."""
-    return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
-
-
-def _resultant(
-    link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray, "T p d"]
-) -> tuple[Rows, Rows]:
-    """Force and moment of port forces, all in one frame."""
-    if link.kind == "beam":  # third component is a moment
-        return in_space(link, f).sum(axis=1), f.sum(axis=1) * [0, 0, 1]
-    force = in_space(link, f)
-    return force.sum(axis=1), cross(arms, force).sum(axis=1)
-
-
-def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces: RowForces) -> list[Recorded]:
-    """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it."""
-    pins = [name] if name != slider.guide else [
-        j for j, joint in scene.joints.items() if slider.name in joint.links and j != name
-    ]  # fmt: skip
-    zero = np.zeros(3)
-    pairs = [(k, j) for k, x in enumerate(model.joints) for j in pins if j in x.joints]
-    if not all(_determinate(model, k, j, zero)[0] for k, j in pairs):
-        return []
-    wrenches = [_wrench(model, k, j, zero, forces) for k, j in pairs]
-    if name == slider.guide:
-        description = f"force of joint {name} on slider {slider.name} from ground"
-
-        def guide(block: Block) -> Rows:
-            return np.asarray(np.sum([wrench(block)[0] for wrench in wrenches], axis=0))
-
-        return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)]
-    carrier = model.links[slider.carrier]
-    description = f"force of joint {name} on link {carrier.name} from slider {slider.name}"
-    gravity = np.asarray(scene.gravity)
-
-    def pin(block: Block) -> Rows:
-        motion, body = block.motion, model.bodies[slider.carrier]
-        nominal = motion.p2[:, body] + motion.R2[:, body] @ (slider.weights @ carrier.X)
-        elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
-        a = nominal + in_space(carrier, elastic)
-        force = wrenches[0](block)[0] - slider.mass * (a - gravity)
-        for x in slider.loads:
-            force += np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
-        return np.asarray(force)
-
-    return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
-
-
-def _torque(scene: Scene, model: Model, driven: str, forces: RowForces) -> list[Recorded]:
-    """Torque of the drive on its link, about the driven joint's axis."""
-    if any(row.name == driven for row in model.rows):
-        return [_row_drive(scene, model, driven, forces)]
-    joint = scene.joints[driven]
-    name = next(link for link in joint.links if link != "ground")
-    axis, at = joint_axis(joint), np.asarray(joint.at)
-    channel = Channel(
-        f"drive/{_of_several(scene, driven)}torque",
-        ("torque",),
-        "N m",
-        "world",
-        f"torque of the drive on link {name}",
-    )
-    carried = next((x for x in model.carried if x.link.name == name), None)
-    if carried is None:
-        wrench = _wrench(model, _holder(model, name, driven), driven, at, forces)
-    else:
-        wrench, others = _hub_wrench(scene, model, carried, forces)
-        if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
-            return []
-    return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
-
-
-def _of_several(scene: Scene, driven: str) -> str:
-    """Part of a channel's name where there are several drives."""
-    return f"{driven}/" if len(scene.driven_joints) > 1 else ""
-
-
-def _gear(model: Model, name: str, forces: RowForces) -> Recorded:
-    """What gears exert on the first joint's link."""
-    row, here = of_joint(model.rows, f"gears.{name}")
-    share = row.plus[0][0]
-    text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
-    return Recorded(
-        Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
-        lambda block: share * forces.of(block)[:, here],
-    )
-
-
-def _row_drive(scene: Scene, model: Model, driven: str, forces: RowForces) -> Recorded:
-    """Torque, of a slide force, of a drive that holds by rows, along its axis in the second link."""
-    joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
-    on = next(link for link in joint.links if link != GROUND)
-    sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
-    quantity, unit = ("force", "N") if slide else ("torque", "N m")
-    channel = Channel(
-        f"drive/{_of_several(scene, driven)}{quantity}",
-        (quantity,),
-        unit,
-        "world",
-        f"{quantity} of the drive on link {on}",
-    )
-
-    def along(block: Block) -> Rows:
-        axis = block.motion.R[:, row.bodies[1]] @ row.axis
-        effort = forces.wrench(driven, block)[0 if slide else 1]
-        return np.asarray(sign * (effort * axis).sum(axis=1, keepdims=True))
-
-    return Recorded(channel, along)
-
-
-def _holder(model: Model, name: str, joint: str) -> int:
-    """The link of a name, or its segment, that a joint holds."""
-    return next(
-        k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints
-    )
 
 
 def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:

@@ -5,12 +5,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.action import kernel_table
+from kedfem.dynamics.actions import rigid_actions
+from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.places import slider_axis
 from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
+from kedfem.results.acting import Measured
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
@@ -43,6 +48,7 @@ class Borne:
 class RigidForces:
     """Rigid inverse dynamics of a scene; worked out once for each motion.
 
+    actions : motors and springs, which are loads of given motion
     turn : time steps after which all poses return; 0 if they do not
     """
 
@@ -50,6 +56,7 @@ class RigidForces:
     linkage: Linkage
     inertias: Inertias
     every: tuple[Borne, ...]
+    actions: Measured
     turn: int = 0
     _motion: RigidMotion | None = None
     _rows: dict[str, Rows] = field(default_factory=dict)
@@ -64,6 +71,10 @@ class RigidForces:
         """
         if motion is not self._motion:
             force, moment = acting(self.inertias, motion)
+            centre = motion.p + motion.R @ self.inertias.centre
+            for end, f, m in self.actions.wrenches(Block(step or 0, motion, [])):
+                force[:, end.body] += f
+                moment[:, end.body] += m - cross(centre[:, end.body], f)
             wrench = np.concatenate([force, moment], axis=2)[:, 1:].reshape(len(motion.t), -1, 1)
             values = (self._responses(motion, step) @ wrench)[..., 0]
             ends = np.cumsum([len(each.channel.columns) for each in self.every])[:-1]
@@ -105,7 +116,9 @@ def rigid_forces(
     if along is not None and not linkage.mobility:
         found = reactions(linkage, _on_grid(linkage, along))
         every = [*(x for name in scene.joints for x in _joint(scene, linkage, found, name)), *every]
-    return RigidForces(scene, linkage, inertias, tuple(every), returning(scene, along))
+    acted = rigid_actions(scene, linkage.bodies)
+    measured = Measured(acted, kernel_table(acted))
+    return RigidForces(scene, linkage, inertias, tuple(every), measured, returning(scene, along))
 
 
 def returning(scene: Scene, along: Path | None) -> int:
