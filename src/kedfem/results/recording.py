@@ -2,28 +2,19 @@
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-import scipy.sparse as sp
-from jaxtyping import Float
-
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import inertias_of_model
-from kedfem.dynamics.model import Model, on_segment
-from kedfem.errors import SceneError
-from kedfem.links.recovery import point_rows, von_mises
+from kedfem.dynamics.model import Model
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import Path
 from kedfem.results.acting import acting, measured_actions
 from kedfem.results.audit import Account, energy_channels
-from kedfem.results.joint_forces import XYZ, Forces, drive_channels, gear_channel, joint_channels
+from kedfem.results.joint_forces import Forces, drive_channels, gear_channel, joint_channels
+from kedfem.results.probes import probe_channels
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.results.records import Channel
 from kedfem.results.rigid import rigid_forces
 from kedfem.results.row_forces import RowForces
-from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
-
-STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
-UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+from kedfem.scene import Scene
 
 
 def recording(
@@ -41,7 +32,7 @@ def recording(
     SceneError
         If a probe is outside its link.
     """
-    probes = [_probe(scene, model, name, probe) for name, probe in scene.output.probes.items()]
+    probes = probe_channels(scene, model)
     actions = account.actions if account else None
     forces = Forces(RowForces(model), actions or measured_actions(scene, model))
     account = account or Account(model, forces.actions)
@@ -78,57 +69,3 @@ def _rigid(scene: Scene, model: Model, along: Path | None) -> list[Recorded]:
         return lambda block: forces.rows(block.motion, block.step)[name]
 
     return [Recorded(each.channel, rows(each.channel.name)) for each in forces.every]
-
-
-def _probe(scene: Scene, model: Model, name: str, probe: Probe) -> Recorded:
-    where, drawn = f"output.probes.{name}.at", np.asarray(probe.at)
-    kinks = _kinks(scene, probe.link)
-    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
-    link = model.links[k]
-    key = f"probes/{name}/{probe.quantity}"
-    place = f"of link {probe.link} at ({', '.join(f'{x:.6g}' for x in at.X)}) m as drawn"
-    if probe.quantity == "stress":
-        dofs, dense = _compact(at.stress)
-
-        def stress(block: Block) -> Rows:
-            g = block.links[k].g
-            s = g.reshape(len(g), -1)[:, dofs] @ dense.T
-            return np.column_stack([s, von_mises(s)])
-
-        return Recorded(Channel(key, STRESS, "Pa", "link", f"stress {place}"), stress)
-    beside = float(np.linalg.norm(at.X - probe.at))
-    if link.kind == "beam" and beside > 1e-6 * link.size:
-        raise SceneError(
-            f"output.probes.{name}.at: must lie on the axis of beam '{link.name}' for a {probe.quantity}, "
-            f"got {beside:.3g} m beside it"
-        )
-    nodes = np.flatnonzero(at.value)
-    weights = at.value[nodes]
-    field = {"displacement": "u", "velocity": "v", "acceleration": "a"}[probe.quantity]
-    columns = XYZ[:2] if link.planar else XYZ
-
-    def vector(block: Block) -> Rows:
-        history = block.links[k]
-        x = np.tensordot(getattr(history, field)[:, nodes], weights, (1, 0))
-        if probe.frame == "link":
-            R = block.motion.R[:, model.bodies[k], : link.d, : link.d]
-            x = (x[:, None] @ R)[:, 0] @ link.axes[: link.d, : link.d]
-        return np.asarray(x[:, : len(columns)])
-
-    description = f"{'' if scene.driven is None else 'elastic '}{probe.quantity} {place}"
-    return Recorded(Channel(key, columns, UNITS[probe.quantity], probe.frame, description), vector)
-
-
-def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
-    """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
-    joints = [joint.at for joint in scene.joints.values() if link in joint.links]
-    bodies = [body.at for body in scene.bodies.values() if body.link == link]
-    single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]
-    forces = [load.at for load in single if load.at is not None]
-    return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
-
-
-def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:
-    """The columns that a matrix uses, and the matrix on them, dense."""
-    columns = np.unique(matrix.indices)
-    return columns, matrix[:, columns].toarray()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import math
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BeforeValidator,
@@ -11,9 +12,10 @@ from pydantic import (
     StrictBool,
     StrictInt,
     model_serializer,
+    model_validator,
 )
 
-from kedfem.scene.base import FileName, Name, Record
+from kedfem.scene.base import Fault, FileName, Name, Record, refuse
 from kedfem.scene.frames import Frames
 from kedfem.scene.initial import InitialMotion, JointSpeed
 from kedfem.scene.links import Count
@@ -70,17 +72,45 @@ class Animation(Record):
     """only so many turns, the last ones; all if not given"""
 
 
+ELASTIC = ("displacement", "velocity", "acceleration")
+TOTAL = ("position", "travel", "total_velocity", "total_acceleration")
+
+
 class Probe(Record):
-    """A quantity at a point of an elastic link, at every time step."""
+    """A quantity at a point of a link, at every time step."""
 
     link: str
-    """the link"""
+    """the link; a rigid one for motions only"""
     at: Point
-    """where, in the drawn position"""
-    quantity: Literal["displacement", "velocity", "acceleration", "stress"]
-    """displacement, velocity and acceleration are those of the elastic motion"""
-    frame: Literal["link", "world"] = "link"
-    """axes of the components: those of the link (x along it) or the world's; stress: the link's only"""
+    """where, in the drawn position; of a rigid link anywhere"""
+    quantity: Literal[
+        "displacement", "velocity", "acceleration", "deflection", "position", "travel", "total_velocity",
+        "total_acceleration", "stress",
+    ]  # fmt: skip
+    """displacement, velocity and acceleration: of the elastic motion, against the rigid mechanism, which a drive moves.
+    position, travel (from the drawn position), total_velocity and total_acceleration: of rigid and elastic motion
+    together, with a drive or without. deflection: of the link against a frame of its own, which goes with its chord"""
+    chord: tuple[Point, Point] | None = None
+    """of a deflection: two points of the link, between which the chord is; if not given its two joints farthest apart. A
+    link with fewer than two joints deflects from its mean rigid motion"""
+    frame: Literal["link", "world"] | None = None
+    """axes of the components: those of the link (x along it) or the world's. The link's if not given, and of a stress; of
+    position, travel and total motions the world's"""
+
+    @model_validator(mode="after")
+    def _in_a_frame(self) -> Self:
+        faults: list[Fault] = []
+        wanted = "link" if self.quantity == "stress" else "world" if self.quantity in TOTAL else None
+        if wanted and self.frame not in {None, wanted}:
+            got = f"got {self.frame!r}"
+            faults.append((("frame",), f"must be {wanted!r} for a {self.quantity.replace('_', ' ')}, {got}"))
+        if self.chord is not None and self.quantity != "deflection":
+            got = f"got one for a {self.quantity.replace('_', ' ')}"
+            faults.append((("chord",), f"must be given for a deflection only, {got}"))
+        if self.chord is not None and math.dist(*self.chord) == 0.0:
+            faults.append((("chord",), "must be two different points, got one twice"))
+        refuse(faults)
+        return self.fill(frame=self.frame or wanted or "link")
 
 
 def animation_or_none(value: Any) -> Any:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, get_args
 
 from pydantic_core import PydanticCustomError
 
+from kedfem.scene.analysis import ELASTIC
 from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.faults import either, line, place
 from kedfem.scene.files import sketched
@@ -333,11 +334,14 @@ def load_faults(parts: Parts) -> Iterator[str]:
             got = f"got {link.name!r}, which is rigid"
             yield load.fault("link", f"must name a link with a shape for a body load, {got}")
     for probe in parts.probes.values():
-        link = parts.links.get(probe.word("link") or "")
-        if link is not None and fidelity(link) == "rigid":
-            yield probe.fault("link", f"must name an elastic link, got {link.name!r}, which is rigid")
-        if probe.word("quantity") == "stress" and probe.word("frame") == "world":
-            yield probe.fault("frame", "must be 'link' for a stress, got 'world'")
+        link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
+        if link is not None and fidelity(link) == "rigid" and quantity in {"stress", "deflection"}:
+            got = f"got {link.name!r}, which is rigid"
+            yield probe.fault("link", f"must name an elastic link for a {quantity}, {got}")
+        if quantity in ELASTIC and not parts.driven:
+            wanted = "position, travel or deflection" if quantity == "displacement" else f"total_{quantity}"
+            why = "without a drive (there is no rigid motion to compare with)"
+            yield probe.fault("quantity", f"must be {wanted} {why}, got {quantity!r}")
     for body in parts.bodies.values():
         yield from flywheel_faults(body, parts)
 
