@@ -9,12 +9,13 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.geometric import GeometricError, geometric_warning
-from kedfem.accuracy.histories import worst
+from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of
+from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
+from kedfem.accuracy.histories import Histories
 from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
-from kedfem.accuracy.resolution import resolution, resolution_warnings, step_error
+from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model, segments, ways
@@ -25,16 +26,16 @@ from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
-from kedfem.output.vtu import AnimationWriter, remove_animation
+from kedfem.output.vtu import AnimationWriter, remove_animation, write_cells
 from kedfem.output.words import clock, moment
-from kedfem.results import Channel, Results, ResultsWriter, claimed, read_results, write_csv
+from kedfem.results import Channel, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
 from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, time_grid, turn_steps
 
-STEM, TABLE, PICTURE, PLOTS = "animation", "results.csv", "worst.png", "plots"
+STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
 T = TypeVar("T")
@@ -58,7 +59,7 @@ class Run:
     """What a run leaves: results, files, highest stress, seconds per stage, warnings for the user, choices made.
 
     balance : of energy and momentum, as far as it was kept account of
-    geometric : estimated error of the peak stress because links bend [-]; None where all frames follow
+    budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     """
 
     folder: FilePath
@@ -69,7 +70,7 @@ class Run:
     reduction: Reduction | None = None
     plan: Plan | None = None
     balance: Balance | None = None
-    geometric: float | None = None
+    budget: Budget | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -101,24 +102,40 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
-    peak, geometric, error = clock.timed(
-        "steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch)
-    )
+    peak, seen = clock.timed("steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch))
     results = read_results(folder / "results.h5")
-    nominal = any(link.fit is None for link in ready.model.links)
+    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results)))
+    add_notes(folder / "results.h5", attributes(found))
+    results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
+    _mesh_field(seen.strained, folder / MESH)
     warnings = (
         *assembly_warning(assembly),
         *stability_warning(scene),
-        *(geometric_warning(geometric) if nominal else ()),
-        *reduction_warning(reduction),
+        *budget_warning(found, None if plan is None else plan.asked),
         *plan_warning(plan),
-        *resolution_warnings(frequencies, error),
+        *resolution_warnings(frequencies),
         *balance_warning(account.balance, scene.analysis.stiffening),
         *warnings,
     )
-    estimate = geometric.estimate if nominal else None
-    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, estimate)
+    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found)
+
+
+def _mesh_field(strained: Strained, file: FilePath) -> None:
+    """The mesh's indicator in each element of solid and plane links, for ParaView."""
+    parts = [
+        ((link.full or link), each.elements)
+        for link, each in ((strained.model.links[k], each) for k, each in strained.indicators.items())
+    ]
+    if parts:
+        cells = [(link.X, link.cells, link.cell_type) for link, _ in parts]
+        write_cells(file, cells, "mesh_error", [values for _, values in parts])
+
+
+def _in_memory(results: Results) -> Histories:
+    """The channels of a run as its errors are judged."""
+    channels = {name: each for name, each in results.channels.items() if kind_of(each[0]) is not None}
+    return Histories(results.time, channels)
 
 
 @dataclass
@@ -164,30 +181,19 @@ def plan_warning(plan: Plan | None) -> tuple[str, ...]:
     return () if plan is None or plan.reached else plan.notes[-1:]
 
 
-def reduction_warning(reduction: Reduction | None) -> tuple[str, ...]:
-    """A warning where the reduction may have cost more than was allowed."""
-    if reduction is None or worst(reduction.estimate) <= reduction.tolerance:
-        return ()
-    name = max(reduction.estimate, key=lambda x: reduction.estimate[x])
-    return (
-        f"reduced links: the error in {name} is estimated at {100 * reduction.estimate[name]:.2g} % of its peak, "
-        f"above the {100 * reduction.tolerance:.2g} % asked for",
-    )
-
-
 def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
     links = [*model.links, *(carried.link for carried in model.carried)]
     return [stress_recovery(link) for link in links] if scene.output.animation else []
 
 
 def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
-             folder: FilePath, watch: Watch) -> tuple[Peak | None, GeometricError, float]:  # fmt: skip
-    """All time steps: rows to the results file, frames to the animation; also geometric error and error of a step."""
+             folder: FilePath, watch: Watch) -> tuple[Peak | None, Seen]:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
-    geometric, errors = GeometricError(model, scene.analysis.stiffening), step_error(ready)
+    seen = watcher(ready)
     channels = [each.channel for each in recorded]
     notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
@@ -202,15 +208,14 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
         try:
             for block in transient(scene, ready.linkage, ready.path, model, solver):
                 table.add(block, rows(recorded, block))
-                geometric.add(block)
-                errors.add(block)
+                seen.add(block)
                 for k in range(len(block)):
                     if block.step + k in wanted:
                         peak = _framed(ready, recoveries, frames, block.at(k), peak)
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
-    return peak, geometric, errors.relative
+    return peak, seen
 
 
 @dataclass
@@ -247,7 +252,7 @@ class _Table:
 
 def _remove_derived(folder: FilePath) -> None:
     """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
-    for name in (TABLE, PICTURE):
+    for name in (TABLE, PICTURE, MESH):
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
 

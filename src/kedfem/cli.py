@@ -298,6 +298,7 @@ def _say_where(folder: Path) -> None:
         ("animation.pvd", "animation, open in ParaView"),
         ("plots", "plots"),
         ("worst.png", "picture of the highest stress"),
+        ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
     ):
         if (folder / name).exists():
             out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)

@@ -60,7 +60,7 @@ def test_steps_in_a_period_are_counted_and_too_few_are_said() -> None:
         found = resolution(meshed(scene_from(arm("beam", steps_per_turn=steps))))
         assert found is not None
         assert_allclose(found.steps_per_period, per_period, rtol=0.02)
-        assert ["steps in a period" in x for x in resolution_warnings(found, 0.0)] == [True] * said
+        assert ["steps in a period" in x for x in resolution_warnings(found)] == [True] * said
 
 
 def test_a_harmonic_that_meets_the_first_frequency_is_said() -> None:
@@ -70,7 +70,7 @@ def test_a_harmonic_that_meets_the_first_frequency_is_said() -> None:
         found = resolution(meshed(scene_from(raw)))
         assert found is not None
         assert [x.harmonic for x in found.meetings] == met
-        assert ["harmonic 3 " in x for x in resolution_warnings(found, 0.0)] == [True] * len(met)
+        assert ["harmonic 3 " in x for x in resolution_warnings(found)] == [True] * len(met)
 
 
 def test_a_frequency_that_changes_over_the_turn_is_met_between_poses() -> None:
@@ -113,11 +113,3 @@ def test_error_of_a_step_is_that_of_a_swinging_mass(rho_inf: float) -> None:
     assert_allclose(
         watcher.relative, wanted, rtol=0.05
     )  # the arm's own mass, and 40 steps see no maximum exactly
-
-
-def test_a_long_step_is_said() -> None:
-    assert resolution_warnings(None, 0.02) == [
-        "a step makes an error of up to 2 % of the largest displacement: the step is too long for what moves, or the "
-        "start or a load too sudden"
-    ]
-    assert resolution_warnings(None, 0.001) == []

@@ -173,7 +173,9 @@ def test_a_run_tells_segments_and_draws_links(tmp_path: Path) -> None:
     raw["analysis"] |= {"turns": 0.1}
     done = analyse(scene_from(raw))
     assert done.results.notes["segments of coupler"] == 4
-    assert done.geometric is None
+    assert done.budget is not None
+    assert done.budget.of("frames") is None
+    assert done.results.notes["error together, joint forces"] == done.budget.together["joint forces"]
     text = (tmp_path / "out" / "animation_0001.vtu").read_text(encoding="utf-8", errors="replace")
     assert text.count('Name="link coupler"') == 1
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.accuracy.budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.transient import steps_of, transient
@@ -39,7 +40,7 @@ def histories(
     keep : numbers of the steps whose states are kept too
     watch : called now and then; what it raises ends the run
     """
-    recorded = recording(ready.scene, ready.model)
+    recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
     times, taken, kept = [], [], []
     solver = steps_of(ready.scene, ready.model)
     for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
@@ -56,7 +57,7 @@ def histories(
 
 def asked_for(name: str) -> bool:
     """Whether a channel counts when an accuracy is asked for: probes, joint forces, the drive's torque."""
-    return name.startswith("probes/") or name.endswith("/force") or name == "drive/torque"
+    return kind_of_name(name) is not None
 
 
 def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:

@@ -19,7 +19,6 @@ from kedfem.scene import path_parameter, time_grid, turn_steps
 POSES = 8  # of the last turn in which the linkage stands still in thought
 LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
 FEWEST = 10  # steps in a period: the period is then 3 % too long
-COARSE = 0.01  # local error of a step, of the peak displacement
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
 
@@ -138,7 +137,7 @@ def step_error(ready: Prepared) -> StepError:
     return StepError(ready.model, local_error(scheme))
 
 
-def resolution_warnings(found: Resolution | None, error: float) -> list[str]:
+def resolution_warnings(found: Resolution | None) -> list[str]:
     """What a user should know about the step and the drive's speed."""
     out = []
     if found is not None and found.steps_per_period < FEWEST:
@@ -146,11 +145,6 @@ def resolution_warnings(found: Resolution | None, error: float) -> list[str]:
             f"the step resolves the first frequency of the linkage, {found.first.max():.3g} Hz, by "
             f"{found.steps_per_period:.2g} steps in a period: vibration is not followed; take {FEWEST} or more, a step "
             f"of {1 / (FEWEST * found.first.max()):.2g} s"
-        )
-    elif error > COARSE:
-        out.append(
-            f"a step makes an error of up to {100 * error:.2g} % of the largest displacement: the step is too long for "
-            "what moves, or the start or a load too sudden"
         )
     if found is not None and found.meetings:
         numbers, speeds, angles = (

@@ -1,12 +1,17 @@
-"""What a run will cost, estimated from the sizes alone: right within a factor of two or three."""
+"""What a run will cost: from a few real steps of its own solver; of large models from the sizes alone."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
 from kedfem.dynamics.dense import SMALL
+from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
@@ -20,16 +25,20 @@ SWEEPS = 4.0  # times the work of a step with nominal frames, where frames follo
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
+TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
+FIRST, MOST = 4, 400  # steps that are tried: first a few, then as many as take about ENOUGH, at most these
+ENOUGH = 0.3  # seconds
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Estimated seconds to factor and to step, bytes of memory, bytes of one animation frame."""
+    """Estimated seconds to factor and to step, bytes of memory and of one animation frame; how many steps were tried."""
 
     factor: float
     steps: float
     memory: float
     frame_bytes: float
+    tried: int = 0
 
 
 def estimated_cost(scene: Scene, model: Model) -> Cost:
@@ -49,6 +58,50 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
         memory=float((FACTOR_BYTES * fill + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
         frame_bytes=120.0 * sum((link.full or link).n for link in model.links),
     )
+
+
+def tried_cost(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, look: Callable[[Block], object]
+) -> Cost:
+    """Cost from some real steps of the solver that the run will have; of large models from their sizes.
+
+    Parameters
+    ----------
+    look : what a run does with the steps beside solving them, recording their channels
+
+    Raises
+    ------
+    SolveError
+        If the first steps cannot be taken.
+    """
+    cost = estimated_cost(scene, model)
+    N = np.array([float(link.unknowns) for link in model.links])
+    weight = float((N * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]).sum())
+    if weight > TRIED:
+        return cost
+    start = perf_counter()
+    solver = steps_of(scene, model)
+    factor, total = perf_counter() - start, time_grid(scene).steps
+
+    def seconds(steps: int) -> float:
+        first = perf_counter()
+        for block in transient(_begun(scene, steps), linkage, along, model, solver):
+            look(block)
+        return perf_counter() - first
+
+    few = min(FIRST, total)
+    seconds(few)  # compiled code is loaded
+    once = seconds(few)
+    more = int(min(max(ENOUGH / max(once, 1e-6), 1.0) * few, MOST, total))
+    step = once / few if more <= few else max(seconds(more) - once, 0.0) / (more - few)
+    return replace(cost, factor=factor, steps=once + step * (total - few), tried=max(more, few))
+
+
+def _begun(scene: Scene, steps: int) -> Scene:
+    """The first steps of a scene's analysis."""
+    h = time_grid(scene).step
+    changed = {"end_time": steps * h, "turns": None, "step": h, "steps_per_turn": None}
+    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=changed)})
 
 
 def _machine() -> tuple[float, float]:

@@ -135,6 +135,33 @@ def write_mesh(mesh: HexMesh, path: Path) -> None:
         vtu.write(str(part), content, binary=True, compression="zlib")
 
 
+def write_cells(
+    path: Path, parts: Sequence[tuple[np.ndarray, np.ndarray, str]], name: str, values: Sequence[np.ndarray]
+) -> None:
+    """Elements as drawn with one value each.
+
+    Parameters
+    ----------
+    parts : points (n, 3), elements (e, m) and their type
+    name : of the values
+    values : (e,) of each part
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import meshio
+    from meshio import vtu
+
+    first = np.cumsum([0, *(len(points) for points, _, _ in parts)])
+    cells = [(kind, (of + n).astype(np.int32)) for (_, of, kind), n in zip(parts, first, strict=False)]
+    points = np.concatenate([points for points, _, _ in parts])
+    content = meshio.Mesh(points, cells, cell_data={name: list(values)})
+    with replacing(path) as part:
+        vtu.write(str(part), content, binary=True, compression="zlib")
+
+
 def remove_animation(folder: Path, stem: str) -> None:
     """Delete the animation of an earlier run: ``STEM.pvd`` and its frames, and nothing else.
 

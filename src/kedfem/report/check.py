@@ -9,7 +9,8 @@ from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.analysis import frame_steps
 from kedfem.dynamics.actions import actions
-from kedfem.dynamics.cost import Cost, estimated_cost
+from kedfem.dynamics.cost import Cost, estimated_cost, tried_cost
+from kedfem.errors import KedfemError
 from kedfem.motion.freedom import of_joints
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.messages import place
@@ -19,6 +20,7 @@ from kedfem.output.words import NOTHING, with_prefix
 from kedfem.report.links import link_table, way_tables
 from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
+from kedfem.results.recording import recording, rows
 from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
 
@@ -27,7 +29,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
     """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
     first = [] if plan is None else plan_tables(plan)
     second = [] if reduction is None else [reduction_table(reduction)]
-    cost = _cost(ready, estimated_cost(ready.scene, ready.model))
+    cost = _cost(ready, forecast(ready))
     found = resolution(ready)
     third = [] if found is None else [resolution_table(found, ready.scene)]
     return [
@@ -41,6 +43,17 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
         *third,
         cost,
     ]
+
+
+def forecast(ready: Prepared) -> Cost:
+    """Cost of a run: a few steps are taken and recorded as a run does; from sizes alone where they cannot be taken."""
+    recorded = recording(ready.scene, ready.model, None, ready.path)
+    try:
+        return tried_cost(
+            ready.scene, ready.linkage, ready.path, ready.model, lambda block: rows(recorded, block)
+        )
+    except KedfemError:  # the run will say why
+        return estimated_cost(ready.scene, ready.model)
 
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
@@ -135,7 +148,8 @@ def _cost(ready: Prepared, cost: Cost) -> Table:
     table = Table(title="Cost (estimated)", show_header=False)
     table.add_row("steps", f"{grid.steps} of {grid.step:.4g} s")
     table.add_row("solver", ready.scene.analysis.solver)
-    table.add_row("time (condensed)", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s")
+    how = f"{cost.tried} steps tried" if cost.tried else "from the sizes alone"
+    table.add_row("time", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s; {how}")
     table.add_row("memory", with_prefix(cost.memory, "B"))
     table.add_row(
         "animation frames",

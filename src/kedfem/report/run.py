@@ -4,8 +4,9 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from kedfem.accuracy.budget import Budget, percent
 from kedfem.analysis import Run
-from kedfem.output.words import NOTHING, clock, moment, percent, with_prefix
+from kedfem.output.words import NOTHING, clock, moment, with_prefix
 from kedfem.report.plan import plan_tables
 from kedfem.results.audit import Balance
 from kedfem.scene import Scene
@@ -35,30 +36,44 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         at = moment(scene, p.time, p.angle)
         table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), at)
         table.caption = "links: the highest stress of all animation frames"
-    balance = [] if done.balance is None else [balance_table(done.balance, done.geometric)]
+    balance = [] if done.balance is None else [balance_table(done.balance)]
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    return [*before, table, *balance, spent]
+    errors = [] if done.budget is None else [budget_table(done.budget)]
+    return [*before, table, *errors, *balance, spent]
 
 
-def balance_table(found: Balance, geometric: float | None) -> Table:
-    """What the steps leave over of energy and momentum, and how far the linear equation is off because links bend.
+def budget_table(found: Budget) -> Table:
+    """Estimated errors: a line for each source, a column for each kind of channel."""
+    table = Table(title="Estimated error, of each channel's largest value")
+    table.add_column("from")
+    for kind in found.kinds:
+        table.add_column(kind, justify="right")
+    for share in found.shares:
+        table.add_row(share.source, *(_cell(share.errors.get(kind)) for kind in found.kinds))
+    table.add_row("together", *(_cell(found.together[kind]) for kind in found.kinds), style="bold")
+    said = [f"mesh of {name}: {percent(eta)} in the energy norm" for name, eta in found.links.items()]
+    said += [f"no estimate of {text}" for text in found.limits]
+    table.caption = Text("\n".join(said))
+    return table
 
-    Parameters
-    ----------
-    geometric : estimated error of the peak stress; None where frames follow, which do not err so
-    """
-    table = Table(title="Balance" if geometric is None else "Balance and geometric error", show_header=False)
+
+def _cell(error: float | None) -> str:
+    return "-" if error is None else percent(error)
+
+
+def balance_table(found: Balance) -> Table:
+    """What the steps leave over of energy and momentum, and what energy nominal frames make."""
+    table = Table(title="Balance", show_header=False)
     for what, share in (
         ("energy, left over by the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
         table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
-    if geometric is not None:
+    if found.neglected:
         table.add_row(
             "energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
         )
-        table.add_row("geometric error, estimated", f"{percent(geometric)} of the peak stress")
     return table

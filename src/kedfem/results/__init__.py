@@ -15,12 +15,13 @@ from kedfem.results.files import claimed, ready_folder, replacing
 from kedfem.results.reader import read_results
 from kedfem.results.records import Channel, Results
 from kedfem.results.table import write_csv
-from kedfem.results.writer import ResultsWriter
+from kedfem.results.writer import ResultsWriter, add_notes
 
 __all__ = [
     "Channel",
     "Results",
     "ResultsWriter",
+    "add_notes",
     "claimed",
     "read_results",
     "ready_folder",

@@ -62,6 +62,9 @@ NO_PORTS = Attachment(
 class Balance:
     """What is left over at worst, of the largest energy or momentum that is exchanged.
 
+    Momentum is judged by that of all links or by what forces pass on in time, whichever is more: a lift that hardly moves
+    passes on its weight. Angular momentum is judged by the linear at the linkage's size at least, for it may vanish.
+
     energy : of the integration [-]
     neglected : energy that the neglected turning of K exchanges [-]
     linear, angular : of the integration's momentum, about the world's origin [-]
@@ -106,6 +109,9 @@ class Account:
         self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
         self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
         self._carried_groups = [group for k in (2, 3) for group in _grouped(self.carried, k)]
+        every = [*model.links, *(x.link for x in model.carried)]
+        nodes = np.concatenate([(link.full or link).nodes for link in every])
+        self._extent = float(np.ptp(nodes, axis=0).max())  # of the linkage as drawn [m]
         self._block: Block | None = None
         self._forces = RowForces(model)
         self._begin()
@@ -116,7 +122,8 @@ class Account:
         self._start: Float[np.ndarray, " 7"] = np.zeros(7)
         self._last: list[Last | None] = [None] * len(self._groups)
         self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._largest = np.zeros(8)
+        self._largest = np.zeros(9)
+        self._impulse = 0.0
 
     def rows(self, block: Block) -> dict[str, Rows]:
         """The channels over a block; the same block again is not counted twice."""
@@ -130,7 +137,9 @@ class Account:
     @property
     def balance(self) -> Balance:
         """Up to now."""
-        exchanged, momentum, angular, *left = (float(x) for x in self._largest)
+        exchanged, momentum, angular, impulse, *left = (float(x) for x in self._largest)
+        momentum = max(momentum, impulse)
+        angular = max(angular, momentum * self._extent)
         return Balance(*(_share(x, of) for x, of in zip(
             left, (exchanged, exchanged, momentum, angular, angular), strict=True
         )))  # fmt: skip
@@ -155,6 +164,7 @@ class Account:
         if self._sums is None:
             self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(9))
             self._start = state[0]
+        before = self._sums.t
         work, total = self._sums.add(block.motion.t, rates, taken)
         work = work - total[:, 8:] * (np.arange(12) == 1)
         change = state - self._start
@@ -162,8 +172,14 @@ class Account:
         left += np.column_stack(
             [total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]]
         )
+        h = np.diff(block.motion.t, prepend=before)
+        passed = self._impulse + np.cumsum(h * flow.sizes[2])
+        self._impulse = float(passed[-1])
         self._watch(
-            flow.sizes, np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]), left, work
+            np.vstack([flow.sizes[:2], passed]),
+            np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]),
+            left,
+            work,
         )
         return {
             "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
@@ -206,12 +222,12 @@ class Account:
 
     def _watch(
         self,
-        sizes: Float[np.ndarray, "2 T"],
+        sizes: Float[np.ndarray, "3 T"],
         exchanged: Float[np.ndarray, "T 5"],
         left: Float[np.ndarray, "T 7"],
         work: Float[np.ndarray, "T 12"],
     ) -> None:
-        """Largest values so far: exchanged energy, momenta of all links, and what does not balance."""
+        """Largest values so far: exchanged energy, momenta of all links, what forces passed on, what does not balance."""
         planar = any(of.link.planar for of in self.of)
         linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
         found = (

@@ -22,7 +22,8 @@ class Flow:
     """Of one or several links at T time points; world components, moments about the world's origin.
 
     kinetic : (T,) energy of the absolute motion [J]
-    momentum, angular : (3, T) [N s, N m s]; sizes: (2, T) their lengths, added up over links
+    momentum, angular : (3, T) [N s, N m s]; sizes: (3, T) their lengths, added up over links, and that of the larger of P
+        and the port forces
     loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum, but
         for what directions that vary in time do on the elastic motion
     force, moment : (3, T) of P and the port forces together [N, N m]
@@ -33,7 +34,7 @@ class Flow:
     kinetic: Scalars
     momentum: Vectors
     angular: Vectors
-    sizes: Float[np.ndarray, "2 T"]
+    sizes: Float[np.ndarray, "3 T"]
     loads: Scalars
     supports: Scalars
     force: Vectors
@@ -118,6 +119,7 @@ def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
     loads = _work(y[1], at.rates[0]) + couple[1] * turns[0] + found.powers[1]
     loads += _work(Mv, at.rates[1]) + couples[0] * turns[1]
     supports = _work(ports, at.rates[0]) + couples[2] * turns[0] + found.powers[2]
+    pushed = np.maximum(_lengths(y[1, 0]), _lengths(ports[0]))
     y[1] += ports
     # Σ x ⊗ y with x = p + R X + δ
     N = np.einsum("iast,zajst->zijst", at.place, y)
@@ -126,11 +128,15 @@ def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
     about = turned(N)
     about[0, -1] += couple[0]
     about[1, -1] += couple[1] + couples[2]
-    sizes = np.sqrt(np.stack([np.einsum("ist,ist->st", x, x) for x in (y[0, 0], about[0])])).sum(axis=1)
+    sizes = np.stack([_lengths(y[0, 0]), _lengths(about[0]), pushed]).sum(axis=1)
     return Flow(
         kinetic.sum(axis=0), in_world(y[0, 0]), in_world(about[0]), sizes, loads.sum(axis=0), supports.sum(axis=0),
         in_world(y[1, 0]), in_world(about[1]), *_neglected(found, at),
     )  # fmt: skip
+
+
+def _lengths(x: Float[np.ndarray, "k S T"]) -> Float[np.ndarray, "S T"]:
+    return np.asarray(np.sqrt(np.einsum("ist,ist->st", x, x)))
 
 
 def _neglected(found: Fields, at: Nominal) -> tuple[Vectors, Scalars]:

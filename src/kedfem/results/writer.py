@@ -238,3 +238,20 @@ class ResultsWriter:
         if isinstance(error, BlockingIOError):
             return OutputError(f"{self.path}: must not be in use, got another run that is writing it")
         return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")
+
+
+def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
+    """Store more facts about a run whose file is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r+", locking="best-effort") as file:
+            file["notes"].attrs.update(notes)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error

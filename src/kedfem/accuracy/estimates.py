@@ -1,0 +1,302 @@
+"""What a run's error is, found beside it: the same linkage run again with other steps, other meshes.
+
+Small models are run again as they are; of large links a companion on a few functions is run instead, on which a step
+takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
+
+* **Step**: the run's step against twice and four times that one; the ratio of the differences shows the order.
+* **Mesh of beams**: twice the elements, in the same step.
+* **Meshes of solid and plane links**: their indicator η (`links.indicator`). Compliance errs by about 2 η², so the
+  companion is run with links that much softer; stress errs besides by a part of η itself.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from kedfem.accuracy.budget import Budget, Share, by_kind, joined
+from kedfem.accuracy.geometric import GeometricError, geometric_warning
+from kedfem.accuracy.histories import Histories, histories, relative_errors
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import Reduction, first_reduced
+from kedfem.accuracy.resolution import StepError, step_error
+from kedfem.accuracy.stability import fewest_steps
+from kedfem.accuracy.variants import refined, with_analysis, with_links, with_steps
+from kedfem.dynamics.dense import SMALL
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.errors import KedfemError
+from kedfem.links.indicator import Indicator, indicator
+from kedfem.links.record import Link
+from kedfem.results.recording import recording
+from kedfem.scene import ForceLoad, Scene, time_grid
+
+LARGE = 100_000  # unknowns of a model for which no companion is made: its functions cost as much as hundreds of steps
+FUNCTIONS = 1e-3  # tolerance of the companion's functions: differences of runs need no better ones
+SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
+SLOW = 1000  # the same where no compiled loop runs them
+ORDERS = 0.4, 2.0  # between which the observed order in the step is believed
+REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
+SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
+LOCAL = 0.1  # of η: stress at a point, of its peak, beside what the compliance does
+SLIGHT = 1e-12
+
+
+@dataclass
+class Strained:
+    """The state of each meshed link in which its strain energy was highest: there its mesh is judged."""
+
+    model: Model
+    energy: dict[int, float]
+    states: dict[int, np.ndarray]
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.energy, self.states = model, {}, {}
+
+    def add(self, block: Block) -> None:
+        """Look at the steps of a block."""
+        for k, (link, history) in enumerate(zip(self.model.links, block.links, strict=True)):
+            if link.meshed and not link.rigid:
+                worst = int(history.strain.argmax())
+                if history.strain[worst] > self.energy.get(k, 0.0):
+                    self.energy[k], self.states[k] = float(history.strain[worst]), history.g[worst].copy()
+
+    @cached_property
+    def indicators(self) -> dict[int, Indicator]:
+        """Of each meshed link, or segment of one, by its number; once all steps have been seen."""
+        return {k: indicator(self.model.links[k], g) for k, g in self.states.items()}
+
+
+@dataclass
+class Seen:
+    """What a run shows of its errors while it steps: meshes' worst states, how far links bend, local errors of steps."""
+
+    strained: Strained
+    geometric: GeometricError
+    running: StepError
+
+    def add(self, block: Block) -> None:
+        """Look at the steps of a block."""
+        self.strained.add(block)
+        self.geometric.add(block)
+        self.running.add(block)
+
+
+def watcher(ready: Prepared) -> Seen:
+    """A watcher of a prepared scene's steps."""
+    return Seen(
+        Strained(ready.model), GeometricError(ready.model, ready.scene.analysis.stiffening), step_error(ready)
+    )
+
+
+def companion(ready: Prepared) -> Prepared | None:
+    """A model whose runs are cheap beside those of a prepared scene; None of one too large to make it."""
+    if ready.model.unknowns > LARGE:
+        return None
+    return first_reduced(ready, FUNCTIONS)
+
+
+def budget(
+    ready: Prepared, seen: Seen, reduction: Reduction | None, ran: Histories | None = None,
+    step: Mapping[str, float] | None = None,
+) -> Budget:  # fmt: skip
+    """Estimated errors of a run.
+
+    Parameters
+    ----------
+    seen : what the run showed while it stepped
+    ran : the run's own channels, where they are at hand
+    step : channel → error of the step, where the run itself knows it
+    """
+    found = seen.strained.indicators
+    eta = link_errors(ready.model, found)
+    kinds = wanted(ready)
+    small = companion(ready)
+    limits = list(_limits(ready, found))
+    shares: list[Share | None] = [reduction_share(reduction)]
+    shares.append(frames_share(seen.geometric, kinds))
+    if small is None:
+        shares += [
+            _running_share(seen.running.relative, kinds) if step is None else _step_share(step),
+            _plain_mesh(eta, kinds),
+        ]
+        return Budget(joined(shares), tuple(limits), eta)
+    own = ran is not None and small.model is ready.model and len(ran.time) > 1
+    small = replace(small, scene=spanned(small.scene, small.model))
+    try:
+        base = histories(small) if ran is None or not own else ran
+        errors = step_errors(small, base) if step is None else step
+        shares.append(_step_share(errors))
+        shares.append(_mesh_share(small, base, eta))
+    except KedfemError as fault:
+        limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
+    return Budget(joined(shares), tuple(limits), eta)
+
+
+def wanted(ready: Prepared) -> tuple[str, ...]:
+    """Kinds of channels that a scene has."""
+    return tuple(by_kind({each.channel.name: 0.0 for each in recording(ready.scene, ready.model)}))
+
+
+def spanned(scene: Scene, model: Model) -> Scene:
+    """The beginning of an analysis that is too long to be run beside itself."""
+    grid = time_grid(scene)
+    compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not scene.springs
+    most = SPAN if compiled else SLOW
+    if grid.steps <= most:
+        return scene
+    return with_analysis(scene, end_time=most * grid.step, turns=None, step=grid.step, steps_per_turn=None)
+
+
+def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
+    """What nominal frames cost; None where all frames follow."""
+    if all(link.fit is not None for link in geometric.model.links):
+        return None
+    warned = geometric_warning(geometric)
+    remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
+    how = f"links turn by up to {np.degrees(geometric.turn):.2g} deg against their rigid motion"
+    return Share(
+        "frames", dict.fromkeys(kinds, geometric.estimate), how, f"{how}; {remedy}" if remedy else ""
+    )
+
+
+def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
+    """Channel → error of the step of a run in memory, by runs with steps twice and four times as long.
+
+    Where those would grow without bound: by one with half the step.
+    """
+    steps, least = time_grid(ready.scene).steps, fewest_steps(ready.scene)
+    if steps // 4 >= max(least, 8):
+        twice, four = (histories(replace(ready, scene=with_steps(ready.scene, steps // k))) for k in (2, 4))
+        near, far = relative_errors(twice, base), relative_errors(four, twice)
+        return {name: near[name] / (2 ** order(far.get(name, 0.0), near[name]) - 1) for name in near}
+    half = histories(replace(ready, scene=with_steps(ready.scene, 2 * steps)))
+    return {name: error / (1 - 2 ** -ORDERS[1]) for name, error in relative_errors(base, half).items()}
+
+
+def order(far: float, near: float) -> float:
+    """Observed order in the step from the differences of three steps, each half of the last."""
+    low, high = ORDERS
+    if near <= SLIGHT or far <= near:
+        return high if near <= SLIGHT else low
+    return min(max(math.log2(far / near), low), high)
+
+
+def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
+    """The scene with twice the elements in all elastic beams; None without any."""
+    beams = {
+        name: link for name, link in scene.links.items() if link.family == "beam" and link.fidelity != "rigid"
+    }
+    beams = {name: link for name, link in beams.items() if link.shape is not None}
+    return with_links(scene, {name: refined(link, factor) for name, link in beams.items()}) if beams else None
+
+
+def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> dict[str, float]:
+    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η²."""
+    scene = finer_beams(small.scene)
+    model = small.model
+    if scene is not None:
+        links = {link.name: link.full or link for link in model.links}
+        if any(link.meshed for link in links.values()):
+            return _separate(small, base, scene, eta)
+        model = elastic_model(scene, small.linkage, along=small.path)
+        other = histories(replace(small, scene=scene, model=model))
+        return {name: REST * error for name, error in relative_errors(base, other).items()}
+    other = histories(replace(small, model=softened(model, eta)))
+    return relative_errors(base, other)
+
+
+def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
+    """Of a scene with both beams and meshed links: each by itself, added up."""
+    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta))))
+    kept = {link.name: link for link in small.model.links if link.meshed and link.fit is None}
+    if any(link.meshed and link.fit is not None for link in small.model.links):
+        return soft
+    from kedfem.links.build import bare_link
+
+    bare = {name: bare_link(finer, name) for name, link in finer.links.items() if link.shape is not None}
+    whole = first_reduced(
+        replace(small, scene=finer, model=elastic_model(finer, small.linkage, bare, small.path)), FUNCTIONS
+    ) if kept else small  # fmt: skip
+    other = relative_errors(base, histories(whole))
+    return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
+
+
+def softened(model: Model, eta: Mapping[str, float]) -> Model:
+    """A model whose meshed links give by what their meshes are too stiff: K0 (1 − 2 η²)."""
+    return replace(
+        model,
+        links=tuple(_softer(link, max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2)) for link in model.links),
+    )
+
+
+def _softer(link: Link, factor: float) -> Link:
+    if factor == 1.0 or link.rigid:
+        return link
+    return replace(link, K0=link.K0 * factor, frames=tuple(replace(x, K0=x.K0 * factor) for x in link.frames))
+
+
+def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float]:
+    """Link → η, all its segments together."""
+    sums: dict[str, np.ndarray] = {}
+    for k, each in found.items():
+        name = model.links[k].name
+        sums[name] = sums.get(name, np.zeros(2)) + np.array([each.error, each.error + each.energy])
+    return {name: float(np.sqrt(error / whole)) if whole else 0.0 for name, (error, whole) in sums.items()}
+
+
+def _step_share(errors: Mapping[str, float]) -> Share:
+    return Share("step", by_kind(errors), "longer steps, or levels in time")
+
+
+def _running_share(running: float, kinds: tuple[str, ...]) -> Share:
+    return Share("step", dict.fromkeys(kinds, running), "local error of a step: no run beside one so large")
+
+
+def _plain_mesh(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:
+    """Of a model without a companion: η² of what moves, η of stress."""
+    if not eta:
+        return None
+    worst = max(eta.values())
+    errors = {kind: SOFT * worst**2 + (LOCAL * worst if kind == "stress" else 0.0) for kind in kinds}
+    return Share("mesh", errors, "recovered stress against that of elements")
+
+
+def _mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
+    errors = by_kind(mesh_errors(small, base, eta))
+    if eta and "stress" in errors:
+        errors["stress"] += LOCAL * max(eta.values())
+    return Share("mesh", errors, "recovered stress against that of elements; beams of twice the elements")
+
+
+def reduction_share(reduction: Reduction | None) -> Share | None:
+    """What reduced links cost."""
+    if reduction is None or not reduction.estimate:
+        return None
+    return Share("reduction", by_kind(reduction.estimate), "richer functions")
+
+
+def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
+    """Places where stress depends on the mesh, however fine it is."""
+    scene, out = ready.scene, []
+    at_edges = dict.fromkeys(ready.model.links[k].name for k, each in found.items() if each.singular)
+    if at_edges:
+        out.append(
+            f"stress of {', '.join(at_edges)} at an edge that points inwards without a fillet: "
+            "it grows as elements shrink"
+        )
+    meshed = {link.name for link in ready.model.links if link.meshed}
+    loads = scene.loads.items()
+    points = [name for name, x in loads if isinstance(x, ForceLoad) and x.link in meshed and x.at is not None]
+    if points:
+        out.append(f"stress where {', '.join(points)} acts on a point: it grows as elements shrink")
+    stiff = [name for name, joint in scene.joints.items() if _stiff(joint.port) and set(joint.links) & meshed]
+    if stiff:
+        out.append(f"stress around joints {', '.join(stiff)} with stiff ports: it grows as elements shrink")
+    return out
+
+
+def _stiff(port: object) -> bool:
+    return port == "stiff" or (isinstance(port, Mapping) and "stiff" in port.values())
