@@ -6,6 +6,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
+import pytest
 from beartype import beartype
 from hypothesis import settings
 from jaxtyping import AbstractArray, install_import_hook
@@ -23,6 +24,7 @@ ALL = [
     if file.stem != "__init__" and not file.stem.endswith("kernel")  # numba compiles the kernels itself
 ]
 HERE = tuple(f"kedfem.{room}" for room in ("mesh", "links", "output", "scene.laws"))
+NUMERICAL = {"laws", "verification", "hard_cases"}  # folders
 CHECKED = ALL if IN_CI else [module for module in ALL if module.startswith(HERE)]
 
 
@@ -45,3 +47,11 @@ def of_arrays(hint: object) -> bool:
 
 # before the first import of kedfem; what runs in every step twice as long, so only in CI
 install_import_hook(CHECKED, "tests.conftest.shapes_checked")
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the default tests of laws and numbers, which .ci/run repeats with other BLAS and numba kernels."""
+    for item in items:
+        if item.path.parent.name in NUMERICAL and not item.get_closest_marker("long"):
+            item.add_marker("kernels")
