@@ -16,6 +16,7 @@ from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
+from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model, segments, ways
@@ -60,6 +61,7 @@ class Run:
 
     balance : of energy and momentum, as far as it was kept account of
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
+    sizes : plain sizes of the scene, for a look at its units
     """
 
     folder: FilePath
@@ -71,6 +73,7 @@ class Run:
     plan: Plan | None = None
     balance: Balance | None = None
     budget: Budget | None = None
+    sizes: Sizes | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -109,7 +112,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)
+    plain = sizes(scene, ready.model)
     warnings = (
+        *size_warnings(scene, plain),
         *assembly_warning(assembly),
         *stability_warning(scene),
         *budget_warning(found, None if plan is None else plan.asked),
@@ -118,7 +123,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *balance_warning(account.balance, scene.analysis.stiffening),
         *warnings,
     )
-    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found)
+    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found, plain)
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:

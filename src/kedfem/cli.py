@@ -43,7 +43,7 @@ def _root(
 def run(scene: ScenePath) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
-    from kedfem.report import run_tables
+    from kedfem.report import run_tables, size_line
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene)
@@ -54,6 +54,8 @@ def run(scene: ScenePath) -> None:
             done = analyse(loaded, watch)
     except KeyboardInterrupt:
         _interrupted(file, _version(file) != before)
+    if done.sizes:
+        out.print(size_line(done.sizes), markup=False, soft_wrap=True)
     _show(run_tables(loaded, done), done.warnings)
     _say_where(done.folder)
 
@@ -63,8 +65,9 @@ def check(scene: ScenePath) -> None:
     """Show what would be modelled and its cost; solve nothing."""
     from kedfem.accuracy.plan import planned
     from kedfem.accuracy.reduction import prepared
+    from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
-    from kedfem.report import assembly_tables, check_tables
+    from kedfem.report import assembly_tables, check_tables, size_line
     from kedfem.scene import read_scene
 
     loaded, assembly = assembled(read_scene(scene))
@@ -75,7 +78,9 @@ def check(scene: ScenePath) -> None:
 
         plan = None if loaded.analysis.accuracy is None else planned(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
-    _show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)])
+    found = sizes(loaded, ready.model)
+    out.print(size_line(found), markup=False, soft_wrap=True)
+    _show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
 
 
 @app.command()
@@ -197,7 +202,9 @@ def new(
     from kedfem.errors import OutputError
 
     if kind not in KINDS:
-        raise SceneError(f"KIND: must be one of {', '.join(KINDS)}, got '{kind}'")
+        from kedfem.scene.faults import one_of
+
+        raise SceneError(f"KIND: {one_of(list(KINDS), kind)}")
     target = path or Path(f"{kind}.toml")
     text = (files("kedfem") / "templates" / f"{kind.replace('-', '_')}.toml").read_text(encoding="utf-8")
     try:

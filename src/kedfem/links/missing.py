@@ -16,6 +16,7 @@ ASKEW = 45.0  # [deg]: axes further off are others
 SCALES = (1000.0, 0.001)
 
 Vector = Float[np.ndarray, "3"]
+NEAR = 0.05  # of a link's size: a joint so near a beam's node was meant to be on it
 
 
 def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = None) -> str:
@@ -36,7 +37,15 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     )
     level = 1e-6 * link.size  # what is as near: the narrowest first
     offered = sorted(candidates(link), key=lambda each: (round(each.distance(point) / level), each.radius))
-    hints = [_units(link, point, axis, gap, offered), _beside(point, axis, offered), _listed(offered, point)]
+    apart = (
+        f"the parts do not meet: they are drawn {1e3 * gap:.3g} mm apart" if gap < NEAR * link.size else ""
+    )
+    hints = [
+        apart if not link.meshed else "",
+        _units(link, point, axis, gap, offered),
+        _beside(point, axis, offered),
+        _listed(offered, point),
+    ]
     return "; ".join([told, *(hint for hint in hints if hint)])
 
 

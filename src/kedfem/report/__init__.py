@@ -6,6 +6,7 @@ from kedfem.report.check import check_tables
 from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import face_kind, mesh_tables
 from kedfem.report.run import run_tables
+from kedfem.report.sizes import size_line
 from kedfem.report.study import study_tables
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "mesh_tables",
     "moment",
     "run_tables",
+    "size_line",
     "study_tables",
 ]

@@ -27,6 +27,7 @@ from kedfem.scene.checks import (
     reference_faults,
 )
 from kedfem.scene.damping import Damping
+from kedfem.scene.doubts import bare_numbers
 from kedfem.scene.drives import Drive, Gear, MotionLaw
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_factor_tables, with_motion_tables
@@ -95,6 +96,7 @@ class Scene(Record):
     _source: str | None = PrivateAttr(None)
     _folder: Path = PrivateAttr(Path())
     _stem: str = PrivateAttr("scene")
+    _doubts: tuple[str, ...] = PrivateAttr(())
 
     @property
     def source(self) -> str | None:
@@ -105,6 +107,11 @@ class Scene(Record):
     def folder(self) -> Path:
         """The folder that file names in the scene are relative to."""
         return self._folder
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Numbers without a unit that were probably meant in another one, in words."""
+        return self._doubts
 
     @property
     def motion(self) -> MotionLaw | None:
@@ -136,7 +143,7 @@ class Scene(Record):
         raw = plain(raw)
         if not isinstance(raw, Mapping):
             raise SceneError(f"must be a table of keys, got {raw!r}")
-        placement = Placement(raw.get("points"), raw.get("joints"))
+        given, placement = raw, Placement(raw.get("points"), raw.get("joints"))
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
         if isinstance(links := raw.get("links"), Mapping):
             raw = {**raw, "links": {name: spelt_out(link) for name, link in links.items()}}
@@ -155,6 +162,7 @@ class Scene(Record):
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
+        scene._doubts = tuple(bare_numbers(given, cls))
         if scene.analysis.frames is None:
             scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))
         return scene

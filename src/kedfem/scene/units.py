@@ -18,7 +18,15 @@ from kedfem.scene.wording import shown
 if TYPE_CHECKING:
     import pint
 
-NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s+-].*?|)\s*")
+NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^0-9\s+-].*?|)\s*", re.ASCII
+)
+LONGEST = 60  # letters of a unit
+NAMED = (
+    r"\(*(?!inf\b|nan\b)(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*) ?-?[1-9]|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?\)*"
+)
+UNIT = re.compile(rf"(?:{NAMED}|1(?= ?/))(?:(?: ?[*/·] ?| ){NAMED})*")
+"""Names with powers of one digit, multiplied and divided: nothing that could be reckoned with."""
 
 KINDS = {
     "1": "a number",
@@ -52,6 +60,12 @@ UNREADABLE = (
     ArithmeticError,
     TokenError,
 )  # pint's, for no unit
+USUAL = (
+    "mm", "cm", "dm", "m", "km", "in", "ft", "deg", "rad", "s", "ms", "min", "h", "Hz", "kHz", "rpm", "m/s", "mm/s",
+    "km/h", "m/s^2", "g", "kg", "t", "kg/m^3", "g/cm^3", "N", "kN", "Pa", "kPa", "MPa", "GPa", "bar", "N*m", "N/m",
+    "N/mm",
+)  # fmt: skip
+"""Units as they are usually written, for hints."""
 OVERFLOW = 10**308  # whole numbers in TOML have no end
 CYCLES = {"hertz"}
 TURNING = {
@@ -103,10 +117,12 @@ def si_number(text: str, unit: str) -> float:
     if match is None:
         raise ValueError("not a number with a unit")
     number, given = float(match[1]), match[2]
+    if given and (len(given) > LONGEST or not UNIT.fullmatch(given)):
+        raise ValueError(f"{shown(given)} is not a unit")
     try:
         wanted, got = unit_registry().parse_units(unit), unit_registry().parse_units(given)
     except pint.errors.UndefinedUnitError:
-        raise ValueError(f"unknown unit {given!r}") from None
+        raise ValueError(f"unknown unit {given!r}{meant(given, unit)}") from None
     except UNREADABLE:
         raise ValueError(f"{given!r} is not a unit") from None
     names = set(got._units)
@@ -116,8 +132,18 @@ def si_number(text: str, unit: str) -> float:
             f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
         )
     if got.dimensionality != wanted.dimensionality:
-        raise ValueError(f"the unit {given!r} is of another kind" if given else "no unit")
+        raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")
     return float(unit_registry().Quantity(number, got).m_as(wanted))
+
+
+def meant(given: str, unit: str) -> str:
+    """A hint at a unit of the kind that is wanted, if one is written like what was given but for upper and lower case."""
+    wanted = unit_registry().parse_units(unit).dimensionality
+    for name in USUAL:
+        same = name.casefold() == given.casefold() and name != given
+        if same and unit_registry().parse_units(name).dimensionality == wanted:
+            return f", did you mean {name!r}?"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,158 @@
+"""Plain sizes of a scene, for a look at what its units made of it, and doubts where they are no machine's."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kedfem.dynamics.model import Model
+from kedfem.scene import ConstantSpeed, Material, Ramp, Scene
+
+LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
+MASSES = 1e-9, 1e6  # kg, of a link
+MODULI = 1e6, 2e12  # Pa: soft rubber, diamond
+DENSITIES = 10.0, 3e4  # kg/m³: foam, osmium
+GRAVITY = 100.0  # m/s²
+TURNS = 1e6  # rpm: beyond dental drills and turbochargers
+WIDE = 3.0, 2.0  # lengths of a link, and m, that its section may be wide
+TIP = 2000.0  # m/s of a driven link's end: beyond what any material bears in a rotor
+APART = 1e4  # longest of shortest link
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """What a scene is like, in SI.
+
+    overall : largest extent of the linkage as drawn [m]
+    lengths, masses : of each link by name [m, kg]; sliders without a shape have no length
+    moduli : Young's modulus of each material in use [Pa]
+    turns, speeds : of drives at a constant (final) speed [rpm, m/s]
+    """
+
+    overall: float
+    lengths: Mapping[str, float]
+    masses: Mapping[str, float]
+    moduli: Mapping[str, float]
+    turns: Mapping[str, float]
+    speeds: Mapping[str, float]
+
+
+def sizes(scene: Scene, model: Model) -> Sizes:
+    """The sizes of a scene and its model."""
+    nodes: dict[str, list[np.ndarray]] = {}
+    masses = {slider.name: slider.mass for slider in model.sliders}
+    for link in [*model.links, *(carried.link for carried in model.carried)]:
+        nodes.setdefault(link.name, []).append((link.full or link).nodes)
+        masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])
+    every = {name: np.concatenate(parts) for name, parts in nodes.items()}
+    joints = np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
+    moduli = {
+        name: scene.materials[name].youngs_modulus
+        for name in dict.fromkeys(link.material for link in scene.links.values())
+        if name is not None
+    }
+    final = {
+        name: float(drive.motion.speed)
+        for name, drive in scene.driven_joints.items()
+        if isinstance(drive.motion, ConstantSpeed | Ramp)
+    }
+    slides = {name for name in final if scene.joints[name].kind == "prismatic"}
+    return Sizes(
+        float(np.ptp(np.concatenate([*every.values(), joints]), axis=0).max()),
+        {name: float(np.linalg.norm(np.ptp(X, axis=0))) for name, X in every.items()},
+        {name: masses[name] for name in scene.links if name in masses},
+        moduli,
+        {name: speed * 30 / np.pi for name, speed in final.items() if name not in slides},
+        {name: speed for name, speed in final.items() if name in slides},
+    )
+
+
+def size_warnings(scene: Scene, found: Sizes) -> tuple[str, ...]:
+    """Doubts about sizes that no machine has, each with the unit that was probably meant."""
+    return (
+        *scene.doubts,
+        *_length_doubts(scene, found),
+        *_material_doubts(scene),
+        *_other_doubts(scene, found),
+    )
+
+
+def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
+    low, high = LENGTHS
+    long = {name: x for name, x in found.lengths.items() if x > high}
+    short = {name: x for name, x in found.lengths.items() if x < low}
+    for names, what in ((long, "longer"), (short, "shorter")):
+        if names:
+            limit = high if names is long else low
+            unit = "are lengths in mm? write '25 mm', or 0.025" if names is long else "are they in m?"
+            sizes = " to ".join(f"{x:.4g}" for x in dict.fromkeys((min(names.values()), max(names.values()))))
+            yield f"links.{', '.join(names)}: {sizes} m long, {what} than any machine's ({limit:g} m): {unit}"
+    if found.lengths and not (long or short):
+        a, b = (
+            min(found.lengths, key=found.lengths.__getitem__),
+            max(found.lengths, key=found.lengths.__getitem__),
+        )
+        if found.lengths[b] > APART * found.lengths[a]:
+            sizes = f"{found.lengths[a]:.4g} m long beside links.{b} of {found.lengths[b]:.4g} m"
+            yield f"links.{a}: {sizes}: are all lengths in one unit?"
+    for name, link in scene.links.items():
+        points = getattr(link.shape, "between", None) or getattr(link.shape, "points", None)
+        span = 0.0 if points is None else float(np.ptp(np.array(points), axis=0).max())
+        for key in ("width", "thickness"):
+            value = getattr(link.shape, key, None) or 0.0
+            if span and name not in long and value > min(WIDE[0] * span, WIDE[1]):
+                yield (
+                    f"links.{name}.shape.{key}: {value:.4g} m for a link of {span:.4g} m: is it in mm? "
+                    f"write '{value:.4g} mm'"
+                )
+
+
+def _material_doubts(scene: Scene) -> Iterator[str]:
+    used = {link.material for link in scene.links.values()}
+    for name, material in scene.materials.items():
+        if name in used:
+            yield from _moduli(f"materials.{name}", material)
+            rho, (low, high) = material.density, DENSITIES
+            if rho < low:
+                unit = "g/cm^3" if rho > 0.01 else "kg/mm^3" if rho > 1e-7 else "t/mm^3"
+                yield (
+                    f"materials.{name}.density: {rho:.4g} kg/m^3 is lighter than any foam: "
+                    f"is it in {unit}? write '{rho:.4g} {unit}'"
+                )
+            elif rho > high:
+                yield f"materials.{name}.density: {rho:.4g} kg/m^3 is heavier than any metal: which unit is it in?"
+
+
+def _moduli(where: str, material: Material) -> Iterator[str]:
+    low, high = MODULI
+    value = material.youngs_modulus
+    if value < low:
+        unit = "GPa" if value < 1000 else "MPa"
+        yield (
+            f"{where}.youngs_modulus: {value:.4g} Pa is softer than rubber (1e6): is it in {unit}? "
+            f"write '{value:.4g} {unit}'"
+        )
+    elif value > high:
+        yield f"{where}.youngs_modulus: {value:.4g} Pa is stiffer than diamond (1.2e12): which unit is it in?"
+
+
+def _other_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
+    low, high = MASSES
+    doubted = {name for name, x in found.lengths.items() if not LENGTHS[0] <= x <= LENGTHS[1]}
+    for name, mass in found.masses.items():
+        if name not in doubted and mass and not low <= mass <= high:
+            which = "lighter" if mass < low else "heavier"
+            yield f"links.{name}: its mass is {mass:.4g} kg, {which} than any machine's: are its units right?"
+    size = float(np.linalg.norm(scene.gravity))
+    if size > GRAVITY:
+        yield f"gravity: {size:.4g} m/s^2 is more than 10 g: is it in mm/s^2? write '{size:.4g} mm/s^2'"
+    for name, turns in found.turns.items():
+        if abs(turns) > TURNS:
+            yield f"drive of joint {name}: {turns:.4g} rpm is faster than any machine's: which unit is it in?"
+        links = [link for link in scene.joints[name].links if link in found.lengths and link not in doubted]
+        tip = max((found.lengths[link] for link in links), default=0.0) * abs(turns) * np.pi / 30
+        if tip > TIP:
+            yield (
+                f"drive of joint {name}: at {turns:.4g} rpm the end of links.{links[0]} moves at {tip:.4g} m/s, "
+                "faster than any rotor's: are lengths and speed in their units?"
+            )
