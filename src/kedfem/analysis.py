@@ -32,8 +32,10 @@ from kedfem.output.words import clock, moment
 from kedfem.results import Channel, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
 from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
+from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
+from kedfem.results.undetermined import undetermined, undetermined_warning
 from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
@@ -105,7 +107,11 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
-    peak, seen = clock.timed("steps", lambda: _stepped(ready, solver, recorded, recoveries, folder, watch))
+    channels = [each.channel for each in recorded]
+    untold = undetermined(scene, ready.model, [each.name for each in channels])
+    efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
+    watched = _Watched(recorded, untold, efforts, recoveries)
+    peak, seen = clock.timed("steps", lambda: _stepped(ready, solver, watched, folder, watch))
     results = read_results(folder / "results.h5")
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results)))
     add_notes(folder / "results.h5", attributes(found))
@@ -121,6 +127,8 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *plan_warning(plan),
         *resolution_warnings(frequencies),
         *balance_warning(account.balance, scene.analysis.stiffening),
+        *efforts.warnings(),
+        *undetermined_warning(untold),
         *warnings,
     )
     return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found, plain)
@@ -191,7 +199,17 @@ def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
     return [stress_recovery(link) for link in links] if scene.output.animation else []
 
 
-def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoveries: list[StressRecovery],
+@dataclass(frozen=True, slots=True)
+class _Watched:
+    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
+
+    recorded: list[Recorded]
+    untold: dict[str, str]
+    efforts: CrossChecks
+    recoveries: list[StressRecovery]
+
+
+def _stepped(ready: Prepared, solver: Steps, watched: _Watched,
              folder: FilePath, watch: Watch) -> tuple[Peak | None, Seen]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
@@ -199,11 +217,12 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
     seen = watcher(ready)
-    channels = [each.channel for each in recorded]
+    channels = [each.channel for each in watched.recorded]
     notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
     notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
     notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
+    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
     ) as writer:
@@ -212,11 +231,13 @@ def _stepped(ready: Prepared, solver: Steps, recorded: list[Recorded], recoverie
             remove_animation(folder, STEM)
         try:
             for block in transient(scene, ready.linkage, ready.path, model, solver):
-                table.add(block, rows(recorded, block))
+                values = rows(watched.recorded, block)
+                table.add(block, values)
+                watched.efforts.add(block.motion, values)
                 seen.add(block)
                 for k in range(len(block)):
                     if block.step + k in wanted:
-                        peak = _framed(ready, recoveries, frames, block.at(k), peak)
+                        peak = _framed(ready, watched.recoveries, frames, block.at(k), peak)
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()

@@ -36,9 +36,9 @@ class Forces:
 
 def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
     """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
-    if any(row.name == name for row in model.rows):
-        return _row_joint(scene, model, name, forces)
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
+    if any(row.name == name for row in model.rows) and slider is None:
+        return _row_joint(scene, model, name, forces)
     if slider is not None:
         return _slider_force(scene, model, slider, name, forces)
     hub = next((x for x in model.carried if x.hub == name), None)
@@ -157,7 +157,7 @@ def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
 def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: Forces) -> Wrench:
     """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
     attachment, link = model.joints[k], model.links[k]
-    rows = _rows_of(attachment, joint)
+    rows = rows_of_joint(attachment, joint)
     arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
     shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
     from_rows = attachment.from_rows[rows]
@@ -219,7 +219,7 @@ def _loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tupl
     """Forces and moments of a joint that statics leave open, as drawn."""
     attachment = model.joints[k]
     arms, link = _arms(attachment, joint, at), model.links[k]
-    loose = attachment.loose[_rows_of(attachment, joint)].T
+    loose = attachment.loose[rows_of_joint(attachment, joint)].T
     return _resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
 
 
@@ -227,7 +227,7 @@ def _small(loose: Float[np.ndarray, "..."]) -> bool:
     return bool(np.abs(loose).max(initial=0.0) < INDETERMINATE)
 
 
-def _rows_of(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
+def rows_of_joint(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
     """All components of all ports of a joint."""
     here = np.flatnonzero([name == joint for name in attachment.joints])
     return (attachment.components * here[:, None] + np.arange(attachment.components)).ravel()

@@ -65,20 +65,39 @@ def known(model: Model, name: str) -> tuple[bool, bool]:
 
     What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
     """
-    bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
-    rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
-    if rows is None:
+    found = _null_space(model)
+    if found is None:
         return True, True
-    U, s, _ = np.linalg.svd(_scaled(rows.C)[0][0])
-    null = U[:, int((s > DEPENDENT).sum()) :]
+    C, null = found
     joint, here = of_joint(model.rows, name)
     loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
     if any(
         link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)
     ):
-        loose &= rows.C[0, here].any(axis=1) | in_plane(joint.gap, joint.turn)
+        loose &= C[here].any(axis=1) | in_plane(joint.gap, joint.turn)
     force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
     return not bool((loose & force).any()), not bool((loose & moment).any())
+
+
+def shared_rows(model: Model, name: str) -> list[str]:
+    """Joints whose constraints repeat those of a joint, as drawn."""
+    found = _null_space(model)
+    if found is None or not any(joint.name == name for joint in model.rows):
+        return []
+    null = found[1]
+    columns = np.abs(null[of_joint(model.rows, name)[1]]).max(axis=0, initial=0.0) > 1e3 * DEPENDENT
+    each = ((joint.name, of_joint(model.rows, joint.name)[1]) for joint in model.rows)
+    return [other for other, here in each if (np.abs(null[here][:, columns]) > 1e3 * DEPENDENT).any()]
+
+
+def _null_space(model: Model) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]] | None:
+    """Rows of all joints as drawn, and the combinations of them that say nothing; None without rows."""
+    bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
+    rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
+    if rows is None:
+        return None
+    U, s, _ = np.linalg.svd(_scaled(rows.C)[0][0])
+    return rows.C[0], U[:, int((s > DEPENDENT).sum()) :]
 
 
 def _multipliers(model: Model, block: Block) -> Float[np.ndarray, "T r"]:

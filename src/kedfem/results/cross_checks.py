@@ -1,0 +1,180 @@
+"""Two independent accounts of one effort, compared over a run: elastic against rigid links, drives against energy.
+
+They cost a few sums a step. Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over
+a run has no mean and nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r tell of an
+effort that is missing, or counted twice, not of one that swings.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.row_joints import RowJoint
+from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rows import cross
+from kedfem.results.records import Channel
+from kedfem.scene import GROUND, Scene
+
+Rows = Float[np.ndarray, "T c"]
+
+# c and the mean of e − r may be off by this part; runs of examples/ and tests stay below 0.2, a missing effort gives 1
+CONTRADICTION = 0.5
+SWING = 1.0  # and by this part of what swings beside it, whose share in c and mean falls with the length of the run
+AMPLIFIED = 3.0  # times as much as rigid links: near a resonance elastic links bear more, in phase
+SMALL = 0.01  # of the largest effort of its unit: what is smaller is not compared
+UNWORKED = 1e-3  # of the energy exchanged: trapezoidal sums of one and the same step agree to rounding
+
+
+@dataclass
+class _Pair:
+    """Sums over the time points so far of an elastic effort and that of rigid links."""
+
+    elastic: str
+    rigid: str
+    columns: list[int]
+    unit: str
+    count: int = 0
+    products: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
+    means: Float[np.ndarray, "2 c"] = field(default_factory=lambda: np.zeros((2, 1)))
+
+    def add(self, e: Rows, r: Rows) -> None:
+        """More time points."""
+        self.count += len(e)
+        self.products += [np.vdot(e, e), np.vdot(e, r), np.vdot(r, r)]
+        sums = np.stack([e.sum(axis=0), r.sum(axis=0)])
+        self.means = self.means + sums
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the rigid effort."""
+        return float(np.sqrt(self.products[2] / max(self.count, 1)))
+
+    def share(self) -> float | None:
+        """How much of the rigid effort the elastic one is, where the two contradict each other; None where they agree."""
+        ee, er, rr = self.products / self.count
+        c = float(er / rr)
+        swing = float(np.sqrt(max(ee - c * er, 0.0) / rr))
+        e, r = self.means / self.count
+        offset = float(np.linalg.norm(e - r) / np.sqrt(rr))
+        spread = float(np.sqrt(max((ee - 2 * er + rr) / rr - offset**2, 0.0)))
+        less = 1.0 - c > CONTRADICTION + SWING * swing
+        more = c > AMPLIFIED + SWING * swing
+        shifted = offset > CONTRADICTION + SWING * spread
+        return c if less or more or shifted else None
+
+
+@dataclass(frozen=True, slots=True)
+class _Drive:
+    """A drive: its effort's channel ("" if there is none), its pair of bodies, point and axis as drawn."""
+
+    effort: str
+    bodies: tuple[int, int]
+    at: Float[np.ndarray, "3"]
+    axis: Float[np.ndarray, "3"]
+    slides: bool
+
+    @classmethod
+    def of(cls, scene: Scene, linkage: Linkage, known: Collection[str], name: str) -> "_Drive":
+        joint = scene.joints[name]
+        several = f"{name}/" if len(scene.driven_joints) > 1 else ""
+        names = (f"drive/{several}{what}" for what in ("torque", "force"))
+        one, other = (linkage.bodies.index(link) for link in moving_pair(joint)[:2])
+        effort = next((each for each in names if each in known), "")
+        return cls(effort, (one, other), np.asarray(joint.at), joint_axis(joint), joint.kind == "prismatic")
+
+    def rate(self, motion: RigidMotion) -> Float[np.ndarray, " T"]:
+        """Speed of the drive's coordinate."""
+        i, j = self.bodies
+        axis = motion.R[:, j] @ self.axis
+        if not self.slides:
+            return np.asarray(((motion.omega[:, i] - motion.omega[:, j]) * axis).sum(axis=1))
+        x = motion.p[:, i] + motion.R[:, i] @ self.at
+        v = [motion.v[:, b] + cross(motion.omega[:, b], x - motion.p[:, b]) for b in (i, j)]
+        return np.asarray(((v[0] - v[1]) * axis).sum(axis=1))
+
+
+class CrossChecks:
+    """Efforts over a run, block after block.
+
+    Parameters
+    ----------
+    rows : joints enforced by constraint equations; where their directions vary they do work on the elastic motion too,
+        and that of the drives is not compared
+    """
+
+    def __init__(
+        self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], rows: Sequence[RowJoint] = ()
+    ) -> None:
+        known = {each.name: each for each in channels}
+        self.size = linkage.size
+        self.pairs = [
+            _Pair(name, rigid, [list(each.columns).index(x) for x in known[rigid].columns], each.unit)
+            for name, each in known.items()
+            for rigid in [_rigid_name(name)]
+            if rigid in known and "without what is along" not in known[rigid].description
+        ]
+        self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
+        steady = all(_steady(scene, row) for row in rows)
+        self.worked = steady and bool(self.drives) and all(each.effort for each in self.drives)
+        self._last: tuple[float, float] | None = None
+        self._work, self._left, self._exchanged = 0.0, 0.0, 0.0
+
+    def add(self, motion: RigidMotion, values: dict[str, Rows]) -> None:
+        """The rows of one more block."""
+        for each in self.pairs:
+            each.add(values[each.elastic][:, each.columns], values[each.rigid])
+        if not self.worked:
+            return
+        power = np.sum([values[each.effort][:, 0] * each.rate(motion) for each in self.drives], axis=0)
+        t0, before = self._last or (float(motion.t[0]), float(power[0]))
+        h = np.diff(motion.t, prepend=t0)
+        work = self._work + np.cumsum(0.5 * h * (power + np.concatenate([[before], power[:-1]])))
+        left = work - values["energy/work"][:, 1]
+        exchanged = [values["energy/strain"], values["energy/kinetic"], values["energy/work"], work]
+        self._last, self._work = (float(motion.t[-1]), float(power[-1])), float(work[-1])
+        self._left = max(self._left, float(np.abs(left).max()))
+        self._exchanged = max(self._exchanged, *(float(np.ptp(x, axis=0).max()) for x in exchanged))
+
+    @property
+    def unworked(self) -> float:
+        """Work of the drives that the account of energy does not have, as a part of the energy exchanged [-]."""
+        return self._left / self._exchanged if self._exchanged else 0.0
+
+    def warnings(self) -> tuple[str, ...]:
+        """Efforts that contradict each other."""
+        out = []
+        for each in self.pairs:
+            most = max(other.size / self._arm(other) for other in self.pairs)
+            share = each.share() if each.size > SMALL * most * self._arm(each) and each.count > 1 else None
+            if share is not None:
+                out.append(
+                    f"{each.elastic} contradicts {each.rigid}: over the run it is {100 * share:.3g} % of it, on average; "
+                    "elastic links do not explain that, unless links or springs are very soft: one of both is wrong"
+                )
+        if self.unworked > UNWORKED:
+            names = ", ".join(each.effort for each in self.drives)
+            out.append(
+                f"{names}: the work of the drive is off the change of energy and the other work by "
+                f"{100 * self.unworked:.2g} % of the energy exchanged: a part of its effort is missing"
+            )
+        return tuple(out)
+
+    def _arm(self, each: _Pair) -> float:
+        """By which moments are compared with forces [m]."""
+        return 1.0 if each.unit == "N" else self.size
+
+
+def _rigid_name(name: str) -> str:
+    """The channel of rigid links beside one of elastic ones."""
+    head, _, what = name.rpartition("/")
+    return f"{head}/rigid_{what}" if what in {"force", "torque"} else ""
+
+
+def _steady(scene: Scene, row: RowJoint) -> bool:
+    """Whether a joint holds rigidly, along directions that do not vary."""
+    joint = scene.joints.get(row.name)
+    fixed = joint is not None and GROUND in joint.links and joint.kind in {"prismatic", "revolute"}
+    return fixed and bool(np.isinf(row.stiffness).all())
