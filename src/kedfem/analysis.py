@@ -18,9 +18,11 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
+from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.model import Model, segments, ways
-from kedfem.dynamics.transient import Steps, steps_of, transient
+from kedfem.dynamics.transient import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
@@ -64,6 +66,7 @@ class Run:
     balance : of energy and momentum, as far as it was kept account of
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     sizes : plain sizes of the scene, for a look at its units
+    step : what the run itself knows of its step's error
     """
 
     folder: FilePath
@@ -76,6 +79,7 @@ class Run:
     balance: Balance | None = None
     budget: Budget | None = None
     sizes: Sizes | None = None
+    step: StepEstimate | None = None
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -102,7 +106,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     plan = None if scene.analysis.accuracy is None else planned(scene, clock.stage)
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
-    solver = clock.timed("factor", lambda: steps_of(scene, ready.model))
+    solvers = clock.timed("factor", lambda: level_steps(scene, ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
     recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
@@ -111,9 +115,10 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
     watched = _Watched(recorded, untold, efforts, recoveries)
-    peak, seen = clock.timed("steps", lambda: _stepped(ready, solver, watched, folder, watch))
+    peak, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
     results = read_results(folder / "results.h5")
-    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results)))
+    known = step.errors if step.levels > 1 else None
+    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), known))
     add_notes(folder / "results.h5", attributes(found))
     results = read_results(folder / "results.h5")
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
@@ -131,7 +136,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *undetermined_warning(untold),
         *warnings,
     )
-    return Run(folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found, plain)
+    return Run(
+        folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found, plain, step
+    )
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:
@@ -209,14 +216,15 @@ class _Watched:
     recoveries: list[StressRecovery]
 
 
-def _stepped(ready: Prepared, solver: Steps, watched: _Watched,
-             folder: FilePath, watch: Watch) -> tuple[Peak | None, Seen]:  # fmt: skip
+def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
+             folder: FilePath, watch: Watch) -> tuple[Peak | None, Seen, StepEstimate]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     peak: Peak | None = None
     seen = watcher(ready)
+    errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
     notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
     following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
@@ -230,18 +238,20 @@ def _stepped(ready: Prepared, solver: Steps, watched: _Watched,
         if not wanted:
             remove_animation(folder, STEM)
         try:
-            for block in transient(scene, ready.linkage, ready.path, model, solver):
+            for block in leveled(scene, ready.linkage, ready.path, model, solvers):
                 values = rows(watched.recorded, block)
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
                 seen.add(block)
+                errors.add(block, values)
                 for k in range(len(block)):
                     if block.step + k in wanted:
                         peak = _framed(ready, watched.recoveries, frames, block.at(k), peak)
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
-    return peak, seen
+            writer.note(errors.estimate.notes)
+    return peak, seen, errors.estimate
 
 
 @dataclass

@@ -26,6 +26,8 @@ def kernel_folder(root: Path) -> Path:
 if not os.environ.get("NUMBA_CACHE_DIR"):
     vars(numba.config)["CACHE_DIR"] = str(kernel_folder(ROOT))
 
-compiled: Any = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
-compiled_in_order: Any = numba.njit(cache=True, error_model="numpy")
+compiled: Any = numba.njit(
+    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}
+)
+compiled_in_order: Any = numba.njit(cache=True, nogil=True, error_model="numpy")
 """Sums as written, where their order matters."""

@@ -23,6 +23,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
 from kedfem.accuracy.stability import fewest_steps
+from kedfem.accuracy.step_estimate import SINGLE
 from kedfem.accuracy.variants import refined, with_analysis, with_links, with_steps
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Block
@@ -119,7 +120,7 @@ def budget(
     shares.append(frames_share(seen.geometric, kinds))
     if small is None:
         shares += [
-            _running_share(seen.running.relative, kinds) if step is None else _step_share(step),
+            _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step),
             _plain_mesh(eta, kinds),
         ]
         return Budget(joined(shares), tuple(limits), eta)
@@ -252,7 +253,9 @@ def _step_share(errors: Mapping[str, float]) -> Share:
 
 
 def _running_share(running: float, kinds: tuple[str, ...]) -> Share:
-    return Share("step", dict.fromkeys(kinds, running), "local error of a step: no run beside one so large")
+    return Share(
+        "step", dict.fromkeys(kinds, running), "local errors of its steps: no run beside one so large"
+    )
 
 
 def _plain_mesh(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from kedfem.accuracy.budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 
@@ -42,8 +42,8 @@ def histories(
     """
     recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
     times, taken, kept = [], [], []
-    solver = steps_of(ready.scene, ready.model)
-    for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
+    solvers = level_steps(ready.scene, ready.model)
+    for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers):
         times.append(block.motion.t)
         taken.append(rows(recorded, block))
         watch()

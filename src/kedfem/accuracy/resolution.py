@@ -100,26 +100,48 @@ def local_error(scheme: Scheme) -> float:
 
 @dataclass
 class StepError:
-    """The largest local error of the steps so far, in the norm of the mass."""
+    """The largest local error of the steps so far, in the norm of the mass, and what local errors add up to.
+
+    Vibration adds them up, step by step, for as long as damping at its frequency lets it: what is left of earlier errors
+    falls by exp(−h (α + β ω²)/2) in a step, ω² = |δ''|/|δ|.
+    """
 
     model: Model
     constant: float
+    h: float
     change: float = 0.0
     peak: float = 0.0
+    grown: float = 0.0
+    _swing: float = field(default=0.0, repr=False)
+    _left: float = field(default=0.0, repr=False)
     _last: Float[np.ndarray, " k"] | None = field(default=None, repr=False)
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
         a = self._weighted(block, "a")
         before = a[:1] if self._last is None else self._last[None]
-        self.change = max(self.change, _largest(np.diff(np.concatenate([before, a]), axis=0)))
+        change = np.linalg.norm(np.diff(np.concatenate([before, a]), axis=0), axis=1)
+        self.change = max(self.change, float(change.max(initial=0.0)))
         self.peak = max(self.peak, _largest(self._weighted(block, "u")))
+        self._swing = max(self._swing, _largest(a))
+        rate = self.model.damping.alpha
+        if self.peak:
+            rate += self.model.damping.beta * self._swing / self.peak
+        kept = float(np.exp(-self.h * rate / 2))
+        for x in change:
+            self._left = kept * self._left + float(x)
+            self.grown = max(self.grown, self._left)
         self._last = a[-1]
 
     @property
     def relative(self) -> float:
         """Of the largest displacement."""
         return self.constant * self.change / self.peak if self.peak else 0.0
+
+    @property
+    def total(self) -> float:
+        """What local errors add up to, of the largest displacement; of a motion that is wrong altogether 1."""
+        return min(1.0, self.constant * self.grown / self.peak) if self.peak else 0.0
 
     def _weighted(self, block: Block, name: str) -> Float[np.ndarray, "T k"]:
         """√m times a field of all links; a full mass is taken for its diagonal."""
@@ -134,7 +156,7 @@ class StepError:
 def step_error(ready: Prepared) -> StepError:
     """A watcher of a prepared scene's steps."""
     scheme = generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf)
-    return StepError(ready.model, local_error(scheme))
+    return StepError(ready.model, local_error(scheme), scheme.h)
 
 
 def resolution_warnings(found: Resolution | None) -> list[str]:

@@ -97,10 +97,12 @@ class FollowingDense:
             k = np.searchsorted(self._beams[0], i)
             for e, (point, seen) in enumerate(zip(points, s.frames, strict=False)):
                 strain[0, k, :, e] = point.strains @ seen.g.ravel()
+                strain[1, k, :, e] = point.strains @ seen.g1.ravel()
                 direction[k, :, e], turn[k, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
             for seen in s.frames if not points else ():
                 Q[i, : link.d, : link.d], angle[i] = seen.Q, seen.angle
-                g[0, i].reshape(D, n)[: link.d, : link.n] = coordinates(link, part, seen.g)
+                for m, x in enumerate((seen.g, seen.g1)):
+                    g[m, i].reshape(D, n)[: link.d, : link.n] = coordinates(link, part, x)
         return u, v, a, F, f, C, force, Q, angle, g, strain, direction, turn, np.zeros(len(self.actions))
 
     def copied(self, state: State) -> State:

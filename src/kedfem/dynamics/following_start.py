@@ -11,7 +11,7 @@ from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.start import Instant
-from kedfem.dynamics.state import Nodal, NodalOf
+from kedfem.dynamics.state import Nodal, NodalOf, Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 
@@ -45,11 +45,13 @@ def far_deflected(
     return [_balanced(links, joints, parts, at, list(u)) for at, u in zip(instants, start, strict=True)]
 
 
-def static_excess(link: Link, u: Nodal, R: NodalOf) -> Nodal:
-    """What the internal force of a deflection has beside K0 g, nominal frame [N]."""
-    g = u @ R
-    f, _ = _internal(link, u, R)
-    return np.asarray(f @ R - (link.K0 @ g.ravel()).reshape(g.shape))
+def excess(link: Link, damping: Rayleigh, u: Nodal, g1: Nodal, R: NodalOf) -> Nodal:
+    """What the internal force of a moving deflection has beside K0 g + β K0 g', nominal frame [N]."""
+    g, y = u @ R, position(link, u @ R)
+    frames = [seen_from(link, frame, y, g1) for frame in frames_of(link)]
+    f, _ = internal_force(link, y, R, frames, np.zeros((3, *y.shape)), damping.beta)
+    linear = g + damping.beta * g1 if link.fit is not None else g
+    return np.asarray(f @ R - (link.K0 @ linear.ravel()).reshape(g.shape))
 
 
 def _balanced(

@@ -18,6 +18,8 @@ from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential
 
+NUDGE = 1e-5  # of a link's size: what it moves by to tell the rate of its deformation, rounding and error 1e-10 of it
+
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
     """The frames of a link: several, one, or none where it keeps the nominal frame."""
@@ -60,6 +62,26 @@ def rotation(
     return Q @ exponential(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
 
 
+def mean_rotations(
+    link: Link, fit: Float[np.ndarray, "n 3"], y: Float[np.ndarray, "T n d"]
+) -> Float[np.ndarray, "T d d"]:
+    """Q of `rotation` at T times."""
+    A = np.einsum("tna,nb->tab", y, fit[:, : y.shape[2]])
+    if link.planar:
+        turn = np.arctan2(A[:, 1, 0] - A[:, 0, 1], A[:, 0, 0] + A[:, 1, 1])
+        Q = np.tile(np.eye(link.d), (len(y), 1, 1))
+        cos, sin = np.cos(turn), np.sin(turn)
+        Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1] = cos, -sin, sin, cos
+        return Q
+    left, _, right = np.linalg.svd(A)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    Q = left @ right
+    U = Q.transpose(0, 2, 1) @ A
+    axial = np.stack([U[:, 2, 1] - U[:, 1, 2], U[:, 0, 2] - U[:, 2, 0], U[:, 1, 0] - U[:, 0, 1]], axis=1)
+    G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - (U + U.transpose(0, 2, 1)) / 2
+    return np.asarray(Q @ exponential(np.linalg.solve(G, axial[:, :, None])[:, :, 0]))
+
+
 def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
     """A turn about z, of rows (u, v) or (u, v, ψ)."""
     Q = np.eye(d)
@@ -77,16 +99,23 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
     return np.asarray(g)
 
 
-def seen_from(link: Link, frame: Frame, y: Nodal) -> Followed:
-    """A frame that stands still, within half a turn of the nominal one.
+def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Followed:
+    """A frame within half a turn of the nominal one, with what it sees of a rate.
 
     Parameters
     ----------
-    y : (n, d) position in the nominal frame, of a planar beam (x, y, ψ)
+    y, y1 : (n, d) position in the nominal frame, of a planar beam (x, y, ψ), and its rate; at rest if not given
     """
     Q, angle = rotation(link, frame.fit, y, 0.0)
     g = deformation(link, y, Q, angle)
-    return Followed(Q, angle, g, np.zeros_like(g), np.zeros_like(g))
+    g1, size = np.zeros_like(g), 0.0 if y1 is None else float(np.abs(y1).max(initial=0.0))
+    if y1 is not None and size:
+        part = NUDGE * link.size / size
+        ahead, behind = (
+            deformation(link, z, *rotation(link, frame.fit, z, angle)) for z in (y + part * y1, y - part * y1)
+        )
+        g1 = (ahead - behind) / (2 * part)
+    return Followed(Q, angle, g, g1, np.zeros_like(g))
 
 
 def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:

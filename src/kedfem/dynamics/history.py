@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.state import LinkState, Nominal
 from kedfem.motion.rigid import RigidMotion
@@ -75,7 +75,7 @@ class LinkHistory:
         products = None if self.products is None else self.products.part(first, end)
         return replace(self.every(slice(first, end)), products=products)
 
-    def every(self, which: slice) -> "LinkHistory":
+    def every(self, which: slice | Int[np.ndarray, " k"]) -> "LinkHistory":
         """Some of the time points, without products."""
         names = [each.name for each in fields(self) if each.name != "products"]
         return LinkHistory(**{name: getattr(self, name)[which] for name in names})
@@ -114,11 +114,16 @@ class Block:
     step : number of the first
     motion : rigid motion at them
     links : per link
+    levels : the same time points as each level of `dynamics.levels` has them, coarsest first; none of a single march
+    between : whether these are not time points of the analysis, but such as only the finest level has, since the one
+        before `step`
     """
 
     step: int
     motion: RigidMotion
     links: Sequence[LinkHistory]
+    levels: tuple["Block", ...] = ()
+    between: bool = False
 
     def __len__(self) -> int:
         return len(self.motion.t)
@@ -128,11 +133,15 @@ class Block:
         if (first, end) == (0, len(self)):
             return self
         links = [each.part(first, end) for each in self.links]
-        return Block(self.step + first, self.motion.part(first, end), links)
+        levels = tuple(each.part(first, end) for each in self.levels)
+        return Block(self.step + first, self.motion.part(first, end), links, levels, self.between)
 
     def every(self, stride: int) -> "Block":
         """Some of its time points, the first and each so many further on; without products."""
-        which = slice(None, None, stride)
+        return self.chosen(slice(None, None, stride))
+
+    def chosen(self, which: slice | Int[np.ndarray, " k"]) -> "Block":
+        """Some of its time points; without products and levels."""
         return Block(self.step, self.motion.at(which), [link.every(which) for link in self.links])
 
     def at(self, k: int) -> "Snapshot":

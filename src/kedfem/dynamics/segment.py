@@ -11,7 +11,7 @@ from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation, s
 from kedfem.dynamics.history import LinkHistory
 from kedfem.dynamics.ports import port_rotation
 from kedfem.dynamics.state import LinkState, Nodal, Rayleigh
-from kedfem.links.record import Link
+from kedfem.links.record import Link, mass_times
 
 PATIENCE, EASIER = 12, 100.0  # after so many sweeps a larger change is taken: stiff hubs round coarsely
 LEAST, FAR = 1e-6, 100.0  # of the links' sizes
@@ -61,7 +61,7 @@ class NotConverged(Exception):  # noqa: N818 - not a fault yet: such a step is t
         self.taken, self.histories, self.state, self.link = taken, histories, state, link
 
 
-def position(link: Link, u: Nodal) -> Nodal:
+def position(link: Link, u: Float[np.ndarray, "... n d"]) -> Float[np.ndarray, "... n d"]:
     """Position of a segment displaced by u, both in the nominal frame; of a planar beam (x, y, ψ)."""
     X = link.X[:, : link.d]
     return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
@@ -77,9 +77,11 @@ def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float
 def first_state(link: Link, joint: Attachment, damping: Rayleigh, s: LinkState) -> SegmentState:
     """A segment's state at the first time point."""
     y = position(link, s.u @ s.R)
-    frames = [seen_from(link, frame, y) for frame in frames_of(link)]
+    frames = [seen_from(link, frame, y, s.g1) for frame in frames_of(link)]
     damped = np.zeros((3, *y.shape))
     damped[0] = damping.alpha * (s.Mu @ s.R)
+    if damping.alpha and s.g1 is not None:
+        damped[1] = damping.alpha * mass_times(link.mass, s.g1)
     f, strain = internal_force(link, y, s.R, frames, damped, damping.beta)
     return SegmentState(
         s.u, s.v, s.a, s.Mu, s.Mv, s.Ma, f, s.F, s.R, tuple(frames), damped,

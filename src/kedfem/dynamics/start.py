@@ -96,7 +96,9 @@ def initial_states(
         )
         Mu, Mv, Ma = (mass_times(link.mass, x) for x in (start.u, start.v, a))
         states.append(
-            LinkState(start.u, start.v, a, Mu, Mv, Ma, g[k], now.R, Kg[k], f[k], C, now.F, forces[k])
+            LinkState(
+                start.u, start.v, a, Mu, Mv, Ma, g[k], now.R, Kg[k], f[k], C, now.F, forces[k], start.g_rate
+            )
         )
     return states
 

@@ -50,6 +50,7 @@ class LinkState:
     C : (3, n, d) C0 times (g, g', g''), link frame, None without damping
     F : P − M R0'', world components [N]
     port_forces : (q,) λ on the link at its ports, link frame [N]
+    g1 : g' where a march begins; None later, where C has what is needed of it
     """
 
     u: Nodal
@@ -65,6 +66,7 @@ class LinkState:
     C: Float[np.ndarray, "3 n d"] | None
     F: Nodal
     port_forces: Float[np.ndarray, " q"]
+    g1: Nodal | None = None
 
 
 def accelerated(scheme: Scheme, u1: Nodal, u: Nodal, v: Nodal, a: Nodal) -> tuple[Nodal, Nodal]:

@@ -12,10 +12,10 @@ from kedfem.dynamics.actions import actions, followers
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
-from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
+from kedfem.dynamics.first_rows import FIRST, INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
-from kedfem.dynamics.following_start import far_deflected, static_excess
+from kedfem.dynamics.following_start import excess, far_deflected
 from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
 from kedfem.dynamics.interface import static_tie
 from kedfem.dynamics.joint_rows import joint_rows
@@ -78,18 +78,25 @@ def _is_small(link: Link) -> bool:
     return link.unknowns <= SMALL and (link.kind != "spatial_beam" or link.full is not None)
 
 
-def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Block]:
+def transient(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps,
+    start: list[LinkState] | None = None,
+) -> Iterator[Block]:  # fmt: skip
     """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
+
+    Parameters
+    ----------
+    start : states at t = 0, those of `first_states` if not given
 
     Raises
     ------
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    stresses = None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
-    states = first_states(scene, linkage, along, model, stresses)
-    start = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
-    yield Block(0, start, _first(model, solver, states))
+    stresses = stresses_of(solver)
+    states = first_states(scene, linkage, along, model, stresses) if start is None else start
+    drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
+    yield Block(0, drawn, _first(model, solver, states))
     state: Any = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
@@ -110,6 +117,11 @@ def transient(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
                 else:
                     links, state = solver.advance(state, forcing, rows)
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+
+
+def stresses_of(solver: Steps) -> Stiffening | None:
+    """Geometric stiffening that a solver knows, if any."""
+    return None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
 
 
 def begun(
@@ -210,11 +222,11 @@ def first_states(
     scene: Scene, linkage: Linkage, along: Path, model: Model,
     stresses: Stiffening | None = None,
 ) -> list[LinkState]:  # fmt: skip
-    """States at t = 0: at rest, or quasi-static with its rate from three instants."""
+    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants."""
     at_rest = scene.analysis.initial == "rest"
     grid = time_grid(scene)
-    h = min(grid.step, grid.end / 2)
-    t = h * np.arange(1 if at_rest else 3)
+    h = min(grid.step, grid.end / (INSTANTS - 1))
+    t = h * np.arange(1 if at_rest else INSTANTS)
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     moments = instants(model, motion, stresses)
     every = actions(scene, model)
@@ -246,7 +258,7 @@ def first_states(
     if following(scene):
         u = far_deflected(model.links, model.joints, moments, u)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
-    rates = ([(-3 * x0 + 4 * x1 - x2) / (2 * h) for x0, x1, x2 in zip(*x, strict=True)] for x in (u, g))
+    rates = ([np.tensordot(FIRST, each, 1) / h for each in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
     if moments[0].turnings is not None:
         start = [
@@ -254,7 +266,7 @@ def first_states(
         ]
     if following(scene):
         start = [
-            replace(x, stressed=static_excess(link, x.u, now.R))
+            replace(x, stressed=excess(link, model.damping, x.u, x.g_rate, now.R))
             for x, link, now in zip(start, model.links, moments[0].at, strict=True)
         ]
     rows = rows_at_start(scene, linkage, along, model)

@@ -36,6 +36,9 @@ class Analysis(Record):
     """time steps in a turn (at the final speed); 720 if neither this nor `step` is given"""
     step: PositiveTime | None = None
     """time step, instead of `steps_per_turn`; shortened so that a whole number reaches the end"""
+    levels: Annotated[StrictInt, Field(ge=1, le=3)] | None = None
+    """levels in time: 2: the motion is solved in whole and in half steps, 3: in quarters too, and combined: of order 4 or
+    6 in the step instead of 2, and its error is known; 1 if not given, or what `accuracy` chooses"""
     rho_inf: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.95
     """ρ∞ of the generalised-α method: what a step leaves of vibration that it cannot resolve; 1 is Newmark's average
     acceleration, which leaves it all"""

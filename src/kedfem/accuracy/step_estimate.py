@@ -1,0 +1,202 @@
+"""The error of the time step in every channel, from what the levels in time differ by."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.resolution import StepError
+from kedfem.dynamics.history import Block
+from kedfem.results.recorded import Recorded
+from kedfem.scene import time_grid
+
+IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
+SURE = 0.7  # of the error asked for, that a step is chosen for
+SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
+TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the truth
+Rows = Float[np.ndarray, "T c"]
+
+
+@dataclass(frozen=True, slots=True)
+class StepEstimate:
+    """What a run knows of its step's error.
+
+    h : step of the coarsest level, which is the analysis's own [s]
+    levels : 1, 2 or 3
+    errors : channel → estimated error of its values, at worst in time, of the channel's peak [-]
+    differences : channel → what successive levels differ by, at worst in time, of the peak, coarsest pair first; none of
+        a single level
+    fast : channel → by which share the finest pair of levels disagrees about its fastest motion, that with the largest
+        second differences in time: small where the order shows, 1 where that motion is out of step
+    running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows,
+        which puts twice of it for the error of every channel
+    local : the largest local error of a step, of the largest displacement [-]
+    """
+
+    h: float
+    levels: int
+    errors: Mapping[str, float]
+    differences: Mapping[str, tuple[float, ...]]
+    fast: Mapping[str, float]
+    running: float
+    local: float
+
+    @property
+    def notes(self) -> dict[str, str | float]:
+        """As a results file keeps them."""
+        errors = {f"step error of {name}": error for name, error in self.errors.items()}
+        return {"levels in time": self.levels, "step error, running": self.running, **errors}
+
+    @property
+    def worst(self) -> float:
+        """The largest error of all channels."""
+        return max(self.errors.values(), default=self.running)
+
+
+@dataclass(frozen=True, slots=True)
+class StepChoice:
+    """A step and a number of levels, the error that is expected, and the work, in steps per second of motion."""
+
+    h: float
+    levels: int
+    error: float
+    work: float
+
+
+def cheapest(found: StepEstimate, wanted: float, channels: Collection[str] | None = None) -> StepChoice:
+    """The step and the levels that reach an error in every channel with the least steps, from a trial's differences.
+
+    D falls with h², what two levels leave, about q D, with h⁴, three, q² D, with h⁶, as long as the fastest motion stays
+    in step: q, which falls with h², no more than IN_STEP. Where it is more in the trial already no order can be relied
+    on: then a step that brings it there, to try again.
+
+    Parameters
+    ----------
+    found : of a run of two or three levels
+    wanted : relative error
+    channels : that count, all that were followed if not given
+    """
+    names = found.differences if channels is None else [x for x in found.differences if x in channels]
+    if found.levels < 2:
+        raise ValueError("the trial must have two or three levels, got one")
+    if not names:
+        return StepChoice(found.h, 1, 0.0, 1 / found.h)
+    D = np.array([found.differences[name][0] for name in names])
+    q = np.minimum(1.0, np.array([found.fast[name] for name in names]) * 4.0 ** (found.levels - 2))
+    out = []
+    for levels, left in ((1, 4 / 3 * D), (2, TWO * q * D), (3, q * q * D)):
+        order = 2 * levels
+        error = np.maximum(left, 1e-300)
+        factor = float(((SURE * wanted / error) ** (1 / order)).min())
+        if levels > 1:
+            factor = min(
+                factor, float(np.sqrt(IN_STEP / np.maximum(q[wanted < D], 1e-300)).min(initial=np.inf))
+            )
+        expected = float((error * factor**order).max())
+        out.append(StepChoice(found.h * factor, levels, expected, (2**levels - 1) / (found.h * factor)))
+    return min(out, key=lambda choice: choice.work)
+
+
+def watched(name: str) -> bool:
+    """Whether a channel's error is followed: probes, joint forces, drives."""
+    return name.startswith(("probes/", "drive/")) or name.endswith(("/force", "/moment"))
+
+
+@dataclass
+class _Sizes:
+    """Largest norms of one channel so far.
+
+    differences : of successive levels
+    next : of successive combinations of two levels
+    curved : second differences in time of the finest pair's difference, and of the values
+    """
+
+    peak: float = 0.0
+    differences: Float[np.ndarray, " l"] = field(default_factory=lambda: np.zeros(0))
+    next: float = 0.0
+    curved: Float[np.ndarray, "2"] = field(default_factory=lambda: np.zeros(2))
+    _tail: list[Rows] = field(default_factory=list)
+
+    @property
+    def fast(self) -> float:
+        """|D''|/|x''| of the finest pair's difference D, at most 1."""
+        return min(1.0, float(self.curved[0] / self.curved[1])) if self.curved[1] else 0.0
+
+    def add(self, values: Rows, levels: Sequence[Rows]) -> None:
+        """More time points, as combined and as each level has them."""
+        self.peak = max(self.peak, _largest(values))
+        steps = [b - a for a, b in pairwise(levels)]
+        if not len(self.differences):
+            self.differences = np.zeros(len(steps))
+        self.differences = np.maximum(self.differences, [_largest(d) for d in steps])
+        if len(steps) == 2:
+            self.next = max(self.next, _largest((4 * steps[1] - steps[0]) / 3))
+        seen = [steps[-1], values] if steps else []
+        if self._tail:
+            seen = [np.concatenate(each) for each in zip(self._tail, seen, strict=True)]
+        self.curved = np.maximum(self.curved, [_largest(np.diff(x, 2, axis=0)) for x in seen] or 0.0)
+        self._tail = [x[-2:] for x in seen]
+
+
+@dataclass
+class StepWatch:
+    """Follows the step's error of a run, block after block.
+
+    recorded : the run's channels
+    running : local errors of its steps, which somebody else adds up
+    """
+
+    ready: Prepared
+    recorded: Sequence[Recorded]
+    running: StepError
+    sizes: dict[str, _Sizes] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.recorded = [each for each in self.recorded if watched(each.channel.name)]
+
+    def add(self, block: Block, values: Mapping[str, Rows]) -> None:
+        """Look at the time points of a block and their rows."""
+        for each in self.recorded:
+            name = each.channel.name
+            if block.levels:
+                of = each.channel.columns
+                which = [k for k, column in enumerate(of) if column != "von_mises"]  # its zeros are kinks
+                every = [values[name], *(each.rows(level) for level in block.levels)]
+                now, *levels = (x[:, which] for x in every)
+                self.sizes.setdefault(name, _Sizes()).add(now, levels)
+
+    @property
+    def estimate(self) -> StepEstimate:
+        """Of what was looked at so far."""
+        analysis = self.ready.scene.analysis
+        running, local, h = self.running.total, self.running.relative, time_grid(self.ready.scene).step
+        if (analysis.levels or 1) == 1:
+            errors = {each.channel.name: min(1.0, SINGLE * running) for each in self.recorded}
+            return StepEstimate(h, 1, errors, {}, {}, running, local)
+        sizes = {name: x for name, x in self.sizes.items() if x.peak}
+        return StepEstimate(
+            h, analysis.levels or 1, {name: _error(x) for name, x in sizes.items()},
+            {name: tuple((x.differences / x.peak).tolist()) for name, x in sizes.items()},
+            {name: x.fast for name, x in sizes.items()}, running, local,
+        )  # fmt: skip
+
+
+def _error(x: _Sizes) -> float:
+    """Of the combined values, of the peak.
+
+    Of two levels, D = x_{h/2} − x_h: fast motion goes wrong first, and second differences in time weigh it most. By
+    q = |D''|/|x''| of it the levels disagree; the next power of the step leaves about q D, and where q is near 1, D
+    itself. Of three, what the two pairs' combinations differ by, δ, is such a D, and δ/D another q.
+    """
+    peak, q = x.peak, x.fast
+    if len(x.differences) == 1:
+        return float(x.differences[0]) / peak * min(1.0, TWO * q)
+    s = x.next / float(x.differences[0]) if x.differences[0] else 0.0
+    return x.next / peak * min(1.0, THREE * float(np.sqrt(q * min(1.0, s))))
+
+
+def _largest(x: Rows) -> float:
+    return float(np.sqrt((x**2).sum(axis=1).max(initial=0.0)))

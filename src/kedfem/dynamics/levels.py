@@ -1,0 +1,299 @@
+"""Levels in time: the same motion in steps of h, h/2 (and h/4) side by side, combined state by state at common times.
+
+The error of a step of generalised-α has an expansion in powers of h (docs/theory.md): c₂ h² + c₃ h³ + c₄ h⁴ …, where
+numerical damping alone makes c₃, which goes with ((1 − ρ∞)/(1 + ρ∞))³ and is 2e-5 at the default ρ∞ = 0.95. So
+
+    two levels    (4 x_{h/2} − x_h)/3                                    order 4, with little numerical damping
+    three levels  (r E_{h/2} − E_h)/(r − 1), E_h = (4 x_{h/2} − x_h)/3   r = 16: order 6; r = 8: order 4, without h³
+
+Everything that is smooth in the state keeps the order, and what is linear in it stays exact: positions, rates, loads,
+internal forces, joint forces. δ'' of the method itself belongs to an instant (α_f − α_m) h before the end of the step;
+what the balance M a = P − M R0'' − f + Wᵀ λ asks for is found from it by the method's own recursion,
+
+    (1 − α_f) a₁ + α_f a₀ = (1 − α_m) δ₁'' + α_m δ₀''
+
+so that accelerations and joint forces of the combined state are in balance as the levels' are.
+"""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.frames import mean_rotations
+from kedfem.dynamics.history import Block, LinkHistory, joined
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import turned_vectors
+from kedfem.dynamics.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.segment import position
+from kedfem.dynamics.transient import Steps, block_length, first_states, steps_of, stresses_of, transient
+from kedfem.errors import SolveError
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rigid import joined as motions_joined
+from kedfem.scene import Scene, time_grid
+
+MOST = 3
+SIXTH = 0.5  # least ρ∞ at which h⁴ is removed before h³ (docs/performance/levels.md)
+
+
+def level_weights(levels: int, rho_inf: float) -> Float[np.ndarray, " l"]:
+    """Factors of the levels' states in the combined one, coarsest first; their sum is 1."""
+    if levels == 1:
+        return np.ones(1)
+    two = np.array([-1.0, 4.0]) / 3
+    if levels == 2:
+        return two
+    r = 16.0 if rho_inf >= SIXTH else 8.0
+    return np.asarray((r * np.append(0.0, two) - np.append(two, 0.0)) / (r - 1))
+
+
+def level_scenes(scene: Scene) -> list[Scene]:
+    """The scene with its own step, half of it, and so on, as many as it has levels."""
+    grid, analysis = time_grid(scene), scene.analysis
+    out = [scene]
+    for k in range(1, analysis.levels or 1):
+        keys = {
+            "step": grid.step / 2**k,
+            "end_time": grid.end,
+            "turns": None,
+            "steps_per_turn": None,
+            "levels": 1,
+        }
+        out.append(scene.model_copy(update={"analysis": analysis.model_copy(update=keys)}))
+    return out
+
+
+def level_steps(scene: Scene, model: Model) -> list[Steps]:
+    """The solver of each level, coarsest first, its matrices factored.
+
+    Raises
+    ------
+    SolveError
+        If an effective matrix is not positive definite.
+    """
+    return [steps_of(each, model) for each in level_scenes(scene)]
+
+
+def leveled(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solvers: Sequence[Steps], between: bool = False
+) -> Iterator[Block]:
+    """All time points of the analysis, combined of all levels, block after block; see `transient`.
+
+    Parameters
+    ----------
+    solvers : of `level_steps`; with one of them this is `transient`
+    between : whether to hand on too, before each block, what the finest level has between its time points,
+        corrected by the interpolated correction of the common ones; flagged as `between`
+
+    Raises
+    ------
+    SolveError
+        As `transient`, by the first level that fails; what all of them have is handed on before.
+    """
+    if len(solvers) == 1:
+        yield from transient(scene, linkage, along, model, solvers[0])
+        return
+    scenes = level_scenes(scene)
+    start = first_states(scenes[-1], linkage, along, model, stresses_of(solvers[-1]))
+    schemes = [generalised_alpha(time_grid(each).step, each.analysis.rho_inf) for each in scenes]
+    streams = [
+        _Stream(transient(each, linkage, along, model, solver, start), scheme)
+        for each, solver, scheme in zip(scenes, solvers, schemes, strict=True)
+    ]
+    combination = _Combination(model, level_weights(len(solvers), scene.analysis.rho_inf))
+    length = max(1, block_length(model) // 2 ** (len(solvers) - 1))
+    steps = time_grid(scene).steps
+    with _pool(min(cores(), len(solvers))) as pool:
+        done = 0
+        while done <= steps:
+            count = 1 if done == 0 else min(length, steps + 1 - done)
+            wanted = [count if done == 0 else count * 2**k for k in range(len(streams))]
+            taken = _taken(pool, streams, wanted)
+            if done == 0:
+                strides, here = [1] * len(taken), 1
+            else:
+                strides = [2**k for k in range(len(taken))]
+                here = min(0 if x is None else len(x) // s for x, s in zip(taken, strides, strict=True))
+            if here:
+                blocks = [x.part(0, here * s) for x, s in zip(taken, strides, strict=True) if x is not None]
+                yield from combination.blocks(done, blocks, strides, between)
+            for stream in streams:
+                if stream.failed is not None and here < count:
+                    raise stream.failed
+            done += count
+
+
+def _taken(pool: Executor | None, streams: Sequence["_Stream"], wanted: Sequence[int]) -> list[Block | None]:
+    """The next time points of all levels; finest first, as they take longest."""
+    if pool is None:
+        return [stream.taken(count) for stream, count in zip(streams, wanted, strict=True)]
+    every = [
+        pool.submit(stream.taken, count) for stream, count in zip(streams[::-1], wanted[::-1], strict=True)
+    ]
+    return [each.result() for each in every[::-1]]
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _pool(count: int) -> Any:
+    """Threads, where there is more than one core: the levels' loops are compiled ones."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    return nullcontext() if count < 2 else ThreadPoolExecutor(count)
+
+
+@dataclass
+class _Stream:
+    """One level: its time points in portions as asked for, with accelerations from the balance."""
+
+    blocks: Iterator[Block]
+    scheme: Scheme
+    failed: SolveError | None = None
+    _rest: Block | None = None
+    _last: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+
+    def taken(self, count: int) -> Block | None:
+        """The next time points; fewer where the level has failed, None without any."""
+        parts: list[Block] = []
+        while count:
+            if self._rest is None:
+                self._rest = self._next()
+                if self._rest is None:
+                    break
+            block = self._rest
+            part = block.part(0, min(count, len(block)))
+            self._rest = block.part(count, len(block)) if count < len(block) else None
+            count -= len(part)
+            parts.append(part)
+        if len(parts) < 2:
+            return parts[0] if parts else None
+        motion = motions_joined([x.motion for x in parts])
+        return Block(parts[0].step, motion, joined([list(x.links) for x in parts]))
+
+    def _next(self) -> Block | None:
+        if self.failed is not None:
+            return None
+        try:
+            block = next(self.blocks)
+        except SolveError as error:
+            self.failed = error
+            return None
+        return self._balanced(block)
+
+    def _balanced(self, block: Block) -> Block:
+        """The block with the accelerations of its balance in place of the method's own δ''."""
+        if not self.scheme.alpha_f:
+            return block
+        if not self._last:
+            self._last = [(link.a[-1], link.a[-1]) for link in block.links]
+            return block
+        links = []
+        for k, (link, (before, balance)) in enumerate(zip(block.links, self._last, strict=True)):
+            a = balanced(self.scheme, before, balance, link.a)
+            self._last[k] = link.a[-1], a[-1]
+            links.append(replace(link, a=a))
+        return replace(block, links=links)
+
+
+def balanced(
+    scheme: Scheme, before: Float[np.ndarray, "n d"], balance: Float[np.ndarray, "n d"],
+    own: Float[np.ndarray, "T n d"],
+) -> Float[np.ndarray, "T n d"]:  # fmt: skip
+    """Accelerations that the balance asks for at the ends of T steps, from the method's own δ''.
+
+    Parameters
+    ----------
+    before, balance : δ'' and the acceleration of the balance at the beginning of the first step
+    own : δ'' at the ends
+    """
+    from scipy.signal import lfilter
+
+    c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+    begin = (scheme.alpha_m * before - scheme.alpha_f * balance) / c_f
+    out, _ = lfilter(
+        [c_m / c_f, scheme.alpha_m / c_f], [1.0, scheme.alpha_f / c_f], own, axis=0, zi=begin[None]
+    )
+    return np.asarray(out)
+
+
+LINEAR = ("u", "v", "a", "g", "F", "port_forces", "strain")
+Fields = dict[str, Any]
+
+
+@dataclass
+class _Combination:
+    """States of all levels, at the same times, as one; and the finest level's, corrected, between them."""
+
+    model: Model
+    weights: Float[np.ndarray, " l"]
+    _corrections: list[Fields] = field(default_factory=list)
+
+    def blocks(
+        self, first: int, taken: Sequence[Block], strides: Sequence[int], between: bool
+    ) -> Iterator[Block]:
+        """Of a span of time: what lies between its time points, if that is wanted; then its time points."""
+        levels = tuple(
+            replace(block.chosen(slice(stride - 1, None, stride)), step=first)
+            for block, stride in zip(taken, strides, strict=True)
+        )
+        motion, every = levels[0].motion, range(len(self.model.links))
+        seen = [[_fields(self.model, k, block) for k in every] for block in levels]
+        combined = [
+            {
+                name: sum(w * each[k][name] for w, each in zip(self.weights, seen, strict=True))
+                for name in LINEAR
+            }
+            for k in every
+        ]
+        if between:
+            now = [{n: x[n] - y[n] for n in LINEAR} for x, y in zip(combined, seen[-1], strict=True)]
+            if strides[-1] > 1:
+                yield self._between(first, taken[-1], strides[-1], now)
+            self._corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
+        yield Block(first, motion, [self._history(k, x, motion) for k, x in enumerate(combined)], levels)
+
+    def _between(self, first: int, finest: Block, stride: int, now: Sequence[Fields]) -> Block:
+        """What the finest level has between common times; its correction is linear in time there."""
+        number = np.arange(len(finest))
+        which = number[(number + 1) % stride != 0]
+        point, share = np.divmod(which + 1, stride)
+        part, links = finest.chosen(which), []
+        for k, (before, after) in enumerate(zip(self._corrections, now, strict=True)):
+            own = _fields(self.model, k, part)
+            for name in LINEAR:
+                x = np.concatenate([before[name], after[name]])
+                s = (share / stride).reshape(-1, *[1] * (x.ndim - 1))
+                own[name] = own[name] + (1 - s) * x[point] + s * x[point + 1]
+            links.append(self._history(k, own, part.motion))
+        return Block(first, part.motion, links, between=True)
+
+    def _history(self, k: int, x: Fields, motion: RigidMotion) -> LinkHistory:
+        """A link's combined state: its frame where its positions now are, energy of its deformation now."""
+        link, joint = self.model.links[k], self.model.joints[k]
+        R = motion.R[:, self.model.bodies[k], : link.d, : link.d]
+        if link.fit is None:
+            Kg = (link.K0 @ x["g"].reshape(len(R), -1).T).T
+            strain = 0.5 * (x["g"].reshape(len(R), -1) * Kg).sum(axis=1)
+            return LinkHistory(**{**x, "strain": strain}, R=R)
+        R = R @ mean_rotations(link, link.fit, position(link, x["u"] @ R))
+        forces = (x["port_forces"] @ R).reshape(len(R), -1)[:, joint.keep]
+        return LinkHistory(**{**x, "port_forces": forces}, R=R)
+
+
+def _fields(model: Model, k: int, block: Block) -> Fields:
+    """What of a link's states is combined; its port forces in world components where its frame is its own."""
+    link, history = model.links[k], block.links[k]
+    out = {name: getattr(history, name) for name in LINEAR}
+    if link.fit is not None:
+        out["port_forces"] = turned_vectors(model.joints[k], history.R, history.port_forces)
+    return out
