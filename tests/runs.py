@@ -102,3 +102,8 @@ def ran(raw: dict[str, Any], compiled: bool = True) -> Ran:
         scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
         solver = FollowingSteps(model.links, model.joints, scheme, model.damping, actions(scene, model))
     return Ran(ready, solver, list(transient(scene, ready.linkage, ready.path, model, solver)))
+
+
+def quick(raw: dict[str, Any]) -> dict[str, Any]:
+    """A raw scene that leaves nothing to be chosen: plain defaults, for tests of something else than accuracy."""
+    return {**raw, "analysis": {**raw.get("analysis", {}), "accuracy": "quick"}}

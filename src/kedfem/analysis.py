@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of
 from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
 from kedfem.accuracy.histories import Histories
-from kedfem.accuracy.plan import Plan, planned
+from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
@@ -103,7 +103,8 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     """The stages of a run, in a folder of its own."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
-    plan = None if scene.analysis.accuracy is None else planned(scene, clock.stage)
+    asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
+    plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model))
@@ -128,8 +129,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *size_warnings(scene, plain),
         *assembly_warning(assembly),
         *stability_warning(scene),
-        *budget_warning(found, None if plan is None else plan.asked),
-        *plan_warning(plan),
+        *budget_warning(found, asked),
         *resolution_warnings(frequencies),
         *balance_warning(account.balance, scene.analysis.stiffening),
         *efforts.warnings(),
@@ -194,11 +194,6 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     count = int((grid.steps - first) * animation.frames_per_turn / turn + 1e-9)
     steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_turn
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
-
-
-def plan_warning(plan: Plan | None) -> tuple[str, ...]:
-    """A warning where the accuracy asked for is not expected."""
-    return () if plan is None or plan.reached else plan.notes[-1:]
 
 
 def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:

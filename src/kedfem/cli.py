@@ -40,13 +40,21 @@ def _root(
 
 
 @app.command()
-def run(scene: ScenePath) -> None:
+def run(
+    scene: ScenePath,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Plain defaults for what the scene leaves open; says how exact they are."
+        ),
+    ] = False,
+) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
     from kedfem.report import run_tables, size_line
     from kedfem.scene import read_scene
 
-    loaded = read_scene(scene)
+    loaded = _quick(read_scene(scene)) if quick else read_scene(scene)
     file = loaded.results_folder / "results.h5"
     before = _version(file)
     try:
@@ -63,7 +71,7 @@ def run(scene: ScenePath) -> None:
 @app.command()
 def check(scene: ScenePath) -> None:
     """Show what would be modelled and its cost; solve nothing."""
-    from kedfem.accuracy.plan import planned
+    from kedfem.accuracy.plan import plan_for
     from kedfem.accuracy.reduction import prepared
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
@@ -76,7 +84,7 @@ def check(scene: ScenePath) -> None:
         def stage(name: str) -> None:
             watch(name, 0, 0)
 
-        plan = None if loaded.analysis.accuracy is None else planned(loaded, stage)
+        plan = plan_for(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
     found = sizes(loaded, ready.model)
     out.print(size_line(found), markup=False, soft_wrap=True)
@@ -238,6 +246,11 @@ def bench(
     with _progress() as watch:
         text = BENCHMARKS[what](folder, quick, watch)
     out.print(text, markup=False, soft_wrap=True)
+
+
+def _quick(scene: Any) -> Any:
+    """The scene with plain defaults for what it leaves open."""
+    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"accuracy": "quick"})})
 
 
 class _progress:  # noqa: N801

@@ -21,6 +21,7 @@ from kedfem.motion.assembly import assembled
 from kedfem.motion.linkage import linkage
 from kedfem.motion.redrawn import Shift, redrawn
 from kedfem.scene import Cad, Polyline, RigidBody, Scene, inertia_tensor, scene_from
+from tests.runs import quick
 
 from ..linkages import RSSR_PIVOT, JointTable, Z, four_bar, joint, motion_at, rssr, slider_crank
 from .test_cli import Command, run_kedfem
@@ -485,7 +486,7 @@ def test_shapes_that_cannot_be_tilted_are_refused_where_they_would_have_to_be() 
 
 
 def test_a_run_warns_that_links_were_moved(tmp_path: Path) -> None:
-    done = analyse(scene_from(apart_four_bar(), tmp_path))
+    done = analyse(scene_from(quick(apart_four_bar()), tmp_path))
     (warning,) = [each for each in done.warnings if each.startswith("joints.C:")]
     assert warning == (
         "joints.C: its links are drawn 0.0001 m apart; closed by moving links up to 0.000114 m (kedfem check tells which)"

@@ -16,6 +16,7 @@ from kedfem.report import run_tables
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.scene import read_scene, scene_from
 from tests import scenes
+from tests.runs import quick
 from tests.scenes import bar, material
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -188,7 +189,7 @@ def test_the_account_does_not_know_how_the_time_points_come_in_blocks() -> None:
 def test_a_run_says_what_is_left_over_and_warns_when_that_is_much(tmp_path: Path) -> None:
     raw = example("four_bar_beams", 60, initial="rest", turns=2)
     raw["output"] = {"folder": str(tmp_path), "animation": False, "plots": False, "picture": False}
-    done = analyse(scene_from(raw))
+    done = analyse(scene_from(quick(raw)))
     assert done.balance is not None
     assert done.balance.energy > 0.02
     assert any("balance leaves over" in warning for warning in done.warnings)

@@ -42,6 +42,7 @@ frequencies = [5, 200]
 [analysis]
 turns = TURNS
 steps_per_turn = 360
+accuracy = "quick"
 [output]
 plots = false
 picture = false

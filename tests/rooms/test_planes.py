@@ -23,6 +23,7 @@ from kedfem.output.rendering import lifted
 from kedfem.output.vtu import AnimationWriter, LinkField
 from kedfem.report import check_tables
 from kedfem.scene import LinkScene, scene_from
+from tests.runs import quick
 
 from .test_dynamics import four_bar, run, slider_crank
 from .test_joints import arm, histories
@@ -337,7 +338,7 @@ def test_probes_read_two_components_and_plane_stress() -> None:
 def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) -> None:
     raw = four_bar("plane", steps_per_turn=24)
     raw["output"] = {"folder": str(tmp_path), "animation": {"frames_per_turn": 2}, "plots": False}
-    scene = scene_from(raw)
+    scene = scene_from(quick(raw))
     done = analyse(scene)
     assert done.peak is not None
     mesh = meshio.read(sorted(tmp_path.glob("*.vtu"))[-1])

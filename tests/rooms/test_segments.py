@@ -24,6 +24,7 @@ from kedfem.links.recovery import stress_recovery
 from kedfem.output.frames import link_fields
 from kedfem.report import check_tables
 from kedfem.scene import scene_from
+from tests.runs import quick
 from tests.scenes import arm, bar
 
 from .test_dynamics import four_bar
@@ -171,7 +172,7 @@ def test_a_run_tells_segments_and_draws_links(tmp_path: Path) -> None:
     raw["output"] = {"folder": str(tmp_path / "out"), "plots": False, "picture": False,
                      "animation": {"frames_per_turn": 10}}  # fmt: skip
     raw["analysis"] |= {"turns": 0.1}
-    done = analyse(scene_from(raw))
+    done = analyse(scene_from(quick(raw)))
     assert done.results.notes["segments of coupler"] == 4
     assert done.budget is not None
     assert done.budget.of("frames") is None

@@ -38,7 +38,7 @@ LARGE = 100_000  # unknowns of a model for which no companion is made: its funct
 FUNCTIONS = 1e-3  # tolerance of the companion's functions: differences of runs need no better ones
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 SLOW = 1000  # the same where no compiled loop runs them
-ORDERS = 0.4, 2.0  # between which the observed order in the step is believed
+ORDERS = 1.0, 2.0  # between which the observed order in the step is believed
 REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
 SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
 LOCAL = 0.1  # of η: stress at a point, of its peak, beside what the compliance does
@@ -172,17 +172,24 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     if steps // 4 >= max(least, 8):
         twice, four = (histories(replace(ready, scene=with_steps(ready.scene, steps // k))) for k in (2, 4))
         near, far = relative_errors(twice, base), relative_errors(four, twice)
-        return {name: near[name] / (2 ** order(far.get(name, 0.0), near[name]) - 1) for name in near}
+        return {
+            name: near[name] / (2 ** believed(observed_order(far.get(name, 0.0), near[name])) - 1)
+            for name in near
+        }
     half = histories(replace(ready, scene=with_steps(ready.scene, 2 * steps)))
     return {name: error / (1 - 2 ** -ORDERS[1]) for name, error in relative_errors(base, half).items()}
 
 
-def order(far: float, near: float) -> float:
-    """Observed order in the step from the differences of three steps, each half of the last."""
-    low, high = ORDERS
-    if near <= SLIGHT or far <= near:
-        return high if near <= SLIGHT else low
-    return min(max(math.log2(far / near), low), high)
+def observed_order(far: float, near: float) -> float:
+    """Order in the step from the differences of three steps, each half of the last; below 1 nothing converges yet."""
+    if near <= SLIGHT:
+        return ORDERS[1]
+    return math.log2(max(far, SLIGHT) / near)
+
+
+def believed(order: float) -> float:
+    """Within ORDERS: while nothing converges, two steps are as far apart as the better one is from the truth."""
+    return min(max(order, ORDERS[0]), ORDERS[1])
 
 
 def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:

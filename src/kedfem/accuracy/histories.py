@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from kedfem.accuracy.budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
-from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
@@ -31,14 +31,16 @@ class Histories:
 
 
 def histories(
-    ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None
-) -> Histories:
+    ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None,
+    look: Callable[[Block], None] = lambda block: None,
+) -> Histories:  # fmt: skip
     """Run a prepared scene and keep its channels.
 
     Parameters
     ----------
     keep : numbers of the steps whose states are kept too
     watch : called now and then; what it raises ends the run
+    look : sees every block
     """
     recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
     times, taken, kept = [], [], []
@@ -47,6 +49,7 @@ def histories(
         times.append(block.motion.t)
         taken.append(rows(recorded, block))
         watch()
+        look(block)
         kept += [block.at(k) for k in range(len(block)) if block.step + k in keep]
     channels = {
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))

@@ -1,8 +1,9 @@
 """The cheapest model of a scene that is near enough: `analysis.accuracy`.
 
-Everything is found by short trial runs of the scene itself, with reduced links: the step by halving it, the mesh by
-making it finer, segments of links with frames that follow by taking more, simpler links by putting them in. What the
-scene states stays; what it leaves open is chosen.
+Everything is found by short trial runs of the scene itself, with reduced links: whether frames must follow from how far
+links bend, beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
+meshes of hexahedra and quadrilaterals from their indicator, segments of links with frames that follow by taking more,
+simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
 """
 
 import math
@@ -13,8 +14,19 @@ from itertools import pairwise
 from typing import Any
 
 from kedfem.accuracy.cache import key
+from kedfem.accuracy.choices import (
+    DEARER,
+    chosen_beams,
+    chosen_frames,
+    chosen_meshes,
+    chosen_step,
+    distinct,
+    open_beams,
+    open_frames,
+    open_meshes,
+    open_step,
+)
 from kedfem.accuracy.segments import open_segments, with_segments
-from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
@@ -23,22 +35,17 @@ from kedfem.accuracy.variants import (
     refined,
     with_analysis,
     with_links,
-    with_steps,
 )
 from kedfem.errors import KedfemError, SceneError
-from kedfem.scene import LinkScene, Scene, time_grid
+from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
-FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried
+FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose fidelity is open
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
 )
-STEP_ORDER = 2.0
-LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
-MOST_STEPS = 200_000  # of the analysis
-TRIES = 6  # steps tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +85,27 @@ class Plan:
         return self.error <= self.asked
 
 
+def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
+    """The plan of a scene that leaves something open; None of one that asks for plain defaults or moves by itself.
+
+    Raises
+    ------
+    MotionError, MeshError, SceneError, SolveError
+        If the scene cannot be run even as it stands.
+    """
+    if scene.analysis.accuracy == "quick" or not scene.driven_joints or not anything_open(scene):
+        return None
+    return planned(scene, stage)
+
+
+def anything_open(scene: Scene) -> bool:
+    """Whether a scene leaves something for an accuracy to choose."""
+    auto = any(link.fidelity == "auto" for link in scene.links.values())
+    return auto or any(f(scene) for f in (open_frames, open_beams, open_meshes, open_step, open_segments))
+
+
 def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
-    """Choose fidelities, mesh sizes, functions and step of a scene with `analysis.accuracy`.
+    """Choose fidelities, mesh sizes, functions, frames and step of a scene with `analysis.accuracy`.
 
     Raises
     ------
@@ -87,7 +113,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
         If the scene cannot be run even as it stands.
     """
     asked = scene.analysis.accuracy
-    if asked is None:
+    if asked == "quick":
         raise ValueError("the scene asks for no accuracy")
     plan: Plan = kept("plan", key(scene), partial(_planned, scene, asked, stage), itself, itself)
     return plan
@@ -95,33 +121,50 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
 
 def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     search = Trials(asked, stage)
-    stage("plan: step")
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
-    scene, step = _with_step(search, _opened(scene, left_open))
+    scene = _opened(scene, left_open)
+    shares: list[Share] = []
+    stage("plan: frames")
+    scene, frames = chosen_frames(search, scene)
+    if frames:
+        shares.append(Share("frames", frames, DEARER * asked))
+    if not (left_open or open_beams(scene) or open_meshes(scene)):
+        search.notes.append("the scene states all meshes; the run tells their error")
+        if not open_step(scene) and not open_segments(scene):
+            return Plan(
+                with_analysis(scene, accuracy="quick"), asked, 1.0, tuple(shares), tuple(search.notes)
+            )
+    stage("plan: beams")
+    scene, beams = chosen_beams(search, scene, MESH / 2 * asked)
+    stage("plan: step")
+    scene, step = chosen_step(search, scene, STEP * asked)
     stage("plan: mesh")
     cut = SEGMENTS if open_segments(scene) else 0.0  # of the mesh's share
-    scene, mesh, finer = _with_mesh(search, scene, (MESH - cut) * max(asked, step / STEP))
+    loose = max(asked, step / STEP)
+    scene, mesh, finer = _with_mesh(search, scene, left_open, (MESH - cut) * loose)
+    scene, meshes = chosen_meshes(search, scene, MESH * loose, left_open)
     segments = 0.0
     if cut:
         stage("plan: segments")
-        scene, segments = with_segments(search, scene, SEGMENTS * max(asked, step / STEP))
+        scene, segments = with_segments(search, scene, SEGMENTS * loose)
     stage("plan: simpler links")
     scene, model = _with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
-    scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy=None)
+    scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy="quick")
     reduced = any(link.reduced for link in scene.links.values())
-    shares = (
+    mesh += beams + meshes
+    shares += [
         Share("time step", step, STEP * asked), Share("mesh", mesh, (MESH - cut) * asked),
         *([Share("segments", segments, SEGMENTS * asked)] if cut else []),
         Share("simpler links", model, max(MODEL, MESH - cut + MODEL - mesh / asked) * asked),
         Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
-    )  # fmt: skip
-    plan = Plan(scene, asked, finer, shares, ())
+    ]  # fmt: skip
+    plan = Plan(scene, asked, finer, tuple(shares), ())
     return replace(plan, notes=(*search.notes, *_limits(plan)))
 
 
 def _limits(plan: Plan) -> Iterator[str]:
     if not plan.reached:
-        limit = max(plan.shares, key=lambda share: share.error / share.allowed)
+        limit = max(plan.shares, key=lambda share: share.error)
         yield (
             f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
             f"{100 * plan.error:.2g} % is expected"
@@ -147,52 +190,22 @@ def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
     return other.model_copy(update=keep)
 
 
-def _with_step(search: Trials, scene: Scene) -> tuple[Scene, float]:
-    """The scene with the largest step whose error is within its share, and that error."""
-    allowed = STEP * search.asked
-    given = {"step", "steps_per_turn"} & scene.analysis.model_fields_set
-    fewest = max(20, math.ceil(steady if (steady := fewest_steps(scene)) < math.inf else 0.0))
-    steps, order, before = max(time_grid(scene).steps, 0 if given else fewest), STEP_ORDER, (0, math.inf)
-    for _ in range(TRIES):
-        now, half = with_steps(scene, steps), with_steps(scene, 2 * steps)
-        error = search.difference(now, half) / (1 - 2**-order)
-        if given:
-            if error > allowed:
-                search.notes.append(f"the scene states its step; its error is about {error:.2g}")
-            return scene, error
-        if before[0] and steps > before[0] and error > 0.0:
-            order = min(STEP_ORDER, math.log(before[1] / error) / math.log(steps / before[0]))
-        wanted = (error / (0.8 * allowed)) ** (1 / max(order, LEAST_ORDER))
-        if error <= allowed and (wanted > 0.5 or steps == fewest):
-            return now, error
-        if order < LEAST_ORDER or steps * min(wanted, 8.0) > MOST_STEPS:
-            search.notes.append(_unresolved(steps, error))
-            return now, error
-        before = (steps, error)
-        steps = max(fewest, math.ceil(steps * min(max(wanted, 0.25), 8.0)))
-    search.notes.append(_unresolved(before[0], error))
-    return with_steps(scene, before[0]), error
-
-
-def _unresolved(steps: int, error: float) -> str:
-    return (
-        f"the error of the time step stays at {error:.2g} with {steps} steps: the motion excites vibration beyond them "
-        "(a start from rest at full speed, a load put on at once?); a smoother start or damping would help"
-    )
-
-
-def _with_mesh(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float, float]:
-    """The scene with the coarsest mesh whose error is allowed, that error, and by what it is finer.
+def _with_mesh(
+    search: Trials, scene: Scene, left_open: list[str], allowed: float
+) -> tuple[Scene, float, float]:
+    """The scene with the coarsest mesh of links whose fidelity is open whose error is allowed, that error, and by what
+    it is finer.
 
     Where the step's error is beyond its share the mesh need not be better.
     """
     open_links = [
-        name for name, link in scene.links.items() if "mesh" not in link.model_fields_set and refinable(link)
+        name
+        for name in left_open
+        if "mesh" not in scene.links[name].model_fields_set and refinable(scene.links[name])
     ]
     if not open_links:
-        search.notes.append("the scene states all meshes; their error was not looked at")
         return scene, 0.0, 1.0
-    meshes = _distinct([(factor, _finer(scene, open_links, factor)) for factor in FINER])
+    meshes = distinct([(factor, _finer(scene, open_links, factor)) for factor in FINER])
     error = math.inf
     for (factor, now), (next_factor, finer) in pairwise(meshes):
         try:
@@ -209,12 +222,6 @@ def _with_mesh(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, flo
         error = beyond
     search.notes.append(f"the finest mesh tried still leaves an error of {error:.2g}")
     return meshes[-1][1], error, meshes[-1][0]
-
-
-def _distinct(meshes: list[tuple[float, Scene]]) -> list[tuple[float, Scene]]:
-    """Without those that are like the one before: few elements become more by whole numbers only."""
-    pairs = zip(meshes, [None, *meshes], strict=False)
-    return [now for now, before in pairs if before is None or now[1].links != before[1].links]
 
 
 def _finer(scene: Scene, names: list[str], factor: float) -> Scene:

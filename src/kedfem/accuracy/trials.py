@@ -16,10 +16,11 @@ from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import Scene, spatial_beams, time_grid
+from kedfem.scene import Ramp, Scene, spatial_beams, time_grid, turn_steps
 
 TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
 TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
+TURNS = 2  # of a trial run
 
 Stage = Callable[[str], None]
 
@@ -90,13 +91,16 @@ class Trials:
 
 
 def shortened(scene: Scene) -> Scene:
-    """The beginning of an analysis that is too long for trials."""
-    grid = time_grid(scene)
-    if grid.steps <= TRIAL_STEPS:
+    """The beginning of an analysis that is too long for trials: TURNS of a drive that turns, after it has sped up."""
+    grid, turn = time_grid(scene), turn_steps(scene)
+    span = grid.end
+    if turn is not None:
+        rises = scene.motion.time if isinstance(scene.motion, Ramp) else 0.0
+        span = min(span, rises + TURNS * turn * grid.step)
+    span = min(span, TRIAL_STEPS * grid.step)
+    if span >= grid.end * (1 - 1e-9):
         return scene
-    return with_analysis(
-        scene, end_time=TRIAL_STEPS * grid.step, turns=None, step=grid.step, steps_per_turn=None
-    )
+    return with_analysis(scene, end_time=span, turns=None, step=grid.step, steps_per_turn=None)
 
 
 def _texts(full: Prepared) -> list[str]:

@@ -16,20 +16,31 @@ def plan_tables(plan: Plan) -> list[Table]:
     for share in plan.shares:
         budget.add_row(share.what, f"{100 * share.error:.2g} %", f"{100 * share.allowed:.2g} %")
     budget.add_row("together", f"{100 * plan.error:.2g} %", f"{100 * plan.asked:.2g} %")
-    chosen = Table(title="Chosen", show_header=False)
+    return [budget, chosen_table(plan)]
+
+
+def chosen_table(plan: Plan) -> Table:
+    """What was chosen, and what was tried for it."""
+    chosen = Table(title=f"Chosen for {100 * plan.asked:.3g} %", show_header=False)
+    chosen.add_row("frames", str(plan.scene.analysis.frames))
     chosen.add_row("step", f"{time_grid(plan.scene).step:.4g} s, {time_grid(plan.scene).steps} steps")
     for name, link in plan.scene.links.items():
         chosen.add_row(name, _chosen(link))
     for note in plan.notes:
         chosen.add_row("note", Text(note))
-    return [budget, chosen]
+    return chosen
 
 
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
     mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
-    return f"{'reduced ' if link.reduced else ''}{link.fidelity}" + (f" ({mesh})" if mesh else "") + segments
+    kind = f"{link.element} " if link.element and link.fidelity != "rigid" else ""
+    return (
+        f"{'reduced ' if link.reduced else ''}{kind}{link.fidelity}"
+        + (f" ({mesh})" if mesh else "")
+        + segments
+    )
 
 
 def reduction_table(reduction: Reduction) -> Table:

@@ -7,14 +7,14 @@ from rich.text import Text
 from kedfem.accuracy.budget import Budget, percent
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, with_prefix
-from kedfem.report.plan import plan_tables
+from kedfem.report.plan import chosen_table
 from kedfem.results.audit import Balance
 from kedfem.scene import Scene
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
-    before = [] if done.plan is None else plan_tables(done.plan)
+    before = [] if done.plan is None else [chosen_table(done.plan)]
     table = Table(title=Text(scene.title or "Largest values"))
     for column in ("channel", "component", "largest", clock(scene)):
         left = column in ("channel", "component")

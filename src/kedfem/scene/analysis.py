@@ -11,6 +11,7 @@ from pydantic import (
     SerializerFunctionWrapHandler,
     StrictBool,
     StrictInt,
+    TypeAdapter,
     model_serializer,
     model_validator,
 )
@@ -23,6 +24,16 @@ from kedfem.scene.points import Point
 from kedfem.scene.units import PositiveTime, Quantity, fault
 
 Positive = Annotated[float, Quantity("1", above=0.0)]
+
+
+ACCURACY: TypeAdapter[float] = TypeAdapter(Annotated[float, Quantity("1", above=0.0, below=1.0)])
+
+
+def accuracy_or_quick(value: object) -> float | str:
+    """A relative error, or the word for plain defaults."""
+    if isinstance(value, str) and value.strip() == "quick":
+        return "quick"
+    return ACCURACY.validate_python(value)
 
 
 class Analysis(Record):
@@ -52,9 +63,10 @@ class Analysis(Record):
     the ground against the other, about or along its axis; other joints then move as little as they can"""
     initial_motions: dict[str, InitialMotion] = Field(default_factory=dict)
     """velocities of links at the start, by name of the link"""
-    accuracy: Annotated[float, Quantity("1", above=0.0, below=1.0)] | None = None
-    """relative error to aim at in probes, joint forces and the drive's torque: fidelities (of links with `fidelity =
-    "auto"`), mesh sizes, functions and step are then chosen for it; none of them is if not given"""
+    accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
+    """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
+    it by short trial runs: frames, elements, mesh sizes, segments, functions, step, and fidelities that are `"auto"`.
+    `"quick"`: plain defaults are taken instead, which `kedfem run --quick` means too"""
     reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
     """relative error that reduced links may cause there"""
     stiffening: StrictBool = False

@@ -198,9 +198,6 @@ def undriven_faults(parts: Parts) -> Iterator[str]:
     if drawn is not None and drawn.exaggeration != 1.0:
         message = "must be 1 in a scene without a drive, which has no motion that it deviates from"
         yield parts.animation.fault("exaggeration", f"{message}, got {drawn.exaggeration:g}")
-    if analysis.has("accuracy"):
-        wanted = "must be left out in a scene without a drive (trial runs need one)"
-        yield analysis.fault("accuracy", f"{wanted}, got {shown(analysis.raw['accuracy'])}")
     yield from drag_faults(parts)
 
 

@@ -102,8 +102,8 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
 def open_fidelity_faults(parts: Parts) -> Iterator[str]:
     """Links left open without saying for which accuracy."""
     for link in parts.links.values():
-        if link.word("fidelity") == "auto" and not parts.analysis.has("accuracy"):
-            yield link.fault("fidelity", "needs analysis.accuracy, e.g. 0.01, got none for 'auto'")
+        if link.word("fidelity") == "auto" and parts.analysis.word("accuracy") == "quick":
+            yield link.fault("fidelity", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
 
 
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[str]:
@@ -125,7 +125,8 @@ def steps_faults(
     for key, instead in (("turns", "end_time"), ("steps_per_turn", "step")):
         if analysis.has(key):
             yield analysis.fault(key, f"needs {wanted} (else {instead} [s]), got {got}")
-    if not any(analysis.has(key) for key in ("step", "steps_per_turn", "accuracy")):
+    stated = any(analysis.has(key) for key in ("step", "steps_per_turn"))
+    if not stated and analysis.word("accuracy") == "quick":
         yield analysis.fault("step", f"is required with {doing} [s], got {got}")
 
 

@@ -147,7 +147,10 @@ class Scene(Record):
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
         if isinstance(links := raw.get("links"), Mapping):
             raw = {**raw, "links": {name: spelt_out(link) for name, link in links.items()}}
-        if isinstance(analysis := raw.get("analysis"), Mapping) and analysis.get("accuracy") is not None:
+        if (
+            isinstance(analysis := raw.get("analysis"), Mapping)
+            and analysis.get("accuracy", "quick") != "quick"
+        ):
             raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_tables(raw, scene_folder.get())
         raw, more = with_factor_tables(raw, scene_folder.get())
