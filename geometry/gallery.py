@@ -6,7 +6,7 @@ from pathlib import Path
 from time import perf_counter
 
 from geometry import PARTS
-from kedfem.mesh import HexMesh, mesh_quality, part_mesh
+from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.report import face_kind
 from kedfem.scene import link_from
@@ -26,7 +26,7 @@ Written by `python -m geometry.gallery`: every STEP file of geometry/ with defau
 def main() -> None:
     """Mesh, measure and draw all parts."""
     os.environ["KEDFEM_CACHE"] = "off"  # or nothing would be measured
-    drawn: list[tuple[str, HexMesh]] = []
+    drawn: list[tuple[str, SolidMesh]] = []
     lines = []
     for name in PARTS:
         start = perf_counter()

@@ -6,13 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from kedfem.mesh import HexMesh
+from kedfem.mesh import SolidMesh
+from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.hexahedra import HEX8, HEX27, Face, linear, quadratic, serendipity, without_spare_nodes
+from kedfem.mesh.tetrahedra import tetrahedral
 
-FORMS = {8: linear, 20: serendipity, 27: quadratic}
+FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}
 
 
-def turned(parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, around: int = 16) -> HexMesh:
+def turned(
+    parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, around: int = 16
+) -> SolidMesh:
     """A part turned about z: hollow cylinders from low to high, from one radius (0: solid) to another [m]."""
     core = 0.5 * min(r for part in parts for r in part[2:] if r > 0)
     radii = sorted({r for part in parts for r in part[2:] if r > 0} | {core})
@@ -51,12 +55,14 @@ def turned(parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, 
         q = quads_[used] + level * len(plane)
         cells.append(np.column_stack([q, q + len(plane)]))
     swept = np.column_stack([np.tile(plane, (len(heights), 1)), np.repeat(heights, len(plane))])
-    mesh = without_spare_nodes(HexMesh(swept, np.concatenate(cells)))
+    mesh = without_spare_nodes(SolidMesh(swept, np.concatenate(cells)))
     distance = np.linalg.norm(mesh.points[:, :2], axis=1)
     return curved(mesh, nodes, distance * (distance > 0.9 * core), lambda x: x * [1, 1, 0])
 
 
-def curved(mesh: HexMesh, nodes: int, radius: np.ndarray, arm: Callable[[np.ndarray], np.ndarray]) -> HexMesh:
+def curved(
+    mesh: SolidMesh, nodes: int, radius: np.ndarray, arm: Callable[[np.ndarray], np.ndarray]
+) -> SolidMesh:
     """The mesh with more nodes, put where the corners of their edge or side are that have one radius (0: straight)."""
     out = quadratic(mesh)
     points = out.points.copy()
@@ -70,7 +76,7 @@ def curved(mesh: HexMesh, nodes: int, radius: np.ndarray, arm: Callable[[np.ndar
     return FORMS[nodes](replace(out, points=points))
 
 
-def ball_on_neck(radius: float, nodes: int = 20) -> HexMesh:
+def ball_on_neck(radius: float, nodes: int = 20) -> SolidMesh:
     """A ball about the origin with a square neck along x that is two radii long."""
     s = np.linspace(-1, 1, 5)
     grid = np.stack(np.meshgrid(s, s, s, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -91,13 +97,13 @@ def ball_on_neck(radius: float, nodes: int = 20) -> HexMesh:
             cells.append([
                 (patch if c[0] < 0 else neck)[j + (c[1] > 0), k + (c[2] > 0)] for c in HEX8
             ])  # fmt: skip
-    mesh = HexMesh(radius * np.concatenate([round_, end]), np.array(cells))
+    mesh = SolidMesh(radius * np.concatenate([round_, end]), np.array(cells))
     on = np.zeros(len(mesh.points))
     on[np.flatnonzero(size > 0.9)] = radius
     return curved(mesh, nodes, on, lambda x: x)
 
 
-def ball_seat(radius: float, nodes: int = 20) -> HexMesh:
+def ball_seat(radius: float, nodes: int = 20) -> SolidMesh:
     """A block with a ball's hollow about the origin, open towards x."""
     s = np.linspace(-1, 1, 4)
     grid = np.stack(np.meshgrid(s, s, s, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -115,17 +121,17 @@ def ball_seat(radius: float, nodes: int = 20) -> HexMesh:
                 corner = points[cell]
                 flipped = np.linalg.det(corner[[1, 3, 4]] - corner[0]) < 0
                 cells.append([cell[k] for k in (0, 3, 2, 1, 4, 7, 6, 5)] if flipped else cell)
-    mesh = HexMesh(radius * points, np.array(cells))
+    mesh = SolidMesh(radius * points, np.array(cells))
     mesh = without_spare_nodes(mesh)
     distance = np.linalg.norm(mesh.points, axis=1)
     del shell
     return curved(mesh, nodes, np.where(np.abs(distance - radius) < 1e-9, radius, 0.0), lambda x: x)
 
 
-def with_face(mesh: HexMesh, name: str, on: Callable[[np.ndarray], np.ndarray]) -> HexMesh:
+def with_face(mesh: SolidMesh, name: str, on: Callable[[np.ndarray], np.ndarray]) -> SolidMesh:
     """The mesh with a named face: the sides whose corners all fulfil a condition on their places."""
-    sides = np.concatenate([mesh.cells[:, s] for s in ([0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5],
-                                                       [2, 3, 7, 6], [3, 0, 4, 7])])  # fmt: skip
+    sides = boundary_sides(mesh.cells)
+    sides = sides[:, : side_corners(sides.shape[1])]
     sides = sides[on(mesh.points)[sides].all(axis=1)]
     nan = np.full(3, np.nan)
     face = Face(name, "other", mesh.points[sides].mean(axis=(0, 1)), nan, np.nan, False, sides)

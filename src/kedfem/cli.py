@@ -121,7 +121,7 @@ def mesh(
         int | None, typer.Option(help="Elements across the smallest width; 2 if nothing else is given.")
     ] = None,
     unknowns: Annotated[int | None, typer.Option(help="About so many unknowns.")] = None,
-    element: Annotated[str, typer.Option(metavar="KIND", help="hex27, hex20 or hex8.")] = "hex27",
+    element: Annotated[str, typer.Option(metavar="KIND", help="hex27, hex20, hex8 or tet10.")] = "hex27",
     scale: Annotated[
         float | None, typer.Option(help="Metres per unit of the file, if not its own unit.")
     ] = None,

@@ -14,7 +14,7 @@ from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.links.build import bare_link
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.scene import scene_from
 from tests import scenes
 from tests.rooms.test_dynamics import four_bar
@@ -97,7 +97,7 @@ def test_badly_shaped_elements(tmp_path: Any) -> None:
     ]
     X[inner] += rng.uniform(-1, 1, (len(inner), 3)) * [0.017, 0.013, 0.013]
     cells = link.cells[:, :8]
-    quality = mesh_quality(HexMesh(X, cells)).least
+    quality = mesh_quality(SolidMesh(X, cells)).least
     assert 0.1 < quality < 0.35
     used, numbers = np.unique(cells, return_inverse=True)
     meshio.write(tmp_path / "arm.vtu", meshio.Mesh(X[used], [("hexahedron", numbers.reshape(cells.shape))]))

@@ -13,8 +13,9 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle
 from kedfem.links.solid import solid_link
-from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
+from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
 from kedfem.mesh.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
+from kedfem.mesh.tetrahedra import tetrahedral
 from kedfem.scene import Material
 
 # shrinking is left out: a smaller seed is no simpler mesh
@@ -24,9 +25,9 @@ LAW = settings(
 VALID = 0.05  # least scaled Jacobian of a random element: det J > 0 at every node and Gauss point
 # any material serves a law; this one is not close to a special case (ν = 0, ν = 1/2)
 MATERIAL = Material(density=2700.0, youngs_modulus=70e9, poisson_ratio=0.33)
-FORMS = {8: linear, 20: serendipity, 27: quadratic}
+FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}
 
-Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
+Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
 
 seeds = st.integers(0, 2**32 - 1)
 _angles = st.floats(-3.1, 3.1, allow_nan=False)  # up to half a turn about any axis
@@ -55,7 +56,7 @@ motions = st.builds(Motion, rotations, vectors, vectors, vectors)
 
 
 @st.composite
-def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = tuple(FORMS)) -> HexMesh:
+def hexahedra(draw: st.DrawFn, nodes: tuple[int, ...] = tuple(FORMS)) -> SolidMesh:
     """One element or a patch of 2 × 2 × 1, all nodes moved at random as far as det J allows."""
     random = np.random.default_rng(draw(seeds))
     along, across = draw(st.sampled_from([(1, 1), (2, 2)]))
@@ -92,7 +93,7 @@ def distorted(mesh: Mesh, moves: np.ndarray) -> Mesh:
     raise ValueError("the mesh is not valid as it is")
 
 
-def solid(mesh: HexMesh, axes: np.ndarray | None = None) -> Link:
+def solid(mesh: SolidMesh, axes: np.ndarray | None = None) -> Link:
     return solid_link("any", mesh, MATERIAL, np.eye(3) if axes is None else axes)
 
 
@@ -100,13 +101,13 @@ def rotated(mesh: Mesh, motion: Motion) -> Mesh:
     return replace(mesh, points=motion.moved(mesh.points))
 
 
-def patch(nodes: int, random: np.random.Generator) -> HexMesh:
+def patch(nodes: int, random: np.random.Generator) -> SolidMesh:
     """2 × 2 × 2 elements of a block, all nodes moved at random."""
     mesh = FORMS[nodes](extruded(*rectangle_quads(1.0, 0.8, 2, 2), 0.6, 2))
     return distorted(mesh, 0.06 * random.uniform(-1, 1, mesh.points.shape))
 
 
-def ring(nodes: int = 27, around: int = 8) -> HexMesh:
+def ring(nodes: int = 27, around: int = 8) -> SolidMesh:
     """Hexahedra about a bore of radius 0.1 along z, outer radius 0.25, thickness 0.2."""
     radii = np.linspace(0.1, 0.25, 3)
     angle = np.arange(2 * around) * np.pi / around
@@ -118,7 +119,7 @@ def ring(nodes: int = 27, around: int = 8) -> HexMesh:
 
 
 @st.composite
-def rings(draw: st.DrawFn) -> HexMesh:
+def rings(draw: st.DrawFn) -> SolidMesh:
     """Rings of quadratic elements whose nodes off the bore are moved at random."""
     random = np.random.default_rng(draw(seeds))
     mesh = ring(draw(st.sampled_from([20, 27])))

@@ -1,4 +1,4 @@
-"""Laws of hexahedral links: det J, N, M and K0 do not depend on the frame, [KED, eqs. (4)-(14), App. A]."""
+"""Laws of solid links, hexahedra and tetrahedra: det J, N, M and K0 depend on no frame, [KED, eqs. (4)-(14), App. A]."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
 from kedfem.links.surface import surface
-from kedfem.mesh import HexMesh
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, shape_gradients
+from kedfem.mesh import SolidMesh
+from kedfem.mesh.hexahedra import NODES, shape_gradients
 from kedfem.motion.newton import cross_matrix
 from tests.laws.strategies import (
     FORMS,
@@ -35,16 +35,24 @@ ROUNDING = 1e-12  # of the largest entry: a few thousand operations in double pr
 
 def jacobians(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """J[k, j] = ∂x_k/∂ξ_j (e, q, 3, 3) at 4 × 4 × 4 Gauss points, from nodal vectors."""
-    xi = np.polynomial.legendre.leggauss(4)[0]
-    at = np.stack(np.meshgrid(xi, xi, xi, indexing="ij"), axis=-1).reshape(-1, 3)
-    gradients = shape_gradients({8: HEX8, 20: HEX20, 27: HEX27}[cells.shape[1]], at)
+    gradients = shape_gradients(NODES[cells.shape[1]], gauss(cells.shape[1])[0])
     return np.einsum("eak,qaj->eqkj", points[cells], gradients)
 
 
-def gauss_volume(mesh: HexMesh) -> float:
-    """Σ w det J with 4 Gauss points a direction: exact, det J being of degree 5 at most."""
-    w = np.polynomial.legendre.leggauss(4)[1]
+def gauss(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """4 Gauss points a direction and their weights; those of a tetrahedron are of the cube shrunk to it."""
+    xi, w = np.polynomial.legendre.leggauss(4)
+    at = np.stack(np.meshgrid(xi, xi, xi, indexing="ij"), axis=-1).reshape(-1, 3)
     weights = np.einsum("i,j,k->ijk", w, w, w).ravel()
+    if nodes != 10:
+        return at, weights
+    x, y, z = ((at + 1) / 2).T
+    return np.stack([x, y * (1 - x), z * (1 - x) * (1 - y)], axis=1), weights / 8 * (1 - x) ** 2 * (1 - y)
+
+
+def gauss_volume(mesh: SolidMesh) -> float:
+    """Σ w det J with 4 Gauss points a direction: exact, det J being of degree 5 at most."""
+    weights = gauss(mesh.cells.shape[1])[1]
     return float(np.linalg.det(jacobians(mesh.points, mesh.cells)).sum(axis=0) @ weights)
 
 
@@ -80,7 +88,7 @@ def rigid_modes(X: np.ndarray) -> np.ndarray:
 
 @LAW
 @given(hexahedra(), motions)
-def test_det_J_keeps_its_value_while_an_element_moves_rigidly(mesh: HexMesh, motion: Motion) -> None:
+def test_det_J_keeps_its_value_while_an_element_moves_rigidly(mesh: SolidMesh, motion: Motion) -> None:
     """d(det J)/dt = |A| + |B| + |C| = 0, though no single one of the three need vanish, [KED, App. A]."""
     J = jacobians(motion.moved(mesh.points), mesh.cells)
     velocity = motion.moved(mesh.points) @ cross_matrix(motion.omega).T + motion.v
@@ -99,7 +107,7 @@ def test_the_three_determinants_of_det_J_do_not_vanish_one_by_one() -> None:
 
 @LAW
 @given(hexahedra(), seeds)
-def test_the_three_determinants_give_the_rate_of_det_J_in_any_motion(mesh: HexMesh, seed: int) -> None:
+def test_the_three_determinants_give_the_rate_of_det_J_in_any_motion(mesh: SolidMesh, seed: int) -> None:
     """|A| + |B| + |C| against a central difference of det J while nodes move at random."""
     velocity = np.random.default_rng(seed).uniform(-0.1, 0.1, mesh.points.shape)
     J, rate = jacobians(mesh.points, mesh.cells), jacobians(velocity, mesh.cells)
@@ -111,14 +119,14 @@ def test_the_three_determinants_give_the_rate_of_det_J_in_any_motion(mesh: HexMe
 
 @LAW
 @given(hexahedra(), motions)
-def test_det_J_of_the_function_space_is_that_of_the_moved_mesh(mesh: HexMesh, motion: Motion) -> None:
+def test_det_J_of_the_function_space_is_that_of_the_moved_mesh(mesh: SolidMesh, motion: Motion) -> None:
     here, there = solid_basis(mesh), solid_basis(rotated(mesh, motion))
     np.testing.assert_allclose(there.dx, here.dx, rtol=0, atol=ROUNDING * here.dx.max())
 
 
 @LAW
 @given(hexahedra())
-def test_functions_sit_on_the_nodes_of_the_mesh_in_its_order(mesh: HexMesh) -> None:
+def test_functions_sit_on_the_nodes_of_the_mesh_in_its_order(mesh: SolidMesh) -> None:
     """Isoparametric: as many functions as nodes, at the same places, [KED, eqs. (4a)(4b)]."""
     link = solid(mesh)
     assert link.n == len(mesh.points)
@@ -127,7 +135,7 @@ def test_functions_sit_on_the_nodes_of_the_mesh_in_its_order(mesh: HexMesh) -> N
 
 @LAW
 @given(hexahedra(), motions, seeds)
-def test_shape_functions_do_not_depend_on_the_frame(mesh: HexMesh, motion: Motion, seed: int) -> None:
+def test_shape_functions_do_not_depend_on_the_frame(mesh: SolidMesh, motion: Motion, seed: int) -> None:
     """N by the moved element's own mapping is N of the element at rest, hence d = N g, [KED, eq. (6)]."""
     here, there = solid(mesh), solid(rotated(mesh, motion))
     np.testing.assert_allclose(there.X, motion.moved(here.X), atol=1e-13)
@@ -148,7 +156,7 @@ def test_shape_functions_do_not_depend_on_the_frame(mesh: HexMesh, motion: Motio
 
 @LAW
 @given(hexahedra(), rotations)
-def test_mass_is_the_same_in_every_frame(mesh: HexMesh, R: np.ndarray) -> None:
+def test_mass_is_the_same_in_every_frame(mesh: SolidMesh, R: np.ndarray) -> None:
     """T M Tᵀ = M, [KED, eq. (12)]."""
     link = solid(mesh)
     M, T = dense_mass(link), node_rotation(link, R)
@@ -157,14 +165,14 @@ def test_mass_is_the_same_in_every_frame(mesh: HexMesh, R: np.ndarray) -> None:
 
 @LAW
 @given(hexahedra(), motions)
-def test_mass_does_not_change_while_the_mesh_moves_rigidly(mesh: HexMesh, motion: Motion) -> None:
+def test_mass_does_not_change_while_the_mesh_moves_rigidly(mesh: SolidMesh, motion: Motion) -> None:
     here, there = dense_mass(solid(mesh)), dense_mass(solid(rotated(mesh, motion)))
     np.testing.assert_allclose(there, here, atol=ROUNDING * here.max())
 
 
 @LAW
 @given(hexahedra())
-def test_mass_is_symmetric_positive_definite_and_of_the_right_sum(mesh: HexMesh) -> None:
+def test_mass_is_symmetric_positive_definite_and_of_the_right_sum(mesh: SolidMesh) -> None:
     """Σ m = ρV, V by an independent quadrature of det J; the first moment is Σ m X = ρ ∫ X dV."""
     link = solid(mesh)
     m = link.mass[0].toarray()
@@ -182,7 +190,7 @@ def test_mass_is_symmetric_positive_definite_and_of_the_right_sum(mesh: HexMesh)
 
 @LAW
 @given(hexahedra())
-def test_six_rigid_modes_cause_no_elastic_force(mesh: HexMesh) -> None:
+def test_six_rigid_modes_cause_no_elastic_force(mesh: SolidMesh) -> None:
     link = solid(mesh)
     forces = link.K0 @ rigid_modes(link.X)
     assert np.linalg.norm(forces) < ROUNDING * sp.linalg.norm(link.K0)
@@ -190,7 +198,7 @@ def test_six_rigid_modes_cause_no_elastic_force(mesh: HexMesh) -> None:
 
 @LAW
 @given(hexahedra())
-def test_stiffness_is_symmetric_and_semidefinite_with_exactly_six_zeros(mesh: HexMesh) -> None:
+def test_stiffness_is_symmetric_and_semidefinite_with_exactly_six_zeros(mesh: SolidMesh) -> None:
     K = solid(mesh).K0.toarray()
     assert np.abs(K - K.T).max() < ROUNDING * np.abs(K).max()
     values = np.linalg.eigvalsh(K)
@@ -201,7 +209,7 @@ def test_stiffness_is_symmetric_and_semidefinite_with_exactly_six_zeros(mesh: He
 
 @LAW
 @given(hexahedra(), motions)
-def test_stiffness_of_the_turned_mesh_is_the_turned_stiffness(mesh: HexMesh, motion: Motion) -> None:
+def test_stiffness_of_the_turned_mesh_is_the_turned_stiffness(mesh: SolidMesh, motion: Motion) -> None:
     """K = T K0 Tᵀ, [KED, eq. (14)], by assembling anew, by block rotation and by the dense product."""
     here, there = solid(mesh), solid(rotated(mesh, motion))
     K, T = rotated_stiffness(here.K0, motion.R).toarray(), node_rotation(here, motion.R)
@@ -213,7 +221,7 @@ def test_stiffness_of_the_turned_mesh_is_the_turned_stiffness(mesh: HexMesh, mot
 @LAW
 @given(hexahedra(), motions, seeds)
 def test_strain_energy_and_stresses_do_not_depend_on_the_frame(
-    mesh: HexMesh, motion: Motion, seed: int
+    mesh: SolidMesh, motion: Motion, seed: int
 ) -> None:
     """½ δᵀ K δ = ½ gᵀ K0 g with δ = T g, [KED, eq. (13)]; stresses in link axes turn with the link."""
     here, there = solid(mesh), solid(rotated(mesh, motion), axes=motion.R)
@@ -240,7 +248,7 @@ def test_a_linear_displacement_is_held_by_the_surface_alone(nodes: int, seed: in
     forces, scale = (link.K0 @ g.ravel()).reshape(-1, 3), np.abs(link.K0).max() * np.abs(g).max()
     on = surface(link, link.basis.mesh.boundary_facets())
     inside = np.setdiff1d(np.arange(link.n), on.dofs[np.abs(on.N).max(axis=1) > ROUNDING])
-    assert len(inside) == {8: 1, 20: 7, 27: 27}[nodes]
+    assert len(inside) == {8: 1, 10: 27, 20: 7, 27: 27}[nodes]
     assert np.abs(forces[inside]).max() < ROUNDING * scale
     stress = stress_of_gradient(H[None], link)
     tolerance = 1e-11 * np.abs(stress).max()
@@ -261,7 +269,7 @@ def test_20_functions_on_27_node_geometry_would_strain_in_a_rigid_turn() -> None
 
 @LAW
 @given(hexahedra())
-def test_rigid_modes_cause_no_stress(mesh: HexMesh) -> None:
+def test_rigid_modes_cause_no_stress(mesh: SolidMesh) -> None:
     link = solid(mesh)
     rows = point_rows(link, "here", link.X[link.basis.element_dofs[:, 0]].mean(axis=0)).stress
     assert np.abs(rows @ rigid_modes(link.X)).max() < 1e-11 * np.abs(rows.toarray()).max()
@@ -269,7 +277,7 @@ def test_rigid_modes_cause_no_stress(mesh: HexMesh) -> None:
 
 @settings(LAW, max_examples=6)  # the vector form is slow
 @given(hexahedra(), st.floats(-0.5, 0.45))
-def test_stiffness_is_that_of_the_vector_form(mesh: HexMesh, nu: float) -> None:
+def test_stiffness_is_that_of_the_vector_form(mesh: SolidMesh, nu: float) -> None:
     """Six scalar matrices against scikit-fem's own linear elasticity on the vector-valued element."""
     basis = solid_basis(mesh)
     lame = (nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu)))  # E = 1 Pa

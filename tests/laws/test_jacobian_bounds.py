@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError
-from kedfem.mesh import HexMesh, checked_mesh, mesh_quality
+from kedfem.mesh import SolidMesh, checked_mesh, mesh_quality
 from kedfem.mesh.bounds import determinant_bounds, valid_everywhere
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, QUAD9, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, QUAD9, shape_gradients
+from kedfem.mesh.simplices import TET10
 from tests.laws.strategies import LAW, hexahedra, seeds
 
-KINDS = st.sampled_from([HEX8, HEX20, HEX27, QUAD9])
+KINDS = st.sampled_from([HEX8, TET10, HEX20, HEX27, QUAD9])
 ROUNDING = 1e-11  # of the mean of |det J|: 216 terms, and a change of basis whose condition is near 1e3
 
 
@@ -24,11 +25,19 @@ def elements(nodes: np.ndarray, size: float, seed: int) -> tuple[np.ndarray, np.
 
 def sampled(points: np.ndarray, cells: np.ndarray, count: int = 13) -> np.ndarray:
     """det J on a grid of count^d places that holds the corners, by the nodes' gradients; (e, q)."""
-    nodes = {9: QUAD9, 8: HEX8, 20: HEX20, 27: HEX27}[cells.shape[1]]
-    line = np.linspace(-1, 1, count)
-    grid = np.stack(np.meshgrid(*[line] * nodes.shape[1], indexing="ij"), axis=-1)
-    gradients = shape_gradients(nodes, grid.reshape(-1, nodes.shape[1]))
+    nodes = NODES[cells.shape[1]]
+    gradients = shape_gradients(nodes, grid(nodes, np.linspace(-1, 1, count)))
     return np.linalg.det(np.einsum("eak,qaj->eqkj", points[cells], gradients))
+
+
+def grid(nodes: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Places in an element, of a tetrahedron those of its cube that are in it too."""
+    places = np.stack(np.meshgrid(*[line] * nodes.shape[1], indexing="ij"), axis=-1).reshape(
+        -1, nodes.shape[1]
+    )
+    if len(nodes) != len(TET10):
+        return places
+    return ((places + 1) / 2)[places.sum(axis=1) <= -1 + 1e-12]
 
 
 @LAW
@@ -53,14 +62,13 @@ def test_without_halving_the_bound_is_below_the_least_sample(nodes, size, seed):
     points, cells = elements(nodes, size, seed)
     lower, _ = determinant_bounds(points, cells, depth=0)
     values = sampled(points, cells)
-    ends = -np.cos(np.pi * np.arange(6) / 5) if len(nodes) > 9 else None
     if (
-        ends is None
-    ):  # the scale is the mean over the places that are sampled inside; of these two kinds only the sign
+        len(nodes) <= 10
+    ):  # the scale is the mean over the places that are sampled inside; of these only the sign
         assert (values.min(axis=1)[lower > 0] > 0).all()
         return
-    grid = np.stack(np.meshgrid(ends, ends, ends, indexing="ij"), axis=-1).reshape(-1, 3)
-    J = np.einsum("eak,qaj->eqkj", points[cells], shape_gradients(nodes, grid))
+    ends = -np.cos(np.pi * np.arange(6) / 5)
+    J = np.einsum("eak,qaj->eqkj", points[cells], shape_gradients(nodes, grid(nodes, ends)))
     scale = abs(np.linalg.det(J)).mean(axis=1)
     assert (lower <= values.min(axis=1) / scale + ROUNDING).all()
 
@@ -94,10 +102,10 @@ def test_cheap_test_passes_nothing_that_the_bounds_do_not(nodes, size, seed):
     assert (valid_everywhere(points, cells) == (determinant_bounds(points, cells)[0] > 0)).all()
 
 
-def folded_between() -> HexMesh:
+def folded_between() -> SolidMesh:
     """A hex27 with a scaled Jacobian of 0.28 at its nodes and Gauss points and det J < 0 between: one of 6,000 tried."""
     moves = np.random.default_rng(4193).uniform(-0.3, 0.3, HEX27.shape)
-    return HexMesh(HEX27 + moves, np.arange(27)[None])
+    return SolidMesh(HEX27 + moves, np.arange(27)[None])
 
 
 def test_an_element_folded_between_the_places_that_are_sampled_is_refused():

@@ -8,7 +8,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.links.bodies import euler_tensor, inertia_of, with_body, with_point_mass
 from kedfem.links.record import Link, mass_times
 from kedfem.links.seats import Seat, face_seat, joint_seat, port_weights, surface_weights
-from kedfem.mesh import HexMesh
+from kedfem.mesh import SolidMesh
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 from tests.laws.strategies import (
@@ -66,7 +66,7 @@ def point_acceleration(motion: Motion, alpha: np.ndarray, p2: np.ndarray, X: np.
 @LAW
 @given(hexahedra(), motions, vectors, vectors)
 def test_inertia_load_of_a_solid_is_literally_minus_M_R0(
-    mesh: HexMesh, motion: Motion, alpha: np.ndarray, p2: np.ndarray
+    mesh: SolidMesh, motion: Motion, alpha: np.ndarray, p2: np.ndarray
 ) -> None:
     """m·1 and m·X serve in place of M R0'' at the nodes, [KED, eq. (17)]."""
     link = solid(mesh)
@@ -101,7 +101,7 @@ def bore(link: Link, motion: Motion) -> Seat:
 @LAW
 @given(rings(), motions, seeds)
 def test_port_weights_of_a_bore_sum_to_one_and_reproduce_affine_fields(
-    mesh: HexMesh, motion: Motion, seed: int
+    mesh: SolidMesh, motion: Motion, seed: int
 ) -> None:
     link = solid(rotated(mesh, motion))
     random = np.random.default_rng(seed)
@@ -114,7 +114,7 @@ def test_port_weights_of_a_bore_sum_to_one_and_reproduce_affine_fields(
 
 @LAW
 @given(rings(), motions, seeds)
-def test_port_weights_commute_with_rotation(mesh: HexMesh, motion: Motion, seed: int) -> None:
+def test_port_weights_commute_with_rotation(mesh: SolidMesh, motion: Motion, seed: int) -> None:
     """Weights of the moved link are those of the link at rest, and scalar: W (u Rᵀ) = (W u) Rᵀ."""
     rest = Motion(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
     random = np.random.default_rng(seed)
@@ -127,7 +127,7 @@ def test_port_weights_commute_with_rotation(mesh: HexMesh, motion: Motion, seed:
     np.testing.assert_allclose(W_moved @ (g @ motion.R.T), (W @ g) @ motion.R.T, atol=1e-11)
 
 
-@pytest.mark.parametrize("nodes", [20, 27])
+@pytest.mark.parametrize("nodes", [10, 20, 27])
 @LAW
 @given(motions)
 def test_surface_weights_of_a_face_sum_to_its_area(nodes: int, motion: Motion) -> None:
@@ -151,7 +151,7 @@ def kinetic_energy(link: Link, velocity: np.ndarray) -> float:
 @LAW
 @given(rings(), motions, vectors, seeds)
 def test_kinetic_energy_with_a_body_is_that_of_link_and_rigid_body(
-    mesh: HexMesh, motion: Motion, centre: np.ndarray, seed: int
+    mesh: SolidMesh, motion: Motion, centre: np.ndarray, seed: int
 ) -> None:
     """T = T_link + ½ m v² + ½ ω · I ω in any rigid motion, I turned with the link."""
     rest = Motion(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
@@ -189,7 +189,7 @@ def test_kinetic_energy_of_a_beam_with_a_body_on_its_node(beam: Beam, motion: Mo
 @LAW
 @given(rings(), motions, seeds)
 def test_kinetic_energy_with_a_slider_is_that_of_link_and_point_mass(
-    mesh: HexMesh, motion: Motion, seed: int
+    mesh: SolidMesh, motion: Motion, seed: int
 ) -> None:
     rest = Motion(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
     link = solid(mesh)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kedfem.errors import MeshError
-from kedfem.mesh import HexMesh, checked_mesh, link_mesh, quads, session
+from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, quads, session
 from kedfem.mesh.hexahedra import HEX8, HEX27
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
@@ -83,14 +83,14 @@ class TestMeshFile:
 
     @pytest.mark.parametrize(
         ("kind", "nodes", "got"),
-        [("tetra", 4, "1 tetra"), ("tetra10", 10, "1 tetra10"), ("quad", 4, "no solid elements")],
+        [("wedge", 6, "1 wedge"), ("pyramid", 5, "1 pyramid"), ("quad", 4, "no solid elements")],
     )
     def test_other_elements(self, tmp_path, kind, nodes, got):
         points = (HEX27[:nodes] + 1) / 2
         message = mesh_file(tmp_path, points, [(kind, np.arange(nodes)[None])])
         assert message == (
-            "links.arm.shape.file: must hold hexahedra of one kind (hexahedron, hexahedron20, hexahedron27), "
-            f"got {got} in {tmp_path / 'arm.vtu'}"
+            "links.arm.shape.file: must hold elements of one kind (tetra, hexahedron, tetra10, hexahedron20, "
+            f"hexahedron27), got {got} in {tmp_path / 'arm.vtu'}"
         )
 
     def test_hexahedra_beside_other_elements(self, tmp_path):
@@ -155,7 +155,7 @@ class TestMeshFile:
 def test_quality_below_the_gate_names_the_element():
     points = np.concatenate([HEX8 * 1.0, HEX8[[1, 2, 5, 6]] + [2.0, 0, 0]])
     points[8:] += [0, 20, 0]  # the second element is sheared to an angle of atan(0.1)
-    mesh = HexMesh(points, np.stack([np.arange(8), [1, 8, 9, 2, 5, 10, 11, 6]]))
+    mesh = SolidMesh(points, np.stack([np.arange(8), [1, 8, 9, 2, 5, 10, 11, 6]]))
     with pytest.raises(MeshError) as caught:
         checked_mesh("links.rocker", mesh, 0.1)
     assert str(caught.value) == (

@@ -15,7 +15,7 @@ from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.hexahedra import Face, HexMesh
+from kedfem.mesh.hexahedra import Face, SolidMesh
 from kedfem.scene.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, written
 
@@ -25,7 +25,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return parts_in(tmp_path_factory.mktemp("cad"))
 
 
-def subdivided(gmsh: ModuleType, size: float, folder: Path) -> HexMesh:
+def subdivided(gmsh: ModuleType, size: float, folder: Path) -> SolidMesh:
     """The solid in the model as 27-node hexahedra with curved sides: any mesh will do."""
     for key, value in (("MeshSizeMax", size), ("SubdivisionAlgorithm", 2), ("ElementOrder", 2)):
         gmsh.option.setNumber(f"Mesh.{key}", value)
@@ -34,12 +34,12 @@ def subdivided(gmsh: ModuleType, size: float, folder: Path) -> HexMesh:
     return mesh_from_file("mesh", folder / "mesh.msh", 1.0)
 
 
-def meshed(folder: Path, path: Path, size: float) -> tuple[Solid, HexMesh]:
+def meshed(folder: Path, path: Path, size: float) -> tuple[Solid, SolidMesh]:
     with solid_model(KEYS, path, "rod", Cad(file=path.name)) as (gmsh, solid):
         return solid, with_faces(gmsh, solid, subdivided(gmsh, size, folder))
 
 
-def area(mesh: HexMesh, face: Face) -> float:
+def area(mesh: SolidMesh, face: Face) -> float:
     return float(side_normals(mesh.points, face.sides)[2].sum())
 
 

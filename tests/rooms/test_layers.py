@@ -10,7 +10,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.hexahedra import HEX27, shape_functions, shape_gradients
@@ -184,7 +184,7 @@ def solid_record(gmsh: ModuleType, name: str = "part") -> Solid:
 
 def meshed(
     part: Part, sizing: Sizing | None = None, turn: tuple[float, ...] = (), scale: float = 1
-) -> HexMesh:
+) -> SolidMesh:
     """The mesh of a part, which may be turned about an axis by an angle and moved far away."""
     with part_in_gmsh(part, turn) as (gmsh, solid):
         return layered_mesh(gmsh, solid, sizing or Sizing())
@@ -211,7 +211,7 @@ class part_in_gmsh:  # noqa: N801  (a context manager)
             yield gmsh, solid_record(gmsh)
 
 
-def figures(mesh: HexMesh) -> tuple[float, np.ndarray, np.ndarray]:
+def figures(mesh: SolidMesh) -> tuple[float, np.ndarray, np.ndarray]:
     """Volume, centre and inertia about it, by 4³ Gauss points: det J has degree 5, with two coordinates 9."""
     x, w = np.polynomial.legendre.leggauss(4)
     at = np.stack(np.meshgrid(x, x, x, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -224,7 +224,7 @@ def figures(mesh: HexMesh) -> tuple[float, np.ndarray, np.ndarray]:
     return float(dx.sum()), centre, np.trace(second) * np.eye(3) - second
 
 
-def assert_same_body(mesh: HexMesh, gmsh: ModuleType, tolerance: float) -> None:
+def assert_same_body(mesh: SolidMesh, gmsh: ModuleType, tolerance: float) -> None:
     """Volume, centre and inertia as OpenCASCADE integrates them over the solid itself."""
     occ, [(_, tag)] = gmsh.model.occ, gmsh.model.getEntities(3)
     volume, centre, inertia = figures(mesh)
@@ -235,7 +235,7 @@ def assert_same_body(mesh: HexMesh, gmsh: ModuleType, tolerance: float) -> None:
     assert_allclose(inertia, true_inertia, rtol=0, atol=tolerance * abs(true_inertia).max())
 
 
-def assert_conforming(mesh: HexMesh) -> None:
+def assert_conforming(mesh: SolidMesh) -> None:
     """Each side of an element is another's too or on the surface, which is closed: no hanging nodes, no gaps."""
     loops = mesh.cells[:, SIDES].reshape(-1, 4)
     _, number, count = np.unique(np.sort(loops, axis=1), axis=0, return_inverse=True, return_counts=True)

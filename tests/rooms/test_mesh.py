@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
 from kedfem.links.solid import solid_basis
-from kedfem.mesh import HexMesh, Quality, checked_mesh, link_mesh, mesh_quality
+from kedfem.mesh import Quality, SolidMesh, checked_mesh, link_mesh, mesh_quality
 from kedfem.mesh.hexahedra import (
     HEX8,
     HEX20,
@@ -38,18 +38,20 @@ GEOMETRY = Path(__file__).parents[2] / "geometry"
 PARTS = {"connecting_rod": 0.18, "crank_web": 0.05, "piston": 0.04}
 
 
-def meshed(folder: Path = HERE, element: str = "hex27", mesh: dict | None = None, **shape: object) -> HexMesh:
+def meshed(
+    folder: Path = HERE, element: str = "hex27", mesh: dict | None = None, **shape: object
+) -> SolidMesh:
     return link_mesh("arm", LinkScene(shape=shape, element=element, mesh=mesh or {}), folder)
 
 
-def volume(mesh: HexMesh) -> float:
+def volume(mesh: SolidMesh) -> float:
     """By scikit-fem, which has its own node order and shape functions."""
     dx = solid_basis(mesh).dx
     assert (dx > 0).all()
     return float(dx.sum())
 
 
-def conforming(mesh: HexMesh) -> bool:
+def conforming(mesh: SolidMesh) -> bool:
     """Whether no face has more than two elements and the closed surface's faces meet in pairs at edges."""
     faces = np.array([[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
     sides, count = np.unique(np.sort(mesh.cells[:, faces].reshape(-1, 4), axis=1), axis=0, return_counts=True)
@@ -60,7 +62,7 @@ def conforming(mesh: HexMesh) -> bool:
     return bool(count.max() <= 2 and (np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
-def bore_nodes(mesh: HexMesh, centre: tuple[float, float], radius: float) -> np.ndarray:
+def bore_nodes(mesh: SolidMesh, centre: tuple[float, float], radius: float) -> np.ndarray:
     """Distances from a bore's axis of the nodes on its wall; none may be inside."""
     distance = np.hypot(*(mesh.points[:, :2] - centre).T)
     assert distance.min() > radius * (1 - 1e-10)
@@ -133,7 +135,7 @@ class TestBar:
         assert_allclose(mesh_quality(mesh).scaled_jacobian, 1, rtol=1e-12)
 
 
-def meshed_upright() -> HexMesh:
+def meshed_upright() -> SolidMesh:
     """A bar along z; scenes refuse it, for `width` has no direction there, but frames must not fail."""
     from kedfem.mesh.hexahedra import extruded, frame_along, placed, rectangle_quads
 
@@ -213,7 +215,7 @@ def plate_shape(L: float, w: float, eye: float, bore: float) -> dict:
     }  # fmt: skip
 
 
-def plate(*sizes: float, across: int = 2, layers: int = 1) -> HexMesh:
+def plate(*sizes: float, across: int = 2, layers: int = 1) -> SolidMesh:
     return meshed(**plate_shape(*sizes), mesh={"elements_across": across, "layers": layers})
 
 
@@ -381,7 +383,7 @@ class TestElements:
         """The 27 functions hold those of 8 and 20 nodes: the same det J, hence the same volume."""
         mesh = {"linear": linear, "serendipity": serendipity}[name](plate(*PLATES[1]))
         random = np.random.default_rng(0)
-        moved = HexMesh(mesh.points + 2e-4 * random.uniform(-1, 1, mesh.points.shape), mesh.cells)
+        moved = SolidMesh(mesh.points + 2e-4 * random.uniform(-1, 1, mesh.points.shape), mesh.cells)
         full = quadratic(moved)
         assert_array_equal(full.points[full.cells[:, : mesh.cells.shape[1]]], moved.points[moved.cells])
         assert len(full.points) == len(quadratic(linear(mesh)).points)
@@ -407,7 +409,7 @@ class TestQuality:
     def test_of_a_skewed_box_is_the_sine_of_its_angle(self):
         points = HEX27 + 0.0
         points[:, 0] += points[:, 1] / math.tan(math.radians(30))
-        mesh = HexMesh(points, np.arange(27)[None])
+        mesh = SolidMesh(points, np.arange(27)[None])
         assert_allclose(mesh_quality(mesh).least, math.sin(math.radians(30)), rtol=1e-12)
 
     def test_names_the_worst_element_and_its_centre(self):
@@ -417,7 +419,7 @@ class TestQuality:
         points = mesh.points.copy()
         corner = np.flatnonzero((abs(points - [1, 0.05, 0.05]) < 1e-12).all(axis=1))
         points[corner] -= [0.05, 0.02, 0.02]
-        quality = mesh_quality(HexMesh(points, mesh.cells))
+        quality = mesh_quality(SolidMesh(points, mesh.cells))
         assert isinstance(quality, Quality)
         assert quality.worst == 3
         assert_allclose(quality.centre, [0.875, 0, 0], atol=0.01)
@@ -426,14 +428,14 @@ class TestQuality:
     def test_sees_an_element_that_is_folded_between_good_corners(self):
         points = HEX27 + 0.0
         points[24] = [0, 0, 1.6]  # the middle of the lower face, above the upper one
-        assert mesh_quality(HexMesh(points, np.arange(27)[None])).least < 0
+        assert mesh_quality(SolidMesh(points, np.arange(27)[None])).least < 0
 
     def test_sees_a_20_node_element_that_is_folded_within_a_face(self):
         points = HEX20 + 0.0
         points[8:12, 2] = 0.05  # the middle of the lower face, −Σ/4 + Σ/2, is at 1.1, above the upper face
         own = np.linalg.det(np.swapaxes(shape_gradients(HEX20, 1.0 * HEX20), 1, 2) @ points)
         assert own.min() > 0.4
-        assert_allclose(mesh_quality(HexMesh(points, np.arange(20)[None])).least, -1, rtol=1e-12)
+        assert_allclose(mesh_quality(SolidMesh(points, np.arange(20)[None])).least, -1, rtol=1e-12)
 
     def test_lets_good_meshes_pass(self):
         mesh = plate(*PLATES[0])
@@ -560,7 +562,7 @@ class TestSession:
             gmsh.finalize()
 
     def test_works_in_threads(self):
-        made: list[HexMesh] = []
+        made: list[SolidMesh] = []
         shape = extrusion_shape(*OUTLINES[2])
         threads = [threading.Thread(target=lambda: made.append(meshed(**shape))) for _ in range(2)]
         for thread in threads:

@@ -16,7 +16,7 @@ from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
 from kedfem.links.seats import joint_seat
-from kedfem.mesh import HexMesh, QuadMesh, link_mesh, mesh_quality, plane_mesh
+from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.picture import write_picture
 from kedfem.output.rendering import lifted
@@ -46,7 +46,7 @@ SHAPES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def both(kind: str, **link: Any) -> tuple[QuadMesh, HexMesh]:
+def both(kind: str, **link: Any) -> tuple[QuadMesh, SolidMesh]:
     shape, mesh = SHAPES[kind]
     folder = ROOT / "geometry"
     plane = LinkScene(shape=shape, mesh=mesh, fidelity="plane", **link)

@@ -7,26 +7,26 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from kedfem.errors import MeshError
-from kedfem.mesh import HexMesh, checked_mesh, mesh_quality
+from kedfem.mesh import SolidMesh, checked_mesh, mesh_quality
 from kedfem.mesh.hexahedra import HEX8, Face
 
 #: Columns of unit cubes along x, the upper side of each moved along y: scaled Jacobian cos of the angle of shear.
 SHEARS = (0.0, 1.0, 3.0, 20.0)
 
 
-def sheared() -> HexMesh:
+def sheared() -> SolidMesh:
     """Four elements apart from each other, sheared by 0, 1, 3 and 20: 1, 0.71, 0.32 and 0.05."""
     cubes = [(HEX8 + 1) / 2 + [2.0 * i, 0, 0] for i in range(len(SHEARS))]
     for cube, shear in zip(cubes, SHEARS, strict=True):
         cube[4:, 1] += shear
-    return HexMesh(np.concatenate(cubes), np.arange(8 * len(SHEARS)).reshape(-1, 8))
+    return SolidMesh(np.concatenate(cubes), np.arange(8 * len(SHEARS)).reshape(-1, 8))
 
 
 def face(name: str, kind: str, radius: float, sides: list[list[int]]) -> Face:
     return Face(name, kind, np.zeros(3), np.array([0, 0, 1.0]), radius, True, np.array(sides))
 
 
-def refusal(mesh: HexMesh, least: float) -> str:
+def refusal(mesh: SolidMesh, least: float) -> str:
     with pytest.raises(MeshError) as caught:
         checked_mesh("links.arm", mesh, least)
     return str(caught.value)
@@ -43,7 +43,7 @@ def test_worst_elements_come_worst_first_with_their_places():
 def test_histogram_counts_every_element_once():
     points = sheared().points.copy()
     points[:8, 2] *= -1  # the first is mirrored
-    edges, counts = mesh_quality(HexMesh(points, sheared().cells)).histogram(10)
+    edges, counts = mesh_quality(SolidMesh(points, sheared().cells)).histogram(10)
     assert len(edges) == len(counts) + 1 == 12
     assert_array_equal(np.flatnonzero(counts), [0, 1, 4, 8])  # below 0; 0.05; 1/√10; 1/√2
     assert counts.sum() == 4

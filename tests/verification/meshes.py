@@ -7,7 +7,7 @@ import numpy as np
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
-from kedfem.mesh import HexMesh, QuadMesh
+from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
 from kedfem.scene import Material
 
@@ -18,7 +18,7 @@ PlaneMapping = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 def mapped_mesh(
     counts: tuple[int, int, int], mapping: Mapping, nodes: int = 27, closed: bool = False
-) -> HexMesh:
+) -> SolidMesh:
     """counts elements along the unit cube's coordinates (r, s, t), each node at mapping(r, s, t).
 
     closed : the face r = 1 is the face r = 0 again, as in a ring.
@@ -34,7 +34,7 @@ def mapped_mesh(
         index[..., 0] %= size[0] - 1
     cells = np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), tuple(size))
     used, renumbered = np.unique(cells, return_inverse=True)
-    mesh = HexMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
+    mesh = SolidMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
     return serendipity(mesh) if nodes == 20 else mesh
 
 

@@ -21,7 +21,7 @@ from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.links.seats import Seat, joint_seat
 from kedfem.links.solid import solid_link
-from kedfem.mesh import HexMesh, link_mesh
+from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.hexahedra import linear, quadratic, serendipity
 from kedfem.scene import Bar, LinkScene, Material, Meshing, PlateLink
 
@@ -102,13 +102,13 @@ def _meshing(size: Size) -> Meshing:
     return Meshing(elements_across=size[0], layers=size[1])
 
 
-def _moved(mesh: HexMesh, part: float, counts: Size) -> HexMesh:
+def _moved(mesh: SolidMesh, part: float, counts: Size) -> SolidMesh:
     """A box's hex8 mesh with its corners moved at random, within the faces that they lie on."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     spacing = (high - low) / counts
     inside = (mesh.points > low + 1e-6 * spacing) & (mesh.points < high - 1e-6 * spacing)
     moves = part * spacing * np.random.default_rng(1).uniform(-1, 1, mesh.points.shape)
-    return HexMesh(mesh.points + inside * moves, mesh.cells)
+    return SolidMesh(mesh.points + inside * moves, mesh.cells)
 
 
 def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]]:

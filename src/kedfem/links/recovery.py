@@ -22,6 +22,7 @@ from kedfem.links.spatial_recovery import (
     section_stress,
     section_value,
 )
+from kedfem.mesh.simplices import barycentric
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
@@ -192,8 +193,11 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
 
 
 def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarray, "m q"]]:
-    """Reduced Gauss points in [0, 1]ᵈ and the matrix that extends values there to the element's nodes."""
+    """Reduced Gauss points of the reference element and the matrix that extends values there to the element's nodes."""
     d, at_nodes = link.d, np.asarray(link.basis.elem.doflocs)  # (m, d)
+    if _simplex(link):
+        b = np.full((4, 4), (5 - np.sqrt(5)) / 20) + np.eye(4) / np.sqrt(5)  # barycentric, of degree 2
+        return b[:, 1:].T, barycentric(at_nodes) @ np.linalg.inv(b)
     if len(at_nodes) == 2**d:
         return np.full((d, 1), 0.5), np.ones((len(at_nodes), 1))
     a = np.array([0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)])
@@ -233,7 +237,7 @@ def _stress_rows(link: Link, gradient: list[sp.csr_array]) -> sp.csr_array:
 
 
 def _shapes(link: Link, local: Float[np.ndarray, " d"]) -> tuple[np.ndarray, np.ndarray]:
-    """N (m,) and dN (m, d) of an element at local coordinates in [0, 1]ᵈ."""
+    """N (m,) and dN (m, d) of an element at local coordinates."""
     pairs = [link.basis.elem.lbasis(local[:, None], i) for i in range(len(link.basis.element_dofs))]
     return np.array([float(np.ravel(N)[0]) for N, _ in pairs]), np.array([np.ravel(dN) for _, dN in pairs])
 
@@ -245,7 +249,7 @@ def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[
     low, high = corners.min(axis=0), corners.max(axis=0)
     outside = np.linalg.norm(np.maximum(np.maximum(low - point, point - high), 0), axis=1)
     size = np.ptp(link.X, axis=0).max()
-    best, gap, at = -1, np.inf, np.full(link.d, 0.5)
+    best, gap, at = -1, np.inf, np.full(link.d, 0.25)
     for element in np.argsort(outside, kind="stable")[:64]:
         if outside[element] > gap:
             break
@@ -261,15 +265,28 @@ def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[
 def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, " d"]) -> Float[np.ndarray, " d"]:
     """Newton for the isoparametric map, kept within the element."""
     x = link.X[link.basis.element_dofs[:, element], : link.d]
-    local = np.full(link.d, 0.5)
+    local = np.full(link.d, 0.25 if _simplex(link) else 0.5)
     for _ in range(30):
         N, dN = _shapes(link, local)
         change = np.linalg.lstsq(x.T @ dN, point - N @ x, rcond=None)[0]
-        moved = np.clip(local + change, 0.0, 1.0)
+        moved = _within(local + change) if _simplex(link) else np.clip(local + change, 0.0, 1.0)
         if np.abs(moved - local).max() < 1e-14:
             break
         local = moved
     return local
+
+
+def _simplex(link: Link) -> bool:
+    """Whether a link is of tetrahedra."""
+    return link.cell_type == "tetra10"
+
+
+def _within(local: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """The place in the reference tetrahedron whose barycentric coordinates are nearest."""
+    b = barycentric(local)
+    falling = np.sort(b)[::-1]
+    excess = (np.cumsum(falling) - 1) / np.arange(1, 5)
+    return np.asarray(np.maximum(b - excess[np.flatnonzero(falling > excess)[-1]], 0.0)[1:])
 
 
 def _beam_rows(

@@ -21,7 +21,7 @@ from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import spatial_beam_link
-from kedfem.mesh import HexMesh, QuadMesh
+from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.hexahedra import Face
 from kedfem.scene import Material
 
@@ -136,7 +136,7 @@ def _slice(
         part = plane_link(link.name, QuadMesh(link.X[used], cells, link.thickness), material, link.axes)
     else:
         faces = _slice_faces(link, elements, used)
-        part = solid_link(link.name, HexMesh(link.X[used], cells, faces, link.way), material, link.axes)
+        part = solid_link(link.name, SolidMesh(link.X[used], cells, faces, link.way), material, link.axes)
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
     assert distance.max() <= SAME * link.size  # noqa: S101

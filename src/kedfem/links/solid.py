@@ -1,5 +1,6 @@
-"""Hexahedral solid links: six scalar forms, and everything else follows. The only wall to scikit-fem, with `surface`.
+"""Solid links of hexahedra or tetrahedra: six scalar forms, and all else follows.
 
+The only wall to scikit-fem, with `surface`.
 [KED, eqs. (4), (9), (11), (13)]; the same functions interpolate geometry and displacement (isoparametric).
 """
 
@@ -13,11 +14,12 @@ from jaxtyping import Float, Int
 from skfem.io.meshio import HEX_MAPPING
 
 from kedfem.links.record import Link, LinkFace, Mass, mass_constants, read_only
-from kedfem.mesh import HexMesh
+from kedfem.mesh import SolidMesh
 from kedfem.mesh.hexahedra import CELL_TYPES
 from kedfem.scene import Material
 
-QUADRATURE_ORDER = {8: 3, 20: 5, 27: 5}  # 2³ and 3³ Gauss points: the volume of a distorted element is exact
+#: 2³, 3³ and 14 Gauss points: the volume of a distorted element is exact, as is ∫ ∂_i N_a of a curved tetrahedron.
+QUADRATURE_ORDER = {8: 3, 10: 5, 20: 5, 27: 5}
 
 
 @dataclass(repr=False)
@@ -28,18 +30,20 @@ class MeshHexS2(skfem.MeshHex1):  # type: ignore[misc]
     elem: type[skfem.Element] = skfem.ElementHexS2
 
 
-MESHES = {8: skfem.MeshHex1, 20: MeshHexS2, 27: skfem.MeshHex2}
+MESHES = {8: skfem.MeshHex1, 10: skfem.MeshTet2, 20: MeshHexS2, 27: skfem.MeshHex2}
+#: Of each node in scikit-fem's order its place in VTK's; those of tetrahedra are the same.
+ORDERS = {nodes: HEX_MAPPING[:nodes] for nodes in (8, 20, 27)} | {10: list(range(10))}
 
 
-def solid_basis(mesh: HexMesh) -> skfem.Basis:
-    """Isoparametric function space of a hexahedral mesh, [KED, eqs. (4a)(4b)].
+def solid_basis(mesh: SolidMesh) -> skfem.Basis:
+    """Isoparametric function space of a mesh, [KED, eqs. (4a)(4b)].
 
     Parameters
     ----------
-    mesh : 8-, 20- or 27-node hexahedra [m]
+    mesh : 8-, 20- or 27-node hexahedra, or 10-node tetrahedra [m]
     """
     nodes = mesh.cells.shape[1]
-    order = np.argsort(HEX_MAPPING[:nodes])
+    order = np.argsort(ORDERS[nodes])
     fem_mesh = MESHES[nodes](np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.cells.T[order]))
     return skfem.Basis(fem_mesh, fem_mesh.elem(), intorder=QUADRATURE_ORDER[nodes])
 
@@ -47,7 +51,7 @@ def solid_basis(mesh: HexMesh) -> skfem.Basis:
 def vtk_cells(basis: skfem.Basis) -> Int[np.ndarray, "e m"]:
     """Elements as rows of function numbers in VTK's node order."""
     dofs = basis.element_dofs
-    return np.ascontiguousarray(dofs[HEX_MAPPING[: len(dofs)]].T)
+    return np.ascontiguousarray(dofs[ORDERS[len(dofs)]].T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,11 +138,11 @@ def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:
     return np.asarray(turned.data)
 
 
-def link_faces(basis: skfem.Basis, mesh: HexMesh) -> tuple[LinkFace, ...]:
+def link_faces(basis: skfem.Basis, mesh: SolidMesh) -> tuple[LinkFace, ...]:
     """Faces of a mesh that have names, as facets of its function space, whose first functions are those of corners."""
     if not mesh.faces:
         return ()
-    corners = np.unique(mesh.cells[:, :8])
+    corners = np.unique(mesh.cells[:, : basis.elem.refdom.nnodes])
     facets = basis.mesh.boundary_facets()
     keys = np.sort(basis.mesh.facets[:, facets].T, axis=1)
     number = {tuple(key): int(facet) for key, facet in zip(keys.tolist(), facets, strict=True)}
@@ -150,13 +154,13 @@ def link_faces(basis: skfem.Basis, mesh: HexMesh) -> tuple[LinkFace, ...]:
     return tuple(out)
 
 
-def solid_link(name: str, mesh: HexMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
-    """The record of a hexahedral link.
+def solid_link(name: str, mesh: SolidMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
+    """The record of a solid link.
 
     Parameters
     ----------
     name : key of the link in the scene
-    mesh : hexahedra in the reference position
+    mesh : hexahedra or tetrahedra in the reference position
     material : ρ, E, ν
     axes : (3, 3) columns are the link axes
     """

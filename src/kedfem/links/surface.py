@@ -10,6 +10,7 @@ import scipy.sparse as sp
 import skfem
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
+from skfem.quadrature import get_quadrature
 
 from kedfem.links.record import Link
 
@@ -37,14 +38,11 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     """
     mesh, elem = link.basis.mesh, link.basis.elem
     elements = mesh.f2t[0, facets]
-    local = np.argmax(
-        mesh.t[: 2**link.d, elements][:, None] == mesh.facets[:, facets][None], axis=0
-    )  # (c, f)
-    corners = np.asarray(elem.doflocs)[local]  # (c, f, d)
-    fixed = np.ptp(corners, axis=0).argmin(axis=1)
-    face = 2 * fixed + corners[0, np.arange(len(facets)), fixed].astype(int)
+    corners = mesh.t[: elem.refdom.nnodes, elements]
+    on = (corners[:, None] == mesh.facets[:, facets][None]).any(axis=1)  # (c, f) which corners a facet has
+    face = (1 << np.arange(len(corners))) @ on
     dofs = link.basis.element_dofs[:, elements].T
-    gauss = 4 ** (link.d - 1)
+    gauss = len(_facet_rule(elem)[1])
     x, normals, dA, N = (
         np.empty((len(facets), gauss, 3)),
         np.empty((len(facets), gauss, 3)),
@@ -53,7 +51,7 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     )
     for which in np.unique(face):
         here = face == which
-        shape, gradient, weights = _face_functions(elem, which // 2, which % 2)
+        shape, gradient, weights = _face_functions(elem, on[:, here.argmax()])
         nodes = link.X[dofs[here]]
         tangents = np.einsum("qmk,fmj->kfqj", gradient, nodes)
         N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
@@ -66,18 +64,37 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     return Surface(x, dA, N, dofs, normals)
 
 
-def _face_functions(elem: skfem.Element, fixed: int, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on one face of [0, 1]ᵈ."""
+def _face_functions(
+    elem: skfem.Element, on: Bool[np.ndarray, " c"]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on the facet with some corners."""
+    corners = np.asarray(elem.doflocs)[: len(on)][on]
+    places, weights = _facet_rule(elem)
+    first, edges = corners.min(axis=0), np.eye(elem.dim)[np.ptp(corners, axis=0) > 0]
+    if _simplex(elem):
+        first, edges = corners[0], corners[1:] - corners[0]
+    points = first[:, None] + edges.T @ places
+    pairs = [elem.lbasis(points, i) for i in range(len(elem.doflocs))]
+    shape = np.stack([np.broadcast_to(N, points.shape[1]) for N, _ in pairs], axis=1)
+    gradient = np.stack([(edges @ np.broadcast_to(dN, points.shape)).T for _, dN in pairs], axis=1)
+    return shape, gradient, weights
+
+
+def _simplex(elem: skfem.Element) -> bool:
+    """Whether an element is a tetrahedron."""
+    return bool(elem.refdom is skfem.refdom.RefTet)
+
+
+def _facet_rule(elem: skfem.Element) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points (d − 1, q) and weights (q,) of a facet in [0, 1]ᵈ⁻¹: 4 a direction, of a triangle of degree 8."""
+    if _simplex(elem):
+        places, weights = get_quadrature(skfem.refdom.RefTri, 8)
+        return np.asarray(places), np.asarray(weights)
     r, w = np.polynomial.legendre.leggauss(4)
     r, w = (r + 1) / 2, w / 2
-    d = elem.dim
-    across, q = [k for k in range(d) if k != fixed], 4 ** (d - 1)
-    points = np.full((d, q), float(side))
-    points[across] = np.stack(np.meshgrid(*[r] * (d - 1), indexing="ij")).reshape(d - 1, q)
-    pairs = [elem.lbasis(points, i) for i in range(len(elem.doflocs))]
-    shape = np.stack([np.broadcast_to(N, q) for N, _ in pairs], axis=1)
-    gradient = np.stack([np.asarray(dN)[across].T for _, dN in pairs], axis=1)
-    return shape, gradient, w if d == 2 else np.outer(w, w).ravel()
+    if elem.dim == 2:
+        return r[None], w
+    return np.stack(np.meshgrid(r, r, indexing="ij")).reshape(2, -1), np.outer(w, w).ravel()
 
 
 def boundary(
@@ -87,12 +104,13 @@ def boundary(
     mesh = link.basis.mesh
     facets = mesh.boundary_facets()
     corners = link.X[mesh.facets[:, facets]].transpose(1, 0, 2)
-    inner = link.X[mesh.t[: 2**link.d, mesh.f2t[0, facets]]].mean(axis=0)
+    inner = link.X[mesh.t[: link.basis.elem.refdom.nnodes, mesh.f2t[0, facets]]].mean(axis=0)
     edges = corners[:, 1:] - corners[:, :1]
     if link.d == 2:
         crosses = np.cross(edges, [0.0, 0.0, 1.0])
     else:  # the four corners of a facet may be numbered in any order: two largest independent edges span it
-        crosses = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in ((0, 1), (1, 2), (0, 2))], axis=1)
+        pairs = ((0, 1), (1, 2), (0, 2)) if edges.shape[1] == 3 else ((0, 1),)
+        crosses = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in pairs], axis=1)
     largest = np.linalg.norm(crosses, axis=2).argmax(axis=1)
     normal = crosses[np.arange(len(facets)), largest]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -1,15 +1,15 @@
-"""Meshes of links: hexahedra with 8, 20 or 27 nodes, quadrilaterals with 9; the only room that speaks to gmsh."""
+"""Meshes of links: hexahedra (8, 20, 27 nodes), tetrahedra (10), quadrilaterals (9); no other room speaks to gmsh."""
 
 from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import Face, HexMesh
+from kedfem.mesh.hexahedra import Face, SolidMesh
 from kedfem.mesh.link import link_mesh, part_mesh, plane_mesh
 from kedfem.mesh.quality import Quality, checked_mesh, mesh_quality
 
 __all__ = [
     "Face",
-    "HexMesh",
     "QuadMesh",
     "Quality",
+    "SolidMesh",
     "checked_mesh",
     "link_mesh",
     "mesh_quality",

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import HEX27, HexMesh, node_numbers, without_spare_nodes
+from kedfem.mesh.hexahedra import HEX27, SolidMesh, node_numbers, without_spare_nodes
 from kedfem.mesh.quality import mesh_quality
 from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
@@ -23,7 +23,7 @@ _OPTIONS: dict[str, float] = {
 }
 
 
-def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
+def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """Hexahedra of a solid that is a block: six faces with four edges each, of any form.
 
     Parameters
@@ -38,7 +38,7 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
 
     Returns
     -------
-    HexMesh
+    SolidMesh
         27-node elements, the nodes of the surface on the solid's own faces.
 
     Raises
@@ -53,7 +53,7 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
             mesh = _transfinite(copy, groups, counts)
         except Exception as error:  # gmsh raises nothing more special
             raise OtherWayError(f"{solid.name}: one block must be mapped, got from gmsh: {error}") from error
-    mesh = HexMesh(
+    mesh = SolidMesh(
         solid.extent * mesh.points,
         mesh.cells,
         way="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
@@ -115,7 +115,7 @@ def _turn(gmsh: ModuleType, edge: int) -> float:
     return float(np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1)).sum())
 
 
-def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) -> HexMesh:
+def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) -> SolidMesh:
     """gmsh's mapped mesh of second order, in VTK's order of nodes."""
     model = gmsh.model.mesh
     for group, count in zip(groups, counts, strict=True):
@@ -133,7 +133,13 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
     if list(kinds) != [_HEX27]:
         raise OtherWayError("other elements than hexahedra")
     points, tags = numbered_nodes(gmsh)
-    cells = np.searchsorted(tags, nodes[0]).reshape(-1, len(HEX27))
+    return gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, len(HEX27)))
+
+
+def gmsh_hexahedra(
+    gmsh: ModuleType, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]
+) -> SolidMesh:
+    """The mesh of hexahedra whose nodes are in gmsh's order."""
     return _right_handed(points, cells[:, _from_gmsh(gmsh)])
 
 
@@ -143,9 +149,9 @@ def _from_gmsh(gmsh: ModuleType) -> list[int]:
     return node_numbers(theirs, HEX27)
 
 
-def _right_handed(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> HexMesh:
+def _right_handed(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> SolidMesh:
     """The mesh, mirrored in its elements if gmsh has numbered them the other way round."""
-    mesh = without_spare_nodes(HexMesh(points, cells))
+    mesh = without_spare_nodes(SolidMesh(points, cells))
     if (mesh_quality(mesh).scaled_jacobian < 0).all():
-        mesh = HexMesh(mesh.points, mesh.cells[:, node_numbers(HEX27, HEX27 * [-1, 1, 1])])
+        mesh = SolidMesh(mesh.points, mesh.cells[:, node_numbers(HEX27, HEX27 * [-1, 1, 1])])
     return mesh

@@ -1,17 +1,19 @@
 """Bounds of det J over whole elements, between the nodes and Gauss points too.
 
-det J of a hex27 is a polynomial of degree 5 in each reference coordinate (hex8: 2; quad9: 3). Its Bernstein
+det J of a hex27 is a polynomial of degree 5 in each reference coordinate (hex8: 2; quad9: 3), of a tet10 one of degree
+3 in all together. Its Bernstein
 coefficients bound it from both sides, and halving the element brings them as near to it as need be: A. Johnen,
 J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013) 359-372.
 """
 
 from functools import cache, reduce
-from math import comb
+from math import comb, factorial, prod
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.mesh.hexahedra import HEX8, HEX20, NODES, QUAD9, shape_gradients
+from kedfem.mesh.simplices import EDGES, TET10
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache
 _DEPTH = (
@@ -31,8 +33,8 @@ def determinant_bounds(
     ----------
     points : (n, d) [m]
         Nodes, in the plane (d = 2) or in space.
-    cells : (e, 9), (e, 8), (e, 20) or (e, 27)
-        quad9, hex8, hex20 or hex27 in VTK order.
+    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10)
+        quad9, hex8, hex20, hex27 or tet10 in VTK order.
     depth : int
         Most halvings.
 
@@ -126,6 +128,8 @@ def _tables(
     k: int,
 ) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
     """Gradients at the places where det J is sampled; from its values its coefficients; from those the halves'."""
+    if k == len(TET10):
+        return _tetrahedron_tables()
     nodes, p = NODES[k], _degree(k)
     d, ends = nodes.shape[1], -np.cos(np.pi * np.arange(p + 1) / p)
     places = np.stack(np.meshgrid(*[ends] * d, indexing="ij"), axis=-1).reshape(-1, d)
@@ -138,9 +142,37 @@ def _tables(
 @cache
 def _ends(k: int) -> Int[np.ndarray, " v"]:
     """The coefficients that are values: those at the corners."""
+    if k == len(TET10):
+        return np.flatnonzero((_LATTICE == _CUBIC).any(axis=1))
     p, d = _degree(k), NODES[k].shape[1]
     grid = np.stack(np.meshgrid(*[np.arange(p + 1)] * d, indexing="ij"), axis=-1).reshape(-1, d)
     return np.flatnonzero(((grid == 0) | (grid == p)).all(axis=1))
+
+
+_CUBIC = 3  # degree of det J of a tet10
+_LATTICE = np.array(
+    [(_CUBIC - i - j - k, i, j, k) for i, j, k in np.ndindex(4, 4, 4) if i + j + k <= _CUBIC]
+)  # exponents of its Bernstein polynomials
+
+
+@cache
+def _tetrahedron_tables() -> tuple[
+    Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]
+]:
+    """`_tables` of a tet10: its halves are the eight tetrahedra between its corners and the middles of its edges."""
+    samples = _LATTICE / _CUBIC
+    inverse = np.linalg.inv(_simplex_bernstein(samples))
+    corners = np.concatenate([np.eye(4), np.eye(4)[EDGES].mean(axis=1)])
+    eighths = [(0, 4, 6, 7), (1, 5, 4, 8), (2, 6, 5, 9), (3, 7, 9, 8)]
+    eighths += [(4, 9, a, b) for a, b in ((5, 6), (6, 7), (7, 8), (8, 5))]  # about the edge between 4 and 9
+    pieces = [inverse @ _simplex_bernstein(samples @ corners[list(eighth)]) for eighth in eighths]
+    return shape_gradients(TET10, samples[:, 1:]), inverse, np.concatenate(pieces).T
+
+
+def _simplex_bernstein(b: Float[np.ndarray, "q 4"]) -> Float[np.ndarray, "q c"]:
+    """The Bernstein polynomials of degree 3 of a tetrahedron at barycentric coordinates."""
+    often = [factorial(_CUBIC) // prod(map(factorial, exponents)) for exponents in _LATTICE.tolist()]
+    return np.asarray(often * np.prod(b[:, None] ** _LATTICE, axis=2))
 
 
 @cache

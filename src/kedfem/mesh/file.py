@@ -1,4 +1,4 @@
-"""Meshes of hexahedra from files, through meshio."""
+"""Meshes of hexahedra or tetrahedra from files, through meshio."""
 
 import contextlib
 import io
@@ -13,32 +13,32 @@ from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
 from kedfem.mesh.groups import named_faces
-from kedfem.mesh.hexahedra import CELL_TYPES, HexMesh, without_spare_nodes
+from kedfem.mesh.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
 
 _ACCEPTED = tuple(CELL_TYPES.values())
 
 
-def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
-    """The hexahedra of a mesh file, nodes that none of them uses left out.
+def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
+    """The hexahedra or tetrahedra of a mesh file, nodes that none of them uses left out.
 
     Parameters
     ----------
     where : str
         What the file is for, for messages.
     path : Path
-        Any format that meshio reads. Points and lines in it are passed over; groups of quadrilaterals on the
-        outside (physical groups of gmsh, sets of cells) become the mesh's `faces`.
+        Any format that meshio reads. Points and lines in it are passed over; groups of quadrilaterals or triangles on
+        the outside (physical groups of gmsh, sets of cells) become the mesh's `faces`.
     scale : float [m]
         Length of the file's unit.
 
     Raises
     ------
     MeshError
-        No such file, not readable, other cells than hexahedra of one kind, coordinates that are not finite,
+        No such file, not readable, other cells than hexahedra or tetrahedra of one kind, coordinates that are not finite,
         nodes that do not exist, several pieces that share no nodes.
     """
     raw = _read(where, path)
-    cells = _hexahedra(where, path, raw)
+    cells = _solid_cells(where, path, raw)
     points = np.asarray(raw.points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"{where}: nodes must have three coordinates, got shape {points.shape} in {path}")
@@ -54,7 +54,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> HexMesh:
             f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
         )
     faces = named_faces(raw, scale * points, cells)
-    mesh = without_spare_nodes(HexMesh(scale * points, cells, faces))
+    mesh = without_spare_nodes(SolidMesh(scale * points, cells, faces))
     pieces = _pieces(mesh)
     if pieces > 1:
         raise MeshError(
@@ -88,8 +88,8 @@ def _read(where: str, path: Path) -> Any:
         ) from error
 
 
-def _hexahedra(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
-    """The cells of the one kind of hexahedra in a file."""
+def _solid_cells(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
+    """The cells of the one kind of hexahedra or tetrahedra in a file."""
     found: dict[str, int] = {}
     for block in raw.cells:
         if block.dim == 3:
@@ -97,10 +97,10 @@ def _hexahedra(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
     if len(found) == 1 and (kind := next(iter(found))) in _ACCEPTED and found[kind]:
         return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
     got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
-    raise MeshError(f"{where}: must hold hexahedra of one kind ({', '.join(_ACCEPTED)}), got {got} in {path}")
+    raise MeshError(f"{where}: must hold elements of one kind ({', '.join(_ACCEPTED)}), got {got} in {path}")
 
 
-def _pieces(mesh: HexMesh) -> int:
+def _pieces(mesh: SolidMesh) -> int:
     """Number of groups of elements that share no nodes."""
     n, (e, k) = len(mesh.points), mesh.cells.shape
     incidence = sp.csr_array((np.ones(e * k), mesh.cells.ravel(), np.arange(0, e * k + 1, k)), shape=(e, n))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import HexMesh, extruded, placed
+from kedfem.mesh.hexahedra import SolidMesh, extruded, placed
 from kedfem.mesh.plane import Quads
 
 
@@ -54,7 +54,7 @@ class Plate:
     axes: Float[np.ndarray, "3 3"]
 
 
-def swept_mesh(plate: Plate, layers: int) -> HexMesh:
+def swept_mesh(plate: Plate, layers: int) -> SolidMesh:
     """hex27 mesh of a plate, with that many elements through its thickness."""
     return placed(extruded(*plate.quads, plate.thickness, layers), plate.origin, plate.axes)
 

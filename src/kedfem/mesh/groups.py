@@ -1,4 +1,4 @@
-"""Named groups of faces in mesh files: what meshio reads as physical groups or sets of quadrilaterals."""
+"""Named groups of faces in mesh files: what meshio reads as physical groups or sets of sides."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.forms import Sample, fitted_form
-from kedfem.mesh.cad.sides import boundary_sides, side_normals
+from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
 from kedfem.mesh.hexahedra import Face
 
 _ACCURACY = (
@@ -20,7 +20,7 @@ _PHYSICAL = "gmsh:physical"
 def named_faces(
     raw: Any, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
 ) -> tuple[Face, ...]:
-    """The groups of quadrilaterals in a mesh file that lie on the outside of its hexahedra.
+    """The groups of quadrilaterals or triangles in a mesh file that lie on the outside of its elements.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def named_faces(
         As it was read.
     points : (n, 3) [m]
         All nodes of the file.
-    cells : (e, 8), (e, 20) or (e, 27)
-        The hexahedra, with the file's numbers of nodes.
+    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10)
+        The elements, with the file's numbers of nodes.
 
     Returns
     -------
@@ -37,10 +37,11 @@ def named_faces(
         With the file's numbers of nodes; groups without a side on the outside are left out.
     """
     sides = boundary_sides(cells)
-    keys = {tuple(corners): i for i, corners in enumerate(np.sort(sides[:, :4], axis=1).tolist())}
+    corners = side_corners(sides.shape[1])
+    keys = {tuple(each): i for i, each in enumerate(np.sort(sides[:, :corners], axis=1).tolist())}
     faces = []
-    for name, quads in _groups(raw):
-        on = {keys.get(tuple(corners), -1) for corners in np.sort(quads, axis=1).tolist()} - {-1}
+    for name, found in _groups(raw, corners):
+        on = {keys.get(tuple(each), -1) for each in np.sort(found, axis=1).tolist()} - {-1}
         if on:
             faces.append(group_face(name, points, sides[sorted(on)]))
     return tuple(faces)
@@ -55,24 +56,32 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
         Of the group.
     points : (n, 3) [m]
         Nodes.
-    sides : (f, 4), (f, 8) or (f, 9)
-        Nodes of the sides, in the order of quad9, seen from outside.
+    sides : (f, 4), (f, 8), (f, 9), (f, 3) or (f, 6)
+        Nodes of the sides, in the order of quad9 or tri6, seen from outside.
     """
     places, normals, areas = side_normals(points, sides)
     form = fitted_form(Sample(points[np.unique(sides)], places, normals), _ACCURACY, _SKEW)
     centroid = areas @ places / areas.sum()
     centre = centroid if form.kind in ("plane", "other") else form.centre
-    return Face(name, form.kind, centre, form.direction, form.radius, form.inward, sides[:, :4])
+    return Face(
+        name,
+        form.kind,
+        centre,
+        form.direction,
+        form.radius,
+        form.inward,
+        sides[:, : side_corners(sides.shape[1])],
+    )
 
 
-def _groups(raw: Any) -> Iterator[tuple[str, Int[np.ndarray, "q 4"]]]:
-    """Each group's name and its quadrilaterals' corners, in the order of the names."""
-    found: dict[str, list[Int[np.ndarray, "q 4"]]] = {}
+def _groups(raw: Any, count: int) -> Iterator[tuple[str, Int[np.ndarray, "q c"]]]:
+    """Each group's name and the corners of its sides of so many, in the order of the names."""
+    found: dict[str, list[Int[np.ndarray, "q c"]]] = {}
     names = {int(number): name for name, (number, dim) in raw.field_data.items() if dim == 2}
     for i, block in enumerate(raw.cells):
-        if not block.type.startswith("quad"):
+        if not block.type.startswith("quad" if count == 4 else "triangle"):
             continue
-        corners = np.asarray(block.data)[:, :4].astype(np.int64)
+        corners = np.asarray(block.data)[:, :count].astype(np.int64)
         if _PHYSICAL in raw.cell_data:
             numbers = np.asarray(raw.cell_data[_PHYSICAL][i]).astype(int)
             for number in np.unique(numbers[numbers > 0]).tolist():

@@ -1,11 +1,12 @@
-"""Hexahedral meshes: the record, the elements' shape functions, extrusion of plane quadrilaterals."""
+"""Meshes of solids: the record, the elements' shape functions; hexahedra by extrusion of plane quadrilaterals."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
+
+from kedfem.mesh.simplices import TET10, TRI6, simplex_functions, simplex_gradients
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 _SIDES = ((0, -1), (1, 0), (0, 1), (-1, 0))
@@ -24,14 +25,19 @@ HEX27: Int[np.ndarray, "27 3"] = np.array(
 HEX20: Int[np.ndarray, "20 3"] = HEX27[:20]
 HEX8: Int[np.ndarray, "8 3"] = HEX27[:8]
 
-CELL_TYPES = {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}  # meshio's names
-
-
-#: Reference coordinates of the nodes of an element that has so many.
-NODES: dict[int, Int[np.ndarray, "k d"]] = {len(nodes): nodes for nodes in (QUAD9, HEX8, HEX20, HEX27)}
+CELL_TYPES = {
+    4: "tetra",
+    8: "hexahedron",
+    10: "tetra10",
+    20: "hexahedron20",
+    27: "hexahedron27",
+}  # meshio's names
 
 
 Places = Float[np.ndarray, "_ d"] | Int[np.ndarray, "_ d"]
+
+#: Reference coordinates of the nodes of an element that has so many.
+NODES: dict[int, Places] = {len(nodes): nodes for nodes in (QUAD9, HEX8, TET10, HEX20, HEX27)}
 
 
 def node_numbers(nodes: Places, at: Places) -> list[int]:
@@ -57,7 +63,7 @@ class Face:
         Of a cylinder or sphere; else nan.
     inward : bool
         Whether the material is outside of a cylinder or sphere: a bore or a seat, not a journal or a ball.
-    sides : (f, 4)
+    sides : (f, 4), of tetrahedra (f, 3)
         Corner nodes of the sides of elements on the face, in any order.
     """
 
@@ -67,19 +73,19 @@ class Face:
     direction: Float[np.ndarray, "3"]
     radius: float
     inward: bool
-    sides: Int[np.ndarray, "f 4"]
+    sides: Int[np.ndarray, "f c"]
 
 
 @dataclass(frozen=True, slots=True)
-class HexMesh:
-    """A mesh of hexahedra alone, every node used; the arrays are read-only copies.
+class SolidMesh:
+    """A mesh of hexahedra alone or of tetrahedra alone, every node used; the arrays are read-only copies.
 
     Attributes
     ----------
     points : (n, 3) [m]
         Nodes in the global reference position.
-    cells : (e, 8), (e, 20) or (e, 27)
-        Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27).
+    cells : (e, 8), (e, 20), (e, 27), (e, 10) or (e, 4)
+        Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27, tetra10, tetra).
     faces : tuple of Face
         Faces that have a name, as far as they are known.
     way : str
@@ -99,17 +105,22 @@ class HexMesh:
 
     @property
     def cell_type(self) -> str:
-        """The cells' name in meshio: hexahedron, hexahedron20 or hexahedron27."""
+        """The cells' name in meshio."""
         return CELL_TYPES[self.cells.shape[1]]
 
+    @property
+    def tetrahedra(self) -> bool:
+        """Whether the elements are tetrahedra."""
+        return self.cells.shape[1] in {4, 10}
 
-def shape_functions(nodes: Int[np.ndarray, "k d"], at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k"]:
-    """N_a of an element: tensor-product Lagrange, or serendipity for HEX20.
+
+def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k"]:
+    """N_a of an element: tensor-product Lagrange, serendipity for HEX20, quadratic on a simplex.
 
     Parameters
     ----------
-    nodes : (k, d) in {-1, 0, 1}
-        Reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9).
+    nodes : (k, d)
+        Reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6).
     at : (q, d) [-]
         Where the values are wanted, reference coordinates.
 
@@ -119,13 +130,13 @@ def shape_functions(nodes: Int[np.ndarray, "k d"], at: Float[np.ndarray, "q d"])
         One value per place and function.
     """
     x = np.asarray(at, dtype=float)
+    if len(nodes) in {len(TET10), len(TRI6)}:
+        return simplex_functions(x)
     product = np.prod([line for line, _ in _factors(nodes, x)], axis=0)
     return np.asarray(product * _brackets(nodes, x)[0])
 
 
-def shape_gradients(
-    nodes: Int[np.ndarray, "k d"], at: Float[np.ndarray, "q d"]
-) -> Float[np.ndarray, "q k d"]:
+def shape_gradients(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k d"]:
     """∂N_a/∂ξ_j of the functions of :func:`shape_functions`.
 
     Returns
@@ -134,6 +145,8 @@ def shape_gradients(
         One gradient per place and shape function.
     """
     x = np.asarray(at, dtype=float)
+    if len(nodes) in {len(TET10), len(TRI6)}:
+        return simplex_gradients(x)
     bracket, slope = _brackets(nodes, x)
     factors = _factors(nodes, x)
     product = np.prod([line for line, _ in factors], axis=0)
@@ -143,7 +156,7 @@ def shape_gradients(
 
 
 def _factors(
-    nodes: Int[np.ndarray, "k d"], x: Float[np.ndarray, "q d"]
+    nodes: Places, x: Float[np.ndarray, "q d"]
 ) -> list[tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k"]]]:
     """Of each direction the factor of every N_a, and its derivative."""
     linear_ends = (1 - x) / 2, (1 + x) / 2
@@ -157,7 +170,7 @@ def _factors(
 
 
 def _brackets(
-    nodes: Int[np.ndarray, "k d"], x: Float[np.ndarray, "q d"]
+    nodes: Places, x: Float[np.ndarray, "q d"]
 ) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
     """What makes a serendipity corner vanish at the middles of its edges, (Σ ξ_j ξ_aj − 2), and its gradient."""
     corner = (nodes != 0).all(axis=1) & (len(nodes) == len(HEX20))
@@ -192,7 +205,7 @@ def rectangle_quads(
 
 def extruded(
     points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], thickness: float, layers: int
-) -> HexMesh:
+) -> SolidMesh:
     """hex27 mesh of a plate: plane quad9 cells swept over -thickness/2 ≤ z ≤ thickness/2.
 
     Parameters
@@ -208,7 +221,7 @@ def extruded(
 
     Returns
     -------
-    HexMesh
+    SolidMesh
         e · layers elements; nodes level by level from below.
     """
     heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
@@ -220,7 +233,7 @@ def stacked(
     heights: Float[np.ndarray, " v"],
     quads: Int[np.ndarray, "e 9"],
     layer: Int[np.ndarray, " e"],
-) -> HexMesh:
+) -> SolidMesh:
     """hex27 elements on plane quad9 cells, each in a layer between heights; nodes level by level, maybe unused ones.
 
     Parameters
@@ -236,10 +249,10 @@ def stacked(
     """
     nodes = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
     levels = 2 * layer[:, None] + 1 + HEX27[:, 2]
-    return HexMesh(nodes, quads[:, node_numbers(QUAD9, HEX27[:, :2])] + len(points) * levels)
+    return SolidMesh(nodes, quads[:, node_numbers(QUAD9, HEX27[:, :2])] + len(points) * levels)
 
 
-def quadratic(mesh: HexMesh) -> HexMesh:
+def quadratic(mesh: SolidMesh) -> SolidMesh:
     """The 27-node hexahedra of the same form, where the element's own functions put the nodes that it has not."""
     e, k = mesh.cells.shape
     if k == len(HEX27):
@@ -253,7 +266,7 @@ def quadratic(mesh: HexMesh) -> HexMesh:
     return replace(mesh, points=np.concatenate([mesh.points, places[first]]), cells=cells)
 
 
-def serendipity(mesh: HexMesh) -> HexMesh:
+def serendipity(mesh: SolidMesh) -> SolidMesh:
     """The 20-node hexahedra with the same corners and edges, nodes within faces and cells dropped."""
     if mesh.cells.shape[1] == len(HEX20):
         return mesh
@@ -261,23 +274,19 @@ def serendipity(mesh: HexMesh) -> HexMesh:
     return without_spare_nodes(replace(full, cells=full.cells[:, : len(HEX20)]))
 
 
-def linear(mesh: HexMesh) -> HexMesh:
+def linear(mesh: SolidMesh) -> SolidMesh:
     """The 8-node hexahedra with the same corners, other nodes dropped."""
     return without_spare_nodes(replace(mesh, cells=mesh.cells[:, : len(HEX8)]))
 
 
-#: Which mesh each element wants.
-FORMS: dict[str, Callable[[HexMesh], HexMesh]] = {"hex8": linear, "hex20": serendipity, "hex27": quadratic}
-
-
-def without_spare_nodes(mesh: HexMesh) -> HexMesh:
+def without_spare_nodes(mesh: SolidMesh) -> SolidMesh:
     """The mesh with nodes that no cell uses left out, the others kept in their order."""
     used, renumbered = np.unique(mesh.cells, return_inverse=True)
     faces = tuple(replace(face, sides=np.searchsorted(used, face.sides)) for face in mesh.faces)
     return replace(mesh, points=mesh.points[used], cells=renumbered.reshape(mesh.cells.shape), faces=faces)
 
 
-def placed(mesh: HexMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> HexMesh:
+def placed(mesh: SolidMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> SolidMesh:
     """The mesh moved rigidly: its x, y, z run along the rows of `axes` from `origin` [m]."""
     faces = tuple(
         replace(face, centre=origin + face.centre @ axes, direction=face.direction @ axes)

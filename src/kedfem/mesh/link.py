@@ -9,12 +9,13 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.file import mesh_from_file
 from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, placed, rectangle_quads
+from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, rectangle_quads
 from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
 from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
 from kedfem.mesh.quads import quad_mesh
 from kedfem.mesh.quality import checked_mesh
+from kedfem.mesh.tetrahedra import FORMS
 from kedfem.mesh.ways import cad_mesh, file_axes
 from kedfem.scene import (
     Arc,
@@ -34,7 +35,7 @@ MOST_ELEMENTS = 2_000_000
 _EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wider than the waist
 
 
-def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
+def link_mesh(name: str, link: LinkScene, folder: Path) -> SolidMesh:
     """The hexahedral mesh of a solid link, in the scene's reference position.
 
     Parameters
@@ -48,7 +49,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
 
     Returns
     -------
-    HexMesh
+    SolidMesh
         Elements of the nodes that `link.element` says, of at least `link.min_quality`.
 
     Raises
@@ -69,7 +70,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> HexMesh:
     return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)
 
 
-def part_mesh(link: LinkScene, folder: Path) -> HexMesh:
+def part_mesh(link: LinkScene, folder: Path) -> SolidMesh:
     """The mesh of a part from CAD on its own; messages name its file, a solid of an assembly is to be named.
 
     Raises

@@ -9,15 +9,17 @@ from jaxtyping import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, Face, HexMesh, shape_gradients
+from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, Face, SolidMesh, shape_gradients
+from kedfem.mesh.simplices import TET10
 
-Mesh = TypeVar("Mesh", HexMesh, QuadMesh)
+Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
+LEAST = 0.1  # scaled Jacobian of hexahedra and quadrilaterals where nothing is asked for
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Scaled Jacobians of a mesh: 1 for a cuboid, at most 0 for an element that is folded or inverted.
+    """Scaled Jacobians of a mesh: 1 for a cuboid or a regular tetrahedron, at most 0 where folded or inverted.
 
     Attributes
     ----------
@@ -61,12 +63,14 @@ def scaled_jacobian(
 ) -> Float[np.ndarray, " e"]:
     """Least of det J / (|J_1| ··· |J_d|) over the nodes and the Gauss points of each element, J_j = ∂X/∂ξ_j.
 
+    Of a tetrahedron √2 det J over the largest product of the three edges that meet in a corner, edges as J makes them.
+
     Parameters
     ----------
     points : (n, d) [m]
         Nodes, in the plane (d = 2) or in space.
-    cells : (e, 9), (e, 8), (e, 20) or (e, 27)
-        quad9, hex8, hex20 or hex27 in VTK order.
+    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10)
+        quad9, hex8, hex20, hex27 or tet10 in VTK order.
 
     Returns
     -------
@@ -74,6 +78,8 @@ def scaled_jacobian(
         Between -1 and 1; 0 where an element has no extent.
     """
     nodes = NODES[cells.shape[1]]
+    if len(nodes) == len(TET10):
+        return _scaled_tetrahedra(points, cells)
     places = HEX27 if len(nodes) == len(HEX20) else nodes  # its Gauss points are 3³ too
     inner = np.sqrt(3 / 5 if len(nodes) != len(HEX8) else 1 / 3)
     gradients = shape_gradients(nodes, np.concatenate([places, inner * places]))
@@ -91,23 +97,40 @@ def _scaled_determinants(
     return np.asarray(determinants / np.where(lengths > 0, lengths, np.inf))
 
 
-def mesh_quality(mesh: HexMesh | QuadMesh) -> Quality:
+def _scaled_tetrahedra(
+    points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]
+) -> Float[np.ndarray, " e"]:
+    """The scaled Jacobians of tetrahedra, at their nodes and centres."""
+    gradients = shape_gradients(TET10, np.concatenate([TET10, np.full((1, 3), 0.25)]))
+    least = []
+    for chunk in np.array_split(cells, max(1, len(cells) // _CHUNK)):
+        J = np.swapaxes(np.tensordot(points[chunk], gradients, axes=(1, 1)), 1, 2)
+        a, b, c = (J[..., j] for j in range(3))
+        edge = [np.linalg.norm(v, axis=-1) for v in (a, b - a, b, c, c - a, c - b)]
+        corners = [edge[i] * edge[j] * edge[k] for i, j, k in ((0, 2, 3), (0, 1, 4), (1, 2, 5), (3, 4, 5))]
+        largest = np.maximum.reduce(corners)
+        least.append((np.sqrt(2) * np.linalg.det(J) / np.where(largest > 0, largest, np.inf)).min(axis=1))
+    return np.concatenate(least)
+
+
+def mesh_quality(mesh: SolidMesh | QuadMesh) -> Quality:
     """The scaled Jacobians of a mesh and where its elements are."""
     values = scaled_jacobian(mesh.points[:, : _dimension(mesh)], mesh.cells)
     return Quality(values, mesh.points[mesh.cells].mean(axis=1))
 
 
-def _dimension(mesh: HexMesh | QuadMesh) -> int:
+def _dimension(mesh: SolidMesh | QuadMesh) -> int:
     """2 for a mesh in a plane, 3 for one in space."""
     return 2 if isinstance(mesh, QuadMesh) else 3
 
 
-def checked_mesh(where: str, mesh: Mesh, min_quality: float) -> Mesh:
+def checked_mesh(where: str, mesh: Mesh, min_quality: float | None) -> Mesh:
     """The mesh itself, if it is good enough: scaled Jacobian at the nodes and Gauss points, det J > 0 everywhere.
 
     Parameters
     ----------
     where : the mesh's link, for messages: ``links.rod``
+    min_quality : None for LEAST, of tetrahedra 0
 
     Raises
     ------
@@ -115,6 +138,8 @@ def checked_mesh(where: str, mesh: Mesh, min_quality: float) -> Mesh:
         The worst element, where it is, and what to change.
     """
     quality = mesh_quality(mesh)
+    if min_quality is None:
+        min_quality = 0.0 if isinstance(mesh, SolidMesh) and mesh.tetrahedra else LEAST
     if quality.least <= 0:
         mirrored = bool((quality.scaled_jacobian < 0).all())
         cure = "the order of their nodes is mirrored" if mirrored else "refine the mesh or mend the mesh file"
@@ -139,11 +164,11 @@ def checked_mesh(where: str, mesh: Mesh, min_quality: float) -> Mesh:
     return mesh
 
 
-def _place(mesh: HexMesh | QuadMesh, quality: Quality, element: int, limit: float) -> str:
+def _place(mesh: SolidMesh | QuadMesh, quality: Quality, element: int, limit: float) -> str:
     """Where an element is, near which face, and how many others are below the limit."""
     x, y, z = quality.centres[element]
     words = f"in element {element} at ({x:.6g}, {y:.6g}, {z:.6g})"
-    if isinstance(mesh, HexMesh) and mesh.faces:
+    if isinstance(mesh, SolidMesh) and mesh.faces:
         words += f" near {_described(_nearest_face(mesh, quality.centres[element]))}"
     others = [other for other in quality.worst_elements(4) if other != element][:3]
     others = [other for other in others if quality.scaled_jacobian[other] < limit]
@@ -154,7 +179,7 @@ def _place(mesh: HexMesh | QuadMesh, quality: Quality, element: int, limit: floa
     return f"{words} and {count} more, as at {places}"
 
 
-def _nearest_face(mesh: HexMesh, place: Float[np.ndarray, "3"]) -> Face:
+def _nearest_face(mesh: SolidMesh, place: Float[np.ndarray, "3"]) -> Face:
     """The named face with a node nearest to a place."""
     squares = [((mesh.points[face.sides] - place) ** 2).sum(axis=2) for face in mesh.faces]
     return mesh.faces[int(np.argmin([square.min(initial=np.inf) for square in squares]))]
@@ -167,7 +192,7 @@ def _described(face: Face) -> str:
     return f"{face.name}, a {face.kind} of radius {1e3 * face.radius:.3g} mm"
 
 
-def _change(mesh: HexMesh | QuadMesh) -> str:
+def _change(mesh: SolidMesh | QuadMesh) -> str:
     """What to do about the shape where elements are bad."""
-    named = isinstance(mesh, HexMesh) and mesh.faces
+    named = isinstance(mesh, SolidMesh) and mesh.faces
     return "suppress a fillet or small feature there" if named else "change the shape there"

@@ -1,10 +1,11 @@
-"""The ladder of ways to fill a part from CAD with hexahedra: the best that it allows, and why not a better one."""
+"""The ladder of ways to mesh a part from CAD: hexahedra where it can be swept, else tetrahedra, and why."""
 
 import json
 from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from time import process_time
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -14,31 +15,39 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.faces import with_faces
+from kedfem.mesh.cad.file import silent
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.cut.subdivided import subdivided_mesh
-from kedfem.mesh.hexahedra import FORMS, HexMesh, frame_along, placed, quadratic
+from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
+from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.tetrahedra import FORMS
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
-ENOUGH = 0.3  # worst scaled Jacobian with which the next way is not tried
-NEAR = 1.15  # ratio of unknowns got and asked for that is near enough
-TRIES = 5  # meshes made in search of a number of unknowns
-LONGEST = 300  # seconds after which a part is given up
+ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other way is tried
+FAIR = 0.2  # of hexahedra that are taken before tetrahedra
+FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some micrometres are in it
+NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
+TRIES = 6  # meshes made in search of a number of unknowns
+LONGEST = 180  # seconds of processor time after which a part is given up
+PATIENCE = 3600  # seconds after which it is given up though it takes no processor time
 
 T = TypeVar("T")
+Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 
-WAYS: tuple[Callable[[ModuleType, Solid, Sizing], HexMesh], ...] = (
-    layered_mesh,
-    block_mesh,
-    subdivided_mesh,
-)
+SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh)
+#: What is tried in turn, by `mesh.kind` and element.
+WAYS: dict[str | None, tuple[Way, ...]] = {
+    None: (*SWEEPS, filled_mesh),
+    "hexahedra": (*SWEEPS, subdivided_mesh),
+    "tet10": (filled_mesh,),
+}
 
 
-def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path) -> HexMesh:
-    """hex27 mesh of a part from CAD, where the scene has it, its faces known; kept between runs.
+def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path) -> SolidMesh:
+    """hex27 or tet10 mesh of a part from CAD, where the scene has it, its faces known; kept between runs.
 
     Parameters
     ----------
@@ -49,12 +58,12 @@ def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path
     Raises
     ------
     MeshError
-        The file cannot be used, or no way gives hexahedra.
+        The file cannot be used, or no way gives a mesh.
     """
     file = folder / shape.file
     said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element]
     key = sha256(json.dumps(said).encode() + contents([file])).hexdigest()
-    mesh: HexMesh = kept(
+    mesh: SolidMesh = kept(
         "mesh", key, lambda: apart(keys.file, _made, keys, name, link, shape, file), itself, itself
     )
     return mesh
@@ -63,10 +72,12 @@ def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path
 def apart(where: str, work: Callable[..., T], *given: Any) -> T:
     """What a function returns in a process of its own: gmsh and OpenCASCADE break down or hang on some parts.
 
+    Nothing that they write reaches the terminal.
+
     Raises
     ------
     MeshError
-        The process broke down, or took more than LONGEST seconds; or what the function raises.
+        The process broke down, or took more than LONGEST seconds of processor time; or what the function raises.
     """
     from joblib.externals.loky import TimeoutError as LateError
     from joblib.externals.loky import get_reusable_executor
@@ -74,12 +85,15 @@ def apart(where: str, work: Callable[..., T], *given: Any) -> T:
 
     executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
     try:
-        found: T = executor.submit(work, *given).result(timeout=LONGEST)
+        found: T = executor.submit(limited, LONGEST, work, *given).result(timeout=PATIENCE)
     except LateError:
         executor.shutdown(kill_workers=True)
-        reason = f"got none within {LONGEST} s"
-    except TerminatedWorkerError:
-        reason = "got one at which they broke down"
+        reason = f"got none within {PATIENCE} s"
+    except TerminatedWorkerError as error:
+        late = "SIGXCPU" in str(error)
+        reason = (
+            f"got none within {LONGEST} s of processor time" if late else "got one at which they broke down"
+        )
     else:
         return found
     raise MeshError(
@@ -88,14 +102,51 @@ def apart(where: str, work: Callable[..., T], *given: Any) -> T:
     )
 
 
-def _made(keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path) -> HexMesh:
+def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
+    """What a function returns, in silence; the process is ended if that takes more processor time than so much."""
+    try:
+        import resource
+    except ImportError:  # a system without such limits
+        with silent():
+            return work(*given)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(process_time() + seconds)), hard))
+    try:
+        with silent():
+            return work(*given)
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
+
+
+def _made(keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path) -> SolidMesh:
     with solid_model(keys, file, name, shape) as (gmsh, solid):
         if link.mesh.size is not None and link.mesh.size > solid.extent:
             raise MeshError(
                 f"{keys.file}: must be larger than its mesh.size {link.mesh.size:.6g} [m], got {solid.extent:.6g}"
             )
-        mesh = with_faces(gmsh, solid, _sized(keys.file, gmsh, solid, link))
+        mesh = with_faces(gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link))
     return placed(mesh, np.array(shape.origin), file_axes(shape))
+
+
+def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> SolidMesh:
+    """The mesh; where there is none, or flat tetrahedra, one with tiny edges and faces of the CAD model healed away."""
+    best: SolidMesh | None = None
+    try:
+        best = _sized(where, gmsh, solid, link)
+        if not best.tetrahedra or mesh_quality(best).least > FLAT:
+            return best
+    except MeshError:
+        if link.mesh.kind is not None:
+            raise
+    for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, sizing(link.mesh))):
+        try:
+            mesh = filled_mesh(gmsh, mended, sizing(link.mesh))
+        except OtherWayError:
+            continue
+        if mesh_quality(mesh).least > FLAT:
+            return replace(mesh, way=f"{mesh.way}; {words}")
+    return best or _sized(where, gmsh, solid, link)  # raises again
 
 
 def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
@@ -109,21 +160,25 @@ def sizing(mesh: Meshing) -> Sizing:
     return Sizing(size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers)
 
 
-def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> HexMesh:
+def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> SolidMesh:
     """The mesh of the size asked for, or of the number of unknowns: then the nearest of at most TRIES."""
-    asked, wanted = sizing(link.mesh), link.mesh.unknowns
-    form = FORMS[str(link.element)]
+    asked, wanted, element = sizing(link.mesh), link.mesh.unknowns, str(link.element)
+    ways, form = WAYS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
     if wanted is None:
-        return best_mesh(where, gmsh, solid, asked, form)
-    nodes_each = {"hex8": 1, "hex20": 4, "hex27": 8}[str(link.element)]  # in the middle of a mesh
-    size = (solid.volume * 3 * 2 * nodes_each / wanted) ** (1 / 3)
-    found: list[tuple[float, HexMesh]] = []
+        return best_mesh(where, gmsh, solid, asked, form, ways)
+    nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # to a cube of the size
+    size = (solid.volume * 3 * nodes_each / wanted) ** (1 / 3)
+    found: list[tuple[float, SolidMesh]] = []
     for _ in range(TRIES):
-        mesh = best_mesh(where, gmsh, solid, replace(asked, size=min(size, solid.extent / 2)), form)
+        mesh = best_mesh(where, gmsh, solid, replace(asked, size=min(size, solid.extent / 2)), form, ways)
         ratio = 3 * len(form(mesh).points) / wanted
         found.append((abs(np.log(ratio)), mesh))
-        if 1 / NEAR < ratio < NEAR:
+        if 1 / NEAR < ratio < NEAR or (
+            len(found) > 1 and ratio == 3 * len(form(found[-2][1]).points) / wanted
+        ):
             break
+        if mesh.tetrahedra:
+            ways = (filled_mesh,)  # what cannot be swept cannot in other sizes
         size *= ratio ** (1 / 2.5)  # in between what plates and lumps need
     off, mesh = min(found, key=lambda each: each[0])
     if off <= np.log(NEAR):
@@ -132,35 +187,49 @@ def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> HexMe
 
 
 def best_mesh(
-    where: str, gmsh: ModuleType, solid: Solid, sizing: Sizing, form: Callable[[HexMesh], HexMesh] = quadratic
-) -> HexMesh:
+    where: str,
+    gmsh: ModuleType,
+    solid: Solid,
+    sizing: Sizing,
+    form: Callable[[SolidMesh], SolidMesh] = quadratic,
+    ways: tuple[Way, ...] = WAYS[None],
+) -> SolidMesh:
     """The mesh by the first way that is good enough, else by the best; in `way` what was done, and why not better.
 
     Parameters
     ----------
-    form : what becomes of its elements, whose quality counts: of 20 nodes they may be worse than of 27
+    form : what becomes of hexahedra, whose quality counts: of 20 nodes they may be worse than of 27
+    ways : to be tried in turn
 
     Raises
     ------
     MeshError
-        No way gives hexahedra; with the reasons of each.
+        No way gives a mesh; with the reasons of each.
     """
-    found: list[tuple[float, HexMesh]] = []
+    found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []
-    for way in WAYS:
+    for way in ways:
+        if way in (filled_mesh, subdivided_mesh) and _best_of(found) >= FAIR:
+            break
         try:
             mesh = way(gmsh, solid, sizing)
         except OtherWayError as error:
-            reasons.append(str(error))
+            reasons.append(str(error).removeprefix(f"{solid.name}: "))
             continue
         least = mesh_quality(form(mesh)).least
-        found.append((least, replace(mesh, way="; ".join([mesh.way, *reasons]))))
-        if least >= ENOUGH:
-            break
+        told = [mesh.way, *reasons[:1]]  # the first says what is in the way, of layers
+        if mesh.tetrahedra or least >= ENOUGH:
+            return replace(mesh, way="; ".join(told))
+        found.append((least, replace(mesh, way="; ".join(told))))
         reasons.append(f"{mesh.way}: worst scaled Jacobian {least:.2g}")
     if not found:
         raise MeshError(
-            f"{where}: must be a solid that hexahedra can fill, got none: {'; '.join(reasons)}; "
-            "take smaller elements (mesh.size) or simplify the part there"
+            f"{where}: must be a solid that can be meshed, got none: {'; '.join(reasons)}; "
+            "take another size (mesh.size) or simplify the part there"
         )
     return max(found, key=lambda each: each[0])[1]
+
+
+def _best_of(found: list[tuple[float, SolidMesh]]) -> float:
+    """The best quality so far."""
+    return max((least for least, _ in found), default=-1.0)

@@ -11,9 +11,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
-from kedfem.mesh.hexahedra import QUAD9, quadratic, shape_functions
+from kedfem.mesh.hexahedra import QUAD9, shape_functions
+from kedfem.mesh.simplices import TRI6
+from kedfem.mesh.tetrahedra import FORMS
 from kedfem.output.picture import ADVICE, TIMEOUT, drawing_fault
 from kedfem.results import replacing
 
@@ -37,18 +39,23 @@ class Drawn:
     lines: Int[np.ndarray, "l k"]
 
 
-def drawn(mesh: HexMesh) -> Drawn:
-    """Outer sides of the elements in small patches, curved as the elements are."""
-    full = quadratic(mesh)
+def drawn(mesh: SolidMesh) -> Drawn:
+    """Outer sides of the elements in small patches, curved as the elements are; those of triangles end in a point."""
+    full = FORMS["hex27"](mesh)
     quality = mesh_quality(mesh).scaled_jacobian
     sides, owners = owned_sides(full.cells)
     k = FINENESS + 1
-    r = np.linspace(-1, 1, k)
+    r = np.linspace(0, 1, k)
     places = np.stack(np.meshgrid(r, r, indexing="ij"), axis=-1).reshape(-1, 2)
-    points = (shape_functions(QUAD9, places) @ full.points[sides]).reshape(-1, 3)
     at = np.arange(k * k).reshape(k, k)
     square = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
     rim = np.stack([at[0], at[-1], at[:, 0], at[:, -1]])
+    if full.tetrahedra:
+        functions = shape_functions(TRI6, np.stack([places[:, 0], places[:, 1] * (1 - places[:, 0])], axis=1))
+        rim = np.stack([at[0], at[:, 0], at[:, -1]])
+    else:
+        functions = shape_functions(QUAD9, 2 * places - 1)
+    points = (functions @ full.points[sides]).reshape(-1, 3)
     start = k * k * np.arange(len(sides))[:, None, None]
     return Drawn(
         points,
@@ -58,7 +65,7 @@ def drawn(mesh: HexMesh) -> Drawn:
     )
 
 
-def write_mesh_picture(meshes: Sequence[tuple[str, HexMesh]], png: Path, title: str) -> None:
+def write_mesh_picture(meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str) -> None:
     """Draw meshes side by side, one alone with the histogram of its quality.
 
     Parameters

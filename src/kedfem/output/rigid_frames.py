@@ -9,20 +9,12 @@ from jaxtyping import Float, Int
 
 from kedfem.links.record import Link
 from kedfem.links.spatial_recovery import drawn
+from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
 from kedfem.output.vtu import RigidField
 from kedfem.scene import Scene
-
-SIDES = (
-    (0, 3, 2, 1),
-    (4, 5, 6, 7),
-    (0, 1, 5, 4),
-    (1, 2, 6, 5),
-    (2, 3, 7, 6),
-    (3, 0, 4, 7),
-)  # of a hexahedron
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +61,14 @@ def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[Ri
 def _seen(link: Link) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
     if link.kind == "spatial_beam":
         values, _, cells = drawn(link)
-        return np.asarray(values @ link.X), outer_sides(cells), "quad"
+        return np.asarray(values @ link.X), boundary_sides(cells), "quad"
     if link.kind == "beam":
         return link.X, link.cells, link.cell_type
-    cells = outer_sides(link.cells[:, :8]) if link.kind == "solid" else link.cells[:, :4]
-    return link.X, cells, "quad"
-
-
-def outer_sides(cells: Int[np.ndarray, "e 8"]) -> Int[np.ndarray, "f 4"]:
-    """The sides of hexahedra, in VTK's order, that only one of them has."""
-    sides = cells[:, SIDES].reshape(-1, 4)
-    _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(sides[np.sort(first[count == 1])])
+    if link.kind == "plane":
+        return link.X, link.cells[:, :4], "quad"
+    sides = boundary_sides(link.cells)
+    corners = side_corners(sides.shape[1])
+    return link.X, sides[:, :corners], "quad" if corners == 4 else "triangle"
 
 
 def _sticks(scene: Scene, name: str) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:

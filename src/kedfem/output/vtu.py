@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.results.files import ready_folder, reason, replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
@@ -117,7 +117,7 @@ class AnimationWriter:
         return path
 
 
-def write_mesh(mesh: HexMesh, path: Path) -> None:
+def write_mesh(mesh: SolidMesh, path: Path) -> None:
     """A mesh as a VTU file, with the scaled Jacobian of its elements.
 
     Raises

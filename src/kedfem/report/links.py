@@ -7,12 +7,13 @@ from rich.text import Text
 
 from kedfem.dynamics.model import Model, segments, ways
 from kedfem.links.record import Link
-from kedfem.mesh import HexMesh, QuadMesh, mesh_quality
+from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
 
 ELEMENTS = {
     "hexahedron27": "hex27",
     "hexahedron20": "hex20",
     "hexahedron": "hex8",
+    "tetra10": "tet10",
     "quad9": "quad9",
     "line3": "beam3",
     "line": "beam2",
@@ -79,7 +80,9 @@ def _quality(*parts: Link) -> str:
     if not full[0].meshed:
         return "-"
     meshes = [
-        QuadMesh(link.X, link.cells, link.thickness) if link.kind == "plane" else HexMesh(link.X, link.cells)
+        QuadMesh(link.X, link.cells, link.thickness)
+        if link.kind == "plane"
+        else SolidMesh(link.X, link.cells)
         for link in full
     ]
     return f"{min(mesh_quality(mesh).least for mesh in meshes):.2f}"

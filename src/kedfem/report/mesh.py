@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.links.rounds import CLOSED
-from kedfem.mesh import HexMesh, mesh_quality
+from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.hexahedra import Face
 from kedfem.output.words import with_prefix
 from kedfem.report.links import ELEMENTS
@@ -14,7 +14,7 @@ from kedfem.report.links import ELEMENTS
 KINDS = ("bore", "journal", "ball seat", "ball", "plane", "part of a cylinder")
 
 
-def mesh_tables(name: str, mesh: HexMesh) -> list[Table]:
+def mesh_tables(name: str, mesh: SolidMesh) -> list[Table]:
     """A part on its own: how it was meshed, its faces that a joint can sit on, the quality of its elements."""
     quality = mesh_quality(mesh)
     table = Table(title=Text(name), show_header=False)
@@ -33,7 +33,7 @@ def mesh_tables(name: str, mesh: HexMesh) -> list[Table]:
     return [table, *([_seats(mesh)] if mesh.faces else []), bars]
 
 
-def _seats(mesh: HexMesh) -> Table:
+def _seats(mesh: SolidMesh) -> Table:
     """Faces with a form, those first that a joint finds by itself."""
     table = Table(
         title="Faces", caption="lengths in mm; for joints.NAME.faces, where a joint does not find its own"
@@ -48,7 +48,7 @@ def _seats(mesh: HexMesh) -> Table:
     return table
 
 
-def face_kind(mesh: HexMesh, face: Face) -> str:
+def face_kind(mesh: SolidMesh, face: Face) -> str:
     """What a joint can take a face for: cylinders only where they are closed."""
     if face.kind != "cylinder":
         return ("ball seat" if face.inward else "ball") if face.kind == "sphere" else "plane"

@@ -28,7 +28,7 @@ SHAPES = {
     "beam": ["bar", "polyline"],
 }
 ELEMENTS = {
-    "solid": ["hex27", "hex20", "hex8"],
+    "solid": ["hex27", "hex20", "hex8", "tet10"],
     "plane": ["quad9"],
     "beam": ["beam3", "beam2", "beam4", "beam5", "beam7", "beam9"],
 }

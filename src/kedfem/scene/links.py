@@ -20,7 +20,9 @@ from kedfem.scene.wording import shown, unknown_name
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
-Element = Literal["hex27", "hex20", "hex8", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
+Element = Literal[
+    "hex27", "hex20", "hex8", "tet10", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"
+]
 Count = Annotated[StrictInt, Field(ge=1)]
 JointKind = Literal[
     "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
@@ -56,6 +58,8 @@ class Meshing(Record):
     """other shapes, solid: number through the thickness; of a part from CAD the least through each of its layers"""
     unknowns: Annotated[StrictInt, Field(ge=100)] | None = None
     """a part from CAD: about so many unknowns, instead of `size` or `elements_across`"""
+    kind: Literal["hexahedra"] | None = None
+    """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
 
 
 def spelt_out(link: Any) -> Any:
@@ -87,10 +91,11 @@ class LinkScene(Record):
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Element | None = None
-    """hex20 (or hex27, hex8) for a solid, hex27 (or these) for one from CAD, quad9 for a plane link, beam3 (or beam2,
-    4, 5, 7, 9: nodes per element) for a beam"""
-    min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.1
-    """least scaled Jacobian of the elements of a solid or plane link"""
+    """hex20 (or hex27, hex8, tet10) for a solid, hex27 (or these) for one from CAD, quad9 for a plane link, beam3 (or
+    beam2, 4, 5, 7, 9: nodes per element) for a beam"""
+    min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] | None = None
+    """least scaled Jacobian of the elements of a solid or plane link; if not given 0.1, of tetrahedra 0: det J > 0 all
+    over"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
     """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
     beam: Literal["planar", "spatial"] | None = None

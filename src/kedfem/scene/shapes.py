@@ -163,7 +163,7 @@ class Polyline(Record):
 
 
 class MeshFile(Record):
-    """A mesh of hexahedra (8, 20 or 27 nodes) in a file that meshio reads; solid."""
+    """A mesh of hexahedra (8, 20 or 27 nodes) or tetrahedra (4, 10) in a file that meshio reads; solid."""
 
     kind: Literal["mesh"] = "mesh"
     file: FileName
@@ -179,7 +179,7 @@ class MeshFile(Record):
 
 
 class Cad(Record):
-    """A part from CAD (STEP, IGES or BREP), made of hexahedra; solid. `step = "rod.step"` in a link is short for it."""
+    """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra. `step = "rod.step"` in a link is short for it."""
 
     kind: Literal["cad"] = "cad"
     file: FileName

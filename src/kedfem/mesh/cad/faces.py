@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
-from kedfem.mesh.hexahedra import Face, HexMesh
+from kedfem.mesh.hexahedra import Face, SolidMesh
 
 _FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
 _ALIKE = 1e-5  # of the radius: cylinders and spheres that are one
@@ -17,8 +17,8 @@ _NEARLY = (
 )
 
 
-def with_faces(gmsh: ModuleType, solid: Solid, mesh: HexMesh) -> HexMesh:
-    """The mesh with the faces of its solid: each side on the outside belongs to exactly one.
+def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
+    """The mesh with the faces of its solid, if it has none yet: each side on the outside belongs to exactly one.
 
     Parameters
     ----------
@@ -26,23 +26,38 @@ def with_faces(gmsh: ModuleType, solid: Solid, mesh: HexMesh) -> HexMesh:
         With the solid in its model.
     solid : Solid
         Its faces, in metres.
-    mesh : HexMesh
+    mesh : SolidMesh
         In the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size.
 
     Returns
     -------
-    HexMesh
+    SolidMesh
         With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on,
         since it is narrower than an element, is left out.
     """
+    if mesh.faces:
+        return mesh
     sides = boundary_sides(mesh.cells)
     of_face = _nearest_faces(gmsh, solid, mesh.points, sides)
-    groups = _one_surface(gmsh, solid)
-    found = [_face(solid, group, sides[np.isin(of_face, group), :4]) for group in groups]
-    return replace(mesh, faces=tuple(face for face in found if len(face.sides)))
+    return replace(
+        mesh,
+        faces=joined_faces(
+            gmsh, solid, {face.tag: sides[of_face == i, :4] for i, face in enumerate(solid.faces)}
+        ),
+    )
 
 
-def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f 4"]) -> Face:
+def joined_faces(
+    gmsh: ModuleType, solid: Solid, sides: dict[int, Int[np.ndarray, "_ c"]]
+) -> tuple[Face, ...]:
+    """The faces of a mesh from the corners of the sides on each face of its solid; those of one surface are one."""
+    found = []
+    for group in _one_surface(gmsh, solid):
+        found.append(_face(solid, group, np.concatenate([sides[solid.faces[i].tag] for i in group])))
+    return tuple(face for face in found if len(face.sides))
+
+
+def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face:
     """The face that some of a solid's faces, of one surface, are together."""
     parts = [solid.faces[i] for i in group]
     first = parts[0]

@@ -141,7 +141,7 @@ def _scaling(file: CadFile) -> float:
 def imported(gmsh: ModuleType, file: CadFile, scaling: float, sewing: float | None) -> None:
     """The file's shapes, added to the model, all numbers times `scaling`; faces sewn if they are `sewing` apart."""
     try:
-        with _options(gmsh, scaling, sewing), _silent():
+        with _options(gmsh, scaling, sewing), silent():
             gmsh.model.occ.importShapes(str(file.path), highestDimOnly=False)
             gmsh.model.occ.synchronize()
     except Exception as error:
@@ -167,7 +167,7 @@ def _options(gmsh: ModuleType, scaling: float, sewing: float | None) -> Iterator
 
 
 @contextmanager
-def _silent() -> Iterator[None]:
+def silent() -> Iterator[None]:
     """What OpenCASCADE itself writes to the terminal is dropped: gmsh's settings do not reach it."""
     kept = [os.dup(stream) for stream in (1, 2)]
     try:

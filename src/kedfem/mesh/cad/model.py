@@ -61,7 +61,7 @@ def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: s
     bodies = _bodies(gmsh, file, tags)
     names = _solid_names(gmsh, file, tags, bodies)
     tag = tags[_choice(key, file, names, link, wanted)]
-    _leave_only(gmsh, tag)
+    leave_only(gmsh, tag)
     return _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
 
 
@@ -116,7 +116,7 @@ def _boundary(gmsh: ModuleType, solid: int) -> list[int]:
     return sorted({abs(tag) for _, tag in gmsh.model.getBoundary([(3, solid)], combined=False)})
 
 
-def _leave_only(gmsh: ModuleType, solid: int) -> None:
+def leave_only(gmsh: ModuleType, solid: int) -> None:
     """Everything else out of the model."""
     kept = {(3, solid), *((2, tag) for tag in _boundary(gmsh, solid))}
     for dimension in (1, 0):

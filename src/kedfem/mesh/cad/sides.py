@@ -1,9 +1,10 @@
-"""The sides of hexahedra on the outside of a mesh."""
+"""The sides of elements on the outside of a mesh."""
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.hexahedra import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
+from kedfem.mesh.simplices import TET_SIDES, TRI6
 
 
 def _side_nodes() -> Int[np.ndarray, "6 9"]:
@@ -29,36 +30,47 @@ def boundary_sides(cells: Int[np.ndarray, "e k"]) -> Int[np.ndarray, "f m"]:
 
 
 def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], Int[np.ndarray, " f"]]:
-    """The sides that one hexahedron alone has, with their nodes in the order of quad9 as far as they have them; which.
+    """The sides that one element alone has, with their nodes in the order of quad9 or tri6 as far as they have them.
 
     Parameters
     ----------
-    cells : (e, 8), (e, 20) or (e, 27)
+    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10)
         Node numbers in VTK order.
 
     Returns
     -------
-    (f, 4), (f, 8) or (f, 9)
+    (f, 4), (f, 8) or (f, 9); of tetrahedra (f, 3) or (f, 6)
         Corners counter-clockwise seen from outside, middles of edges, centre.
     (f,)
-        The hexahedron of each.
+        The element of each.
     """
-    count = {8: 4, 20: 8, 27: 9}[cells.shape[1]]
-    sides = cells[:, SIDE_NODES[:, :count]].reshape(-1, count)
-    _, first, often = np.unique(np.sort(sides[:, :4], axis=1), axis=0, return_index=True, return_counts=True)
+    nodes = cells.shape[1]
+    of_element = TET_SIDES if nodes in {4, 10} else SIDE_NODES
+    count = {4: 3, 10: 6, 8: 4, 20: 8, 27: 9}[nodes]
+    sides = cells[:, of_element[:, :count]].reshape(-1, count)
+    keys = np.sort(sides[:, : side_corners(count)], axis=1)
+    _, first, often = np.unique(keys, axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[often == 1])
-    return sides[alone], alone // len(SIDE_NODES)
+    return sides[alone], alone // len(of_element)
+
+
+def side_corners(nodes: int) -> int:
+    """How many of the nodes of a side are corners."""
+    return 3 if nodes in {3, 6} else 4
 
 
 def side_normals(
     points: Float[np.ndarray, "n 3"], sides: Int[np.ndarray, "f m"]
 ) -> tuple[Float[np.ndarray, "f 3"], Float[np.ndarray, "f 3"], Float[np.ndarray, "f"]]:
     """Of each side the place at its middle [m], the outward unit normal there, and its area [m²], about."""
-    nodes = QUAD9[: sides.shape[1]]
-    middle = np.zeros((1, 2))
     X = points[sides]
+    if sides.shape[1] == 3:
+        X = np.concatenate([X, (X + np.roll(X, -1, axis=1)) / 2], axis=1)
+    triangles = X.shape[1] == len(TRI6)
+    nodes = TRI6 if triangles else QUAD9[: sides.shape[1]]
+    middle = np.full((1, 2), 1 / 3 if triangles else 0.0)
     places = np.einsum("a,fac->fc", shape_functions(nodes, middle)[0], X)
     along = np.einsum("aj,fac->fjc", shape_gradients(nodes, middle)[0], X)
     normals = np.cross(along[:, 0], along[:, 1])
     lengths = np.linalg.norm(normals, axis=1)
-    return places, normals / np.maximum(lengths, 1e-300)[:, None], 4 * lengths
+    return places, normals / np.maximum(lengths, 1e-300)[:, None], lengths * (0.5 if triangles else 4)

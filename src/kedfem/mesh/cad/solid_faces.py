@@ -16,6 +16,7 @@ from kedfem.mesh.cad.solids import CadFace
 _ACCURACY = 1e-4  # of points, in sizes of the face: what translators between CAD systems leave
 _SKEW = 1e-3
 _FINENESS = (5, 11, 25)  # places along each parameter, until some are within the face
+_ASIDE = 0.4627  # where in its part of a grid a place is: not in the middle, where edges of holes often are
 _LEAST = 4  # places within a face that are enough
 _MOST, _FEWEST = 12, 3  # places at which the two sides of a face are looked at
 _IN_ALL = 100  # such places in all: of a part with many faces a look takes up to 10 ms
@@ -135,7 +136,7 @@ def _places(gmsh: ModuleType, tag: int, share: Float[np.ndarray, "m"]) -> Places
 def _inner_places(gmsh: ModuleType, tag: int, most: int) -> Places:
     """A few places within a face, as far apart as a grid allows; none if it is too narrow for the finest."""
     for fineness in _FINENESS:
-        grid = _places(gmsh, tag, (np.arange(fineness) + 0.5) / fineness)
+        grid = _places(gmsh, tag, (np.arange(fineness) + _ASIDE) / fineness)
         inside = [i for i, at in enumerate(grid.at) if gmsh.model.isInside(2, tag, at, parametric=True)]
         if len(inside) >= _LEAST:
             break

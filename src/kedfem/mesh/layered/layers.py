@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import HexMesh
+from kedfem.mesh.hexahedra import SolidMesh
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
@@ -25,7 +25,7 @@ _SAMPLES = np.linspace(0.0, 1.0, 7)
 _AXES = ("x", "y", "z")
 
 
-def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
+def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """Hexahedra of a solid whose faces lie along one direction or across it: its section swept through its slabs.
 
     The plane faces across the direction cut the solid into slabs of constant section. All sections together
@@ -43,7 +43,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
 
     Returns
     -------
-    HexMesh
+    SolidMesh
         27-node elements, corners and middles of sides on the solid's own faces; without faces that have names.
 
     Raises
@@ -52,7 +52,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> HexMesh:
         No such direction, with the face that is in the way; or the section gives no mesh of quality, with the
         place.
     """
-    best: tuple[float, HexMesh] | None = None
+    best: tuple[float, SolidMesh] | None = None
     refusals: list[str] = []
     tries = [(direction, share) for direction in layer_directions(gmsh, solid) for share in _SHARES]
     for direction, share in tries:
@@ -92,10 +92,8 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
             words = f"{_face_in_words(largest)}, is neither along nor across {direction_in_words(direction)}"
             obstacles.append((sum(face.area for face in slanted), words))
     if not found:
-        obstacle = min(obstacles)[1] if obstacles else "no plane face"
-        raise OtherWayError(
-            f"{solid.name}: must consist of layers along one direction, got one where {obstacle}"
-        )
+        obstacle = min(obstacles)[1] if obstacles else "it has no plane face"
+        raise OtherWayError(f"{solid.name}: no layers along one direction, as {obstacle}")
     return tuple(found)
 
 
@@ -139,18 +137,19 @@ def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) 
 def _face_in_words(face: CadFace) -> str:
     """A face for the user: its name and what its geometry is."""
     about = "({:.3g}, {:.3g}, {:.3g})".format(*(face.direction + 0.0))
+    near = "near ({:.3g}, {:.3g}, {:.3g}) mm".format(*(1e3 * face.centre + 0.0))
     forms = {
         "plane": f"a plane with normal {about}",
         "cylinder": f"a cylinder of radius {1000 * face.radius:.4g} mm about {about}",
         "sphere": f"a sphere of radius {1000 * face.radius:.4g} mm",
         "other": "a free form, cone or torus",
     }
-    return f"{face.name}, {forms[face.kind]}"
+    return f"{face.name}, {forms[face.kind]} {near}"
 
 
 def _mesh_along(
     gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"], sizing: Sizing, share: float
-) -> HexMesh:
+) -> SolidMesh:
     """The mesh swept along one direction, in the solid's place."""
     with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
         size = share * plan_size(plan_with_cusps, sizing)
@@ -162,7 +161,7 @@ def _mesh_along(
     words = _way_in_words(direction, flat, plan, int(layers.sum()))
     if filled > 0:
         words += f"; cusps between touching edges filled, {100 * filled:.2g} % of the volume"
-    return HexMesh(mesh.points, mesh.cells, way=words)
+    return SolidMesh(mesh.points, mesh.cells, way=words)
 
 
 def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan, layers: int) -> str:
@@ -177,7 +176,7 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
     return f"{kind}{comma} swept along {direction_in_words(direction)} through {through}{by}"
 
 
-def _not_too_bad(solid: Solid, mesh: HexMesh) -> HexMesh:
+def _not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
     """The mesh itself, unless another way may do better."""
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import HexMesh, stacked, without_spare_nodes
+from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh
 
 
-def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> HexMesh:
+def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> SolidMesh:
     """hex27 mesh: each cell of the plan through the slabs in which its region has material.
 
     A node's number is made of its place in the plan and of its level, so slabs share the nodes between them.

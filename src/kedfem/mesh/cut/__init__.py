@@ -1,1 +1,0 @@
-"""Any solid: tetrahedra cut into four hexahedra each, relaxed on the surface from CAD."""

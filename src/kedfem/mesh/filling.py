@@ -1,0 +1,308 @@
+"""Any solid filled with 10-node tetrahedra, nodes on the CAD model's own faces: what is left where nothing sweeps."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from kedfem.mesh.blocks import gmsh_hexahedra
+from kedfem.mesh.bounds import valid_everywhere
+from kedfem.mesh.cad.faces import joined_faces
+from kedfem.mesh.cad.model import leave_only
+from kedfem.mesh.cad.solid_faces import cad_faces
+from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.hexahedra import SolidMesh, node_numbers
+from kedfem.mesh.quality import scaled_jacobian
+from kedfem.mesh.session import gmsh_options, numbered_nodes
+from kedfem.mesh.simplices import EDGES, TET10
+from kedfem.mesh.tetrahedra import edge_middles
+
+_HEX27 = 12  # gmsh's number of the 27-node hexahedron
+_TET10 = 11  # gmsh's number of the 10-node tetrahedron
+_REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
+_COUNT = (
+    1200  # regular tetrahedra that fill a lump without small features, with two elements asked for across
+)
+_TURN = np.pi / 6  # that an element's edge turns along a curved face, where the least size lets it
+_FINEST = 4.0  # the size over the least size that curvature asks for
+_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser
+_STEPS = 5  # times that it is
+_COARSEST = 4.0  # the most by which it may be: curvature and the finest size follow
+_BAD = 0.03  # scaled Jacobian below which curved elements are optimised, else straightened, and other settings tried
+_FEW = 0.02  # share of bad elements that optimisation can help
+#: gmsh's optimisation of curved elements takes minutes where it finds no way.
+_BRIEF: dict[str, float] = {"Mesh.HighOrderIterMax": 25, "Mesh.HighOrderPassMax": 5}
+_HEALED = (0.03, 0.1, 0.3)  # sizes of edges that are healed away in turn, of the elements' size
+_SAME = 1e-3  # of the volume that this may change
+_BLENDS = (
+    0.4,
+    0.7,
+    1.0,
+)  # how far edges of bad elements are straightened, those of folded ones in the end wholly
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One way to let gmsh make tetrahedra: its 2-D and 3-D algorithm."""
+
+    plane: int
+    solid: int
+
+
+#: The usual ones; others where gmsh gives up or leaves flat elements.
+SETTINGS = (Setting(6, 1), Setting(6, 10), Setting(5, 1), Setting(1, 4))
+
+
+def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+    """tet10 mesh of a solid of any form, its faces known.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid in its model, which stays there.
+    solid : Solid
+        The solid.
+    sizing : Sizing
+        How fine. Without a size: `across` elements in twice the mean wall 2 V/A, which is the thickness of a plate, the
+        radius of a rod, the wall of a tube, but at least some thousand elements; 12 to a circle, as far as that is not
+        finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step.
+
+    Returns
+    -------
+    SolidMesh
+        Proven to have det J > 0 everywhere.
+
+    Raises
+    ------
+    OtherWayError
+        gmsh makes no tetrahedra of the solid; what it said.
+    """
+    said: list[str] = []
+    found: SolidMesh | None = None
+    coarser = 1.0
+    for _ in range(_STEPS):
+        mesh = _best_of_settings(gmsh, solid, sizing, coarser, said)
+        if mesh is not None and (found is None or len(mesh.points) < len(found.points)):
+            found = mesh
+        plenty = found is None or 3 * len(found.points) > _PLENTY
+        if sizing.size is not None or found is None or not plenty or coarser >= _COARSEST:
+            break
+        ratio = (3 * len(found.points) / _PLENTY) ** 0.5
+        coarser = min(coarser * np.clip(1.05 * ratio, 1.15, 2.0), _COARSEST)
+    gmsh.model.mesh.clear()
+    if found is None:
+        reasons = "; ".join(dict.fromkeys(said)) or "none at all"
+        raise OtherWayError(f"{solid.name}: gmsh makes no tetrahedra of it: {reasons}")
+    return found
+
+
+def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+    """hex27 mesh of a solid of any form by gmsh's own subdivision, four in each tetrahedron; its quality is poor.
+
+    Raises
+    ------
+    OtherWayError
+        gmsh makes none, with what it said.
+    """
+    said: list[str] = []
+    size = 2 * tetrahedron_size(solid, sizing)
+    numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
+    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, said):
+        gmsh.model.mesh.clear()
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.model.mesh.optimize("HighOrder")
+        kinds, _, nodes = gmsh.model.mesh.getElements(3, solid.tag)
+        if list(kinds) == [_HEX27]:
+            points, tags = numbered_nodes(gmsh)
+            mesh = gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, 27))
+            way = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
+            return replace(mesh, way=way)
+    raise OtherWayError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(said)}")
+
+
+def healed(gmsh: ModuleType, where: str, solid: Solid, size: float) -> Iterator[tuple[Solid, str]]:
+    """The solid of gmsh's model with edges and faces below growing sizes healed away, and what was done in words.
+
+    Parameters
+    ----------
+    size : of the elements [m]; what is healed is much smaller
+
+    Yields
+    ------
+    Solid and words, as long as the volume stays what it was.
+    """
+    tag = solid.tag
+    for share in _HEALED:
+        made = gmsh.model.occ.healShapes([(3, tag)], tolerance=share * size)
+        gmsh.model.occ.synchronize()
+        solids = {tag for dim, tag in made if dim == 3}
+        if len(solids) != 1:
+            return
+        (tag,) = solids
+        leave_only(gmsh, tag)
+        volume = float(gmsh.model.occ.getMass(3, tag))
+        if abs(volume / solid.volume - 1) > _SAME:
+            return
+        faces = cad_faces(gmsh, where, tag, solid.extent, {})
+        words = f"edges and faces below {1e3 * share * size:.2g} mm healed away"
+        yield replace(solid, tag=tag, volume=volume, faces=faces), words
+
+
+def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
+    """Edge length [m] of the tetrahedra; see :func:`filled_mesh`."""
+    if sizing.size is not None:
+        return sizing.size
+    width = max(2 * solid.volume / solid.area, (solid.volume / (_COUNT * _REGULAR)) ** (1 / 3))
+    return float(2 * width / sizing.across)
+
+
+def _best_of_settings(
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str]
+) -> SolidMesh | None:
+    """The first mesh that is good enough, else the best."""
+    best: tuple[float, SolidMesh] | None = None
+    for mesh in _tried(gmsh, solid, sizing, coarser, said):
+        least = float(scaled_jacobian(mesh.points, mesh.cells).min())
+        if best is None or least > best[0]:
+            best = least, mesh
+        if best[0] >= _BAD or (sizing.size is None and 3 * len(mesh.points) > _PLENTY):
+            break
+    return best and best[1]
+
+
+def _tried(
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str]
+) -> Iterator[SolidMesh]:
+    """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
+    size = coarser * tetrahedron_size(solid, sizing)
+    turn = min(_TURN * coarser, np.pi / 3) * min(1.0, 4 * sizing.turn / np.pi)
+    for setting in SETTINGS:
+        numbers = _options(size, turn, size * min(1.0, coarser / _FINEST), setting)
+        with gmsh_options(gmsh, numbers):
+            mesh = _generated(gmsh, solid, said)
+        if mesh is not None:
+            yield mesh
+
+
+def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[str, float]:
+    """gmsh's options for tetrahedra of a size, which turn by so much along a curved face unless finer than a least."""
+    return {
+        "Mesh.MeshSizeMax": size,
+        "Mesh.MeshSizeMin": finest,
+        "Mesh.MeshSizeFromCurvature": float(np.ceil(2 * np.pi / turn - 1e-9)),
+        "Mesh.MeshSizeFromPoints": 0,
+        "Mesh.MeshSizeExtendFromBoundary": 1,
+        "Mesh.Algorithm": setting.plane,
+        "Mesh.Algorithm3D": setting.solid,
+        "Mesh.Optimize": 1,
+        "Mesh.OptimizeNetgen": int(setting.solid == 1),
+        "Mesh.RecombineAll": 0,
+        "Mesh.SubdivisionAlgorithm": 0,
+        "Mesh.ElementOrder": 1,
+        "Mesh.SecondOrderLinear": 0,
+        "Mesh.SecondOrderIncomplete": 0,
+        "Mesh.HighOrderOptimize": 0,
+    }
+
+
+@contextmanager
+def _listening(gmsh: ModuleType, said: list[str]) -> Iterator[None]:
+    """Whatever gmsh complains of goes to `said`, and it goes on after the block."""
+    gmsh.logger.start()
+    try:
+        yield
+    except Exception as error:
+        if type(error) is not Exception:  # gmsh raises nothing more special
+            raise
+        lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
+        said += lines or [str(error)]
+    finally:
+        gmsh.logger.stop()
+
+
+def _generated(gmsh: ModuleType, solid: Solid, said: list[str]) -> SolidMesh | None:
+    """A mesh under the settings that gmsh has now, or None; what it complains of goes to `said`."""
+    points, cells, sides = np.zeros((0, 3)), np.zeros((0, 10), dtype=np.int64), {}
+    with _listening(gmsh, said):
+        gmsh.model.mesh.clear()
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        points, cells = _tetrahedra(gmsh, solid)
+        if _worth_optimising(points, cells):
+            with gmsh_options(gmsh, _BRIEF):
+                gmsh.model.mesh.optimize("HighOrder")
+            points, cells = _tetrahedra(gmsh, solid)
+        sides = {face.tag: _sides(gmsh, face.tag) for face in solid.faces}
+    if not len(cells) or not sides:
+        return None
+    unfolded = _unfolded(points, cells)
+    if unfolded is None:
+        said.append("flat elements")
+        return None
+    used, numbers = np.unique(cells, return_inverse=True)
+    faces = joined_faces(gmsh, solid, {tag: np.searchsorted(used, each) for tag, each in sides.items()})
+    way = f"{len(cells):,} tetrahedra of 10 nodes"
+    return SolidMesh(unfolded[used], numbers.reshape(cells.shape), faces, way)
+
+
+def _worth_optimising(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]) -> bool:
+    """Whether some elements, not too many, are bad by their curvature alone."""
+    bad = cells[scaled_jacobian(points, cells) < _BAD]
+    if not len(bad) or len(bad) > _FEW * len(cells):
+        return False
+    straight = points.copy()
+    straight[bad[:, 4:]] = edge_middles(points, bad)
+    return bool(scaled_jacobian(straight, bad).min() > _BAD)
+
+
+def _tetrahedra(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 10"]]:
+    """Nodes and cells of the second-order tetrahedra in gmsh's model, in VTK's order."""
+    points, ranked = numbered_nodes(gmsh)
+    kinds, _, nodes = gmsh.model.mesh.getElements(3, solid.tag)
+    if list(kinds) != [_TET10]:
+        return points, np.zeros((0, 10), dtype=np.int64)
+    theirs = np.reshape(gmsh.model.mesh.getElementProperties(_TET10)[4], (-1, 3))
+    order = node_numbers(np.round(theirs, 6), TET10)
+    return points, np.searchsorted(ranked, nodes[0]).reshape(-1, 10)[:, order]
+
+
+def _sides(gmsh: ModuleType, face: int) -> Int[np.ndarray, "f 3"]:
+    """Corners of the triangles on a face."""
+    _, ranked = numbered_nodes(gmsh)
+    kinds, _, nodes = gmsh.model.mesh.getElements(2, face)
+    if not len(kinds):
+        return np.zeros((0, 3), dtype=np.int64)
+    return np.asarray(np.searchsorted(ranked, nodes[0]).reshape(-1, 6)[:, :3])
+
+
+def _unfolded(
+    points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]
+) -> Float[np.ndarray, "n 3"] | None:
+    """The nodes, edges made straighter where elements are bad, until none is folded; None if straight ones are.
+
+    Elements with straight edges are valid if their corners are in order, so that there is an end to it.
+    """
+    bent, straight = points, points.copy()
+    straight[cells[:, 4:]] = edge_middles(points, cells)
+    moved = np.zeros(len(points))
+    for _ in range(len(_BLENDS) * len(EDGES)):
+        folded = ~valid_everywhere(points, cells)
+        bad = scaled_jacobian(points, cells) < _BAD
+        nodes = np.union1d(cells[folded, 4:], cells[bad, 4:][moved[cells[bad, 4:]] < _BLENDS[-2]])
+        if not len(nodes):
+            return points
+        if (moved[nodes] == 1.0).all():
+            return None
+        moved[nodes] = _next(moved[nodes])
+        points = bent + moved[:, None] * (straight - bent)
+    return None
+
+
+def _next(blend: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """The next of the blends."""
+    step: Bool[np.ndarray, "b n"] = np.array(_BLENDS)[:, None] > blend
+    return np.where(step.any(axis=0), np.array(_BLENDS)[step.argmax(axis=0)], 1.0)

@@ -1,0 +1,162 @@
+"""Tetrahedra: hexahedra divided into them, gmsh's own of any solid, folded ones mended, files of them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import meshio
+import numpy as np
+import pytest
+from geometry.catalogue import PARTS
+from geometry.make import empty_model
+from geometry.step_files import write_step
+from numpy.testing import assert_allclose
+
+from kedfem.errors import MeshError
+from kedfem.links.solid import solid_basis
+from kedfem.mesh import SolidMesh, filling, link_mesh, mesh_quality, part_mesh
+from kedfem.mesh.bounds import valid_everywhere
+from kedfem.mesh.cad.sides import owned_sides
+from kedfem.mesh.file import mesh_from_file
+from kedfem.mesh.hexahedra import extruded, quadratic, rectangle_quads
+from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.simplices import TET10
+from kedfem.mesh.tetrahedra import FORMS, straightened, tetrahedral
+from kedfem.scene import link_from
+from tests.laws.strategies import ring
+
+FLOAT = 1e-12  # of a volume: a few hundred terms
+
+
+def volume(mesh: SolidMesh) -> float:
+    return float(solid_basis(mesh).dx.sum())
+
+
+@pytest.fixture
+def gmsh() -> Iterator[ModuleType]:
+    with gmsh_model() as gmsh:
+        yield gmsh
+
+
+class TestDivided:
+    def test_a_block_keeps_its_nodes_and_volume(self) -> None:
+        """Six in each hexahedron, on no other nodes than hex27 has, sides of neighbours the same."""
+        hexahedra = extruded(*rectangle_quads(3.0, 2.0, 3, 2), 1.0, 2)
+        mesh = tetrahedral(hexahedra)
+        assert len(mesh.cells) == 6 * len(hexahedra.cells)
+        assert {tuple(x) for x in mesh.points.tolist()} <= {tuple(x) for x in hexahedra.points.tolist()}
+        assert len(owned_sides(mesh.cells)[0]) == 2 * len(owned_sides(hexahedra.cells)[0])
+        assert volume(mesh) == pytest.approx(6.0, rel=FLOAT)
+        assert mesh_quality(mesh).least > 0.3
+
+    def test_a_ring_keeps_its_bore(self) -> None:
+        """Parabolas through three points of an arc of 2π/16: 6e-5 of a circle's area off at most, both forms alike."""
+        hexahedra, mesh = ring(27, around=16), ring(10, around=16)
+        assert valid_everywhere(mesh.points, mesh.cells).all()
+        assert volume(mesh) == pytest.approx(volume(hexahedra), rel=1e-4)
+
+    def test_of_hexahedra_with_fewer_nodes_is_that_of_their_27(self) -> None:
+        few = FORMS["hex20"](extruded(*rectangle_quads(1.0, 1.0, 1, 1), 1.0, 1))
+        assert_allclose(tetrahedral(few).points, tetrahedral(quadratic(few)).points)
+
+    def test_tetrahedra_stay_in_every_form(self) -> None:
+        mesh = tetrahedral(extruded(*rectangle_quads(1.0, 1.0, 1, 1), 1.0, 1))
+        for form in FORMS.values():
+            assert form(mesh) is mesh
+            assert_allclose(form(straightened(mesh)).points[: len(mesh.points)].sum(), mesh.points.sum())
+
+    def test_scaled_jacobian_of_a_regular_one_is_1(self) -> None:
+        corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])[[0, 1, 3, 2]]
+        mesh = tetrahedral(SolidMesh(corners, np.arange(4)[None]))
+        assert mesh_quality(mesh).least == pytest.approx(1.0, rel=FLOAT)
+
+
+class TestMended:
+    def test_folded_ones_are_straightened_as_far_as_needed(self) -> None:
+        """A middle of an edge moved beyond the other side: valid again, and corners where they were."""
+        points, cells = TET10.copy(), np.arange(10)[None]
+        points[4] = [0.5, 0.6, 0.6]
+        assert not valid_everywhere(points, cells).all()
+        mended = filling._unfolded(points, cells)
+        assert mended is not None
+        assert valid_everywhere(mended, cells).all()
+        assert_allclose(mended[:4], points[:4])
+
+    def test_flat_ones_are_not(self) -> None:
+        assert filling._unfolded(TET10 * [1, 1, 0.0], np.arange(10)[None]) is None
+
+
+#: Easy ones of the catalogue, a tiny edge, and a part whose grid of looks met the edge of a hole.
+SOME = ("casting", "ball_seat", "bent_bar", "chamfered_bushing", "hook")
+#: The rest of a representative ten, slower.
+MORE = (
+    "lever_with_rounded_edges",
+    "ribbed_bell_crank",
+    "rod_end_with_thread",
+    "forged_rocker",
+    "i_section_rod",
+)
+
+
+@pytest.mark.parametrize(
+    "name", [*SOME[:2], *(pytest.param(n, marks=pytest.mark.long) for n in (*SOME[2:], *MORE))]
+)
+def test_parts_of_the_catalogue_are_meshed(name: str, tmp_path: Path) -> None:
+    """None refused, det J > 0 all over, at most 45,000 unknowns, volume within 0.5 % of CAD."""
+    with empty_model() as occ:
+        exact = 1e-9 * occ.getMass(3, PARTS[name](occ))
+        occ.synchronize()
+        write_step(tmp_path / f"{name}.step", [name])
+    given = {"shape": {"kind": "cad", "file": f"{name}.step"}, "material": "steel"}
+    mesh = part_mesh(link_from(given), tmp_path)
+    assert valid_everywhere(mesh.points, mesh.cells).all()
+    assert 3 * len(mesh.points) <= 45_000
+    assert volume(mesh) == pytest.approx(exact, rel=5e-3)
+
+
+def test_hexahedra_at_any_price_are_gmshs_subdivision(tmp_path: Path) -> None:
+    with empty_model() as occ:
+        occ.addSphere(0, 0, 0, 10)
+        occ.synchronize()
+        write_step(tmp_path / "ball.step", ["ball"])
+    shape = {"kind": "cad", "file": "ball.step"}
+    given = {
+        "shape": shape,
+        "material": "steel",
+        "mesh": {"kind": "hexahedra", "size": "5 mm"},
+        "min_quality": 0.0,
+    }
+    mesh = part_mesh(link_from(given), tmp_path)
+    assert mesh.cell_type == "hexahedron27"
+    assert "gmsh's subdivision" in mesh.way
+    with pytest.raises(MeshError, match=r"scaled Jacobian must be at least 0\.9 everywhere"):
+        part_mesh(link_from(given | {"min_quality": 0.9}), tmp_path)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("ending", ["msh", "inp", "vtu"])
+def test_files_of_tetrahedra_are_links(gmsh: ModuleType, tmp_path: Path, order: int, ending: str) -> None:
+    """Written by gmsh in its own order of nodes; physical groups of triangles are faces."""
+    gmsh.model.occ.addBox(0, 0, 0, 2, 1, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.option.setNumber("Mesh.ElementOrder", order)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+    low = next(
+        tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.occ.getCenterOfMass(2, tag)[0] < 1e-6
+    )
+    gmsh.model.addPhysicalGroup(2, [low], name="wall")
+    gmsh.model.addPhysicalGroup(3, [1], name="body")
+    gmsh.model.mesh.generate(3)
+    gmsh.write(str(tmp_path / "box.msh"))
+    file = tmp_path / f"box.{ending}"
+    if ending != "msh":
+        meshio.write(file, meshio.read(tmp_path / "box.msh"))
+    mesh = mesh_from_file("mesh", file, 1.0)
+    link = link_from({"shape": {"kind": "mesh", "file": file.name}, "material": "steel"})
+    made = link_mesh("box", link, tmp_path)
+    assert made.cell_type == "tetra10"
+    assert volume(made) == pytest.approx(2.0, rel=1e-9)
+    if ending == "msh":
+        (wall,) = mesh.faces
+        assert (wall.name, wall.kind) == ("wall", "plane")
+        assert_allclose(wall.direction, [-1, 0, 0], atol=1e-9)
