@@ -413,7 +413,7 @@ def test_sections_of_lines_turn_with_them(keys: dict[str, Any]) -> None:
     assert_allclose(frames[1], frames[0] @ R.T, rtol=0, atol=1e-10)
 
 
-def test_bars_as_beams_become_lines_where_they_are_tilted() -> None:
+def test_bars_tilt_as_lines_do() -> None:
     def coupler(kind: str) -> Any:
         raw = apart_rssr()
         P, _, Q = raw["links"]["coupler"]["shape"]["points"]
@@ -425,8 +425,10 @@ def test_bars_as_beams_become_lines_where_they_are_tilted() -> None:
         }
         return assembled(scene_from(raw))[0].links["coupler"].shape
 
-    assert coupler("bar") == coupler("polyline")
-    assert coupler("bar").up is not None
+    bar, line = coupler("bar"), coupler("polyline")
+    assert bar.between == line.points
+    assert bar.up == line.up
+    assert bar.up is not None
 
 
 # -- refused ------------------------------------------------------------------------------------------------
@@ -476,10 +478,12 @@ def test_shapes_that_cannot_be_tilted_are_refused_where_they_would_have_to_be() 
     Q = raw["links"]["coupler"]["shape"]["points"][-1]
     bar = {"kind": "bar", "between": [P, Q], "width": 0.02, "thickness": 0.01}
     raw["links"]["coupler"] = {"material": "steel", "shape": bar}
-    with pytest.raises(
-        MotionError, match=r"links\.coupler\.shape: must be .* tilts it, got a bar tilted by .* deg"
-    ):
-        assembled(scene_from(raw))
+    assert assembled(scene_from(raw))[0].links["coupler"].shape.up is not None
+    raw = arm()
+    eyes = {"kind": "plate_link", "between": [[0, 0], [0.3, 0]], "width": 0.02, "thickness": 0.01}
+    raw["links"]["arm"] = {"material": "steel", "shape": {**eyes, "bore_diameter": 0.01}}
+    with pytest.raises(MotionError, match=r"links\.arm\.shape: must be .* got a plate_link tilted by .* deg"):
+        redrawn(scene_from(raw), {"arm": TILT})
 
 
 # -- told ---------------------------------------------------------------------------------------------------

@@ -358,7 +358,8 @@ x_point = [0.25, 0]
         (PLATE.replace("[0, 0]", '"O"'), "file: part.toml: origin: must name a point, got 'O', known: none"),
         (
             PLATE + "[points]\nP = [1]",
-            "file: part.toml: points.P: must be a point: a name, or two or three coordinates [m], got [1]",
+            "file: part.toml: points.P: must be a point: a name, two or three coordinates [m], or a construction, "
+            "got [1]",
         ),
     ],
 )

@@ -19,8 +19,9 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
 from kedfem.links.record import Link
+from kedfem.links.recovery import PointRows, point_rows
 from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, wave_frequency
-from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights
+from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights, rigid_seat
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, unit
@@ -292,8 +293,28 @@ def _with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, L
     ]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.faces[body.link] for j in here if body.link in j.faces), ())
-    key, seat = on_part(links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis, faces))
+    if scene.links[body.link].fidelity == "rigid" and links[body.link].kind == "solid":
+        return body.link, _carrying(links[body.link], rigid_seat(links[body.link], at), where, body, axis)
+    try:
+        key, seat = on_part(
+            links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis, faces)
+        )
+    except MeshError:
+        if not isinstance(body, PointMass):
+            raise
+        key, point = on_part(links, body.link, at, lambda link: point_rows(link, f"{where}.at", at))
+        return key, with_point_mass(links[key], _on_axis(links[key], where, point, at), body.mass)
     return key, _carrying(links[key], seat, where, body, axis)
+
+
+def _on_axis(link: Link, where: str, point: PointRows, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, " n"]:
+    """Weights of a point of a link that carries a mass: of a planar beam on its axis."""
+    beside = float(np.linalg.norm(point.X - at))
+    if link.kind == "beam" and beside > 1e-6 * link.size:
+        raise SceneError(
+            f"{where}.at: must lie on the axis of planar beam '{link.name}', got {beside:.3g} m beside it"
+        )
+    return point.value
 
 
 def _carrying(link: Link, seat: Seat, where: str, body: Body, axis: Float[np.ndarray, "3"] | None) -> Link:
@@ -315,10 +336,6 @@ def _carrying(link: Link, seat: Seat, where: str, body: Body, axis: Float[np.nda
                 )
                 raise MeshError(
                     f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
-                )
-            if link.kind == "beam" and np.linalg.norm(np.subtract(centre, at)[:2]) > 1e-9:
-                raise SceneError(
-                    f"{where}.centre: a body on a planar beam must have its centre at its point {body.at}, got {centre}"
                 )
             return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
 

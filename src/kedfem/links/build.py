@@ -1,11 +1,13 @@
 """Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included."""
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
-from kedfem.links.beam import beam_link, line_axes
-from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
+from kedfem.links.beam import beam_link, line_axes, spaced
+from kedfem.links.beam_axis import Axis, directions, smooth_axis, straight_axis
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.seats import joint_seat
@@ -30,6 +32,7 @@ from kedfem.scene import (
     MeshFile,
     Part,
     PlateLink,
+    PointMass,
     Polyline,
     RectangleSection,
     Scene,
@@ -37,6 +40,8 @@ from kedfem.scene import (
     spatial_beams,
 )
 
+SEATED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
+SAME = 1e-6  # of a segment's length: what is so near is at one place
 SEGMENTS = 6  # of a solid or plane link with frames that follow, where none are given
 
 
@@ -54,7 +59,9 @@ def bare_links(scene: Scene) -> dict[str, Link]:
 def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
     """Link axes as columns, in the reference position: x along shapes that have a direction, else the world's axes."""
     match link.shape:
-        case Bar(between=(a, b)) | PlateLink(between=(a, b)) | Part(between=(a, b)):
+        case Bar(between=(a, b)) as bar:
+            return directions(np.subtract(b, a), np.array(bar.upward)).T
+        case PlateLink(between=(a, b)) | Part(between=(a, b)):
             return line_axes(np.asarray(a), np.asarray(b))
         case Cad(origin=a, towards=b) | MeshFile(origin=a, towards=b) if b is not None:
             return line_axes(np.asarray(a), np.asarray(b))
@@ -78,7 +85,7 @@ def bare_link(scene: Scene, name: str) -> Link:
         return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
     if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
-    return _beam(name, link, material, name in spatial_beams(scene))
+    return _beam(scene, name)
 
 
 def parted(scene: Scene, name: str, link: Link) -> Segments:
@@ -103,7 +110,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case "beam":
             return beam_segments(link, material)
         case "spatial_beam":
-            return space_segments(link, _axis(given), material)
+            return space_segments(link, _axis(scene, name), material)
         case _:
             joints = [joint for joint in scene.joints.values() if name in joint.links]
             ends = np.array([joint.at for joint in joints]).reshape(-1, 3)
@@ -154,29 +161,62 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     return out
 
 
-def _beam(name: str, link: LinkScene, material: Material, spatial: bool) -> Link:
-    shape = link.shape
+def _beam(scene: Scene, name: str) -> Link:
+    link = scene.links[name]
+    shape, material = link.shape, scene.materials[str(link.material)]
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
     of_section = shape.of_section if isinstance(shape, Polyline) else _of_bar(shape)
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
-    points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
-    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
-    if not spatial:
-        return beam_link(name, points, section, material, elements, beam_nodes(link))
-    return spatial_beam_link(name, _axis(link), section, material)
+    if name in spatial_beams(scene):
+        return spatial_beam_link(name, _axis(scene, name), section, material)
+    points, elements = beam_points(scene, name, spatial=False), link.mesh.elements
+    count = elements if isinstance(elements, int) else 1
+    return beam_link(name, points, section, material, count, beam_nodes(link))
 
 
-def _axis(link: LinkScene) -> Axis:
+def _axis(scene: Scene, name: str) -> Axis:
     """The axis of a beam in space."""
+    link = scene.links[name]
     shape = link.shape
     if not isinstance(shape, Bar | Polyline):
         raise TypeError("a beam is a bar or a polyline")  # refused by the scene already
-    smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, None)
-    points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
+    smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, shape.upward)
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
     make = smooth_axis if smooth else straight_axis
+    points = beam_points(scene, name, spatial=True)
     return make(points, elements, beam_nodes(link), None if up is None else np.array(up))
+
+
+def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 3"]:
+    """The corners of a beam, and where joints and bodies sit between them: segments begin and end there.
+
+    Those that have a node already need no corner, but for bodies with inertia on a beam in space.
+    """
+    link = scene.links[name]
+    shape = link.shape
+    points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
+    if getattr(shape, "smooth", False):
+        return points
+    held = [x.on(name) for x in scene.joints.values() if name in x.links and x.kind in SEATED]
+    light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
+    heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
+    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
+    nodes = spaced(elements, beam_nodes(link)) / elements
+    out = [points[:1]]
+    for P, Q in pairwise(points):
+        length = float(np.linalg.norm(Q - P))
+        inside, corners = [], []
+        for at, corner in [*((x, False) for x in (*held, *light)), *((x, spatial) for x in heavy)]:
+            f = float((np.asarray(at) - P) @ (Q - P)) / length**2
+            beside = float(np.linalg.norm(P + f * (Q - P) - at))
+            if beside <= SAME * length and SAME < f < 1.0 - SAME:
+                inside.append(f)
+                corners.append(corner or np.abs(nodes - f).min() > SAME)
+        apart = [f for k, f in enumerate(sorted(inside)) if k == 0 or f - sorted(inside)[k - 1] > SAME]
+        apart = apart if any(corners) else []  # one new corner moves all nodes of the segment
+        out += [P + np.array(apart)[:, None] * (Q - P), Q[None]]
+    return np.concatenate(out)
 
 
 def beam_nodes(link: LinkScene) -> int:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.linalg import qr
 
 from kedfem.errors import MeshError
 from kedfem.links.missing import in_its_plane, not_touching
@@ -91,6 +92,21 @@ def joint_seat(
     if link.kind == "spatial_beam":
         return _section_seat(link, where, point)
     return facet_seat(link, named_facets(link, where, faces) if faces else picked(link, where, point, axis))
+
+
+def rigid_seat(link: Link, at: Float[np.ndarray, "3"]) -> Seat:
+    """The seat that a rigid solid offers at any point: its affine field, told by four of its nodes.
+
+    Parameters
+    ----------
+    at : reference position, in the link or outside it [m]
+    """
+    known = np.column_stack([link.one, (link.X - np.outer(link.one, at)) / link.size])
+    order = qr(known.T, mode="r", pivoting=True)[1]
+    four = order[:4]
+    fit = np.zeros((4, link.n))
+    fit[:, four] = np.linalg.inv(known[four]) / np.array([1.0, *[link.size] * 3])[:, None]
+    return Seat(fit, np.asarray(at, float), np.eye(3), np.full(3, link.size))
 
 
 def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Seat:

@@ -17,6 +17,7 @@ from kedfem.scene import Material
 
 HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
 HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
+STRAIGHT = 1e-9  # of tangents: rounding
 
 
 def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "6 m 3 3"], float]:
@@ -150,9 +151,16 @@ def spatial_beam_link(
     read_only(X, one, cells, m1, mX)
     return Link(
         name=name, kind="spatial_beam", X=X, one=one, cells=cells, cell_type=cell_type(cells.shape[1]),
-        axes=line_axes(x[0, 0], x[-1, 0]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        axes=_link_axes(axis), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=material.youngs_modulus, lame=material.lame(), section=section, triples=triples,
     )  # fmt: skip
+
+
+def _link_axes(axis: Axis) -> Float[np.ndarray, "3 3"]:
+    """Of a straight beam those of its section, else x between its ends."""
+    chord = line_axes(axis.frame[0, 0], axis.frame[-1, 0])
+    straight = np.abs(axis.frame[:, 1] - chord[:, 0]).max() < STRAIGHT
+    return np.asarray(axis.frame[0, 1:].T) if straight else chord
 
 
 def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"], sp.csr_array]:

@@ -125,7 +125,7 @@ def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:
     _check_count(f"{where}.mesh.elements", float(math.prod([along, across, *layers])))
     P, Q = np.array(shape.between)
     quads = rectangle_quads(math.dist(P, Q), shape.width, along, across)
-    return Plate(quads, shape.thickness, P, frame_along(Q - P))
+    return Plate(quads, shape.thickness, P, frame_along(Q - P, np.array(shape.upward)))
 
 
 def eye_plate(where: str, shape: PlateLink, mesh: Meshing) -> Plate:

@@ -159,12 +159,10 @@ def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
         case Polyline() as line:
             points = tuple(shift.point(x) for x in line.points)
             change = {"points": points, "up": _up(where, line.up, _directions(line), shift)}
-        case Bar() as bar if link.fidelity == "beam":
-            if _tilt(shift, *_defaults([bar.between])) > 0.0:
-                line = Polyline(points=bar.between, width=bar.width, thickness=bar.thickness)
-                return _link(name, link.model_copy(update={"shape": line}), shift)
-            change = {"between": tuple(shift.point(x) for x in bar.between)}
-        case Bar() | PlateLink() | Part() as shape:
+        case Bar() as bar:
+            up = bar.up if _tilt(shift, bar.upward) == 0.0 else shift.turned(bar.upward)
+            change = {"between": tuple(shift.point(x) for x in bar.between), "up": up}
+        case PlateLink() | Part() as shape:
             _check_level(where, shape.kind, shift)
             change = {"between": tuple(shift.point(x) for x in shape.between)}
         case Extrusion() as plate:

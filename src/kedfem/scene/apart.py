@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainSerializer, TypeAdapter, ValidatorFunctionWrapHandler, WrapValidator
 
-from kedfem.scene.points import XYZ, Point, placed
+from kedfem.scene.points import XYZ, Point, is_construction, placed
 from kedfem.scene.units import Length
 
 BY_LINK: TypeAdapter[dict[str, XYZ]] = TypeAdapter(dict[str, Point])
@@ -31,7 +31,8 @@ def apart(points: Mapping[str, XYZ]) -> Apart:
 
 def joint_point(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
     """A point, or points in a table by link."""
-    return apart(BY_LINK.validate_python(value)) if isinstance(value, Mapping) else placed(value, coordinates)
+    by_link = isinstance(value, Mapping) and not is_construction(value)
+    return apart(BY_LINK.validate_python(value)) if by_link else placed(value, coordinates)
 
 
 def stored_point(at: XYZ) -> object:

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from kedfem.scene.faults import place
-from kedfem.scene.hints import Where, below, members, quantities
-from kedfem.scene.points import construction_of
+from kedfem.scene.hints import Where, below, quantities
 
 TURN = 2.0 * math.pi
 FAST = (
@@ -25,8 +24,6 @@ def bare_numbers(raw: Any, hint: Any, where: Where = ()) -> Iterator[str]:
     hint : its type, a record
     where : its place in the scene
     """
-    if isinstance(raw, Mapping) and any(_is_tuple(member) for member in members(hint)):
-        hint = construction_of(raw)
     items = raw.items() if isinstance(raw, Mapping) else enumerate(raw)
     for key, value in items:
         inner = below(hint, key, raw)
@@ -37,10 +34,6 @@ def bare_numbers(raw: Any, hint: Any, where: Where = ()) -> Iterator[str]:
         elif isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(raw, Mapping):
             units = {quantity.unit for quantity in quantities(inner)}
             yield from doubts(place((*where, key)), float(value), units)
-
-
-def _is_tuple(member: Any) -> bool:
-    return getattr(member, "__origin__", None) is tuple
 
 
 def doubts(where: str, value: float, units: set[str]) -> Iterator[str]:

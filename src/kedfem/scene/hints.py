@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from kedfem.scene.points import AxisPoints, construction_of, is_construction
 from kedfem.scene.units import Quantity
 
 Where = tuple[str | int, ...]
@@ -69,6 +70,18 @@ def quantities(hint: Any) -> set[Quantity]:
     return found.union(*(quantities(part) for part in get_args(hint) if not isinstance(part, (str, int))))
 
 
+def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
+    """The record of a table that stands for a point or an axis; None if it stands for neither."""
+    units = {
+        frozenset(x.unit for x in quantities(part)) for part in members(hint) if get_origin(part) is tuple
+    }
+    if models(hint) and not is_construction(raw):
+        return None
+    if units == {frozenset({"m"})}:
+        return construction_of(raw)
+    return AxisPoints if units == {frozenset({"1"})} else None
+
+
 def below(hint: Any, part: str | int, raw: Any) -> Any:
     """The type of one key or item of something of a given type; None if it has none."""
     for member in members(hint):
@@ -77,6 +90,8 @@ def below(hint: Any, part: str | int, raw: Any) -> Any:
             return inner[1]
         if get_origin(member) is tuple and isinstance(part, int):
             return inner[0] if inner[-1] is Ellipsis or part >= len(inner) else inner[part]
+    if isinstance(raw, Mapping) and (constructed := construction(hint, raw)) is not None:
+        hint = constructed
     for model in models(hint):
         wanted = raw.get("kind") if isinstance(raw, dict) else None
         if part in keys(model) and (kind_of(model) in [None, wanted]):
@@ -103,4 +118,6 @@ def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
 def known_keys(hint: Any, raw: Any) -> list[str]:
     """The keys that a record of a given type may have, for raw input of one kind if there are several."""
     kind = raw.get("kind") if isinstance(raw, dict) else None
+    made = construction(hint, raw) if isinstance(raw, Mapping) else None
+    hint = made or hint
     return [key for model in models(hint) if kind_of(model) in [None, kind] for key in keys(model)]

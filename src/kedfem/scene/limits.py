@@ -12,7 +12,7 @@ from kedfem.scene.files import part_geometry
 from kedfem.scene.laws import table_noise
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
-from kedfem.scene.shapes import Cad, MeshFile, Part
+from kedfem.scene.shapes import Bar, Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
 ROUGH = 0.05  # share of a table's acceleration that may be noise
@@ -36,6 +36,10 @@ def planar_faults(parts: Parts) -> Iterator[str]:
         yield f"gravity: must lie in the xy plane in {here} [m/s^2], got {vector(parts.gravity)}"
     for load in parts.loads.values():
         yield from leaving(load, f"in {here}")
+    for link in parts.links.values():
+        shape = getattr(link.record, "shape", None)
+        if fidelity(link) == "plane" and isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
+            yield link.fault("shape", f"must be along z in {here}, got {vector(shape.upward)}", "up")
     yield from mixed_faults(parts)
     yield from plane_faults(parts, here)
 

@@ -49,7 +49,8 @@ class Meshing(Record):
     """How finely a link is divided into elements."""
 
     elements: Annotated[int | tuple[int, int] | tuple[int, int, int] | None, BeforeValidator(counts)] = None
-    """bar: numbers along and across, of a solid also through the thickness; beam: number per segment (1 if not given)"""
+    """bar: numbers along and across, of a solid also through the thickness; beam: number per segment
+    (1 if not given); joints and bodies between its corners begin segments of their own"""
     size: PositiveLength | None = None
     """other shapes: edge length of the elements, instead of `elements_across`"""
     elements_across: Count | None = None
@@ -196,8 +197,9 @@ class Joint(Record):
     """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
     `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
     axis: Axis | None = None
-    """`"x"`, `"y"`, `"z"` or a vector: a hinge's axis (`"z"` if not given), the direction of what slides, the normal of a
-    planar joint (required for those); for a ball or a weld the axis of the bore that holds it"""
+    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
+    of what slides, the normal of a planar joint (required for those); for a ball or a weld the axis of the bore that
+    holds it"""
     axes: tuple[Axis, Axis] | None = None
     """of a universal joint: the axis in the first link and that in the second, at right angles"""
     lead: Annotated[float, Quantity("m")] | None = None

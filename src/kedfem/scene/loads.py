@@ -230,7 +230,7 @@ class PointMass(Record):
     link: str
     """the link that carries it"""
     at: Point
-    """the joint's point: the bore that carries it"""
+    """where: anywhere on a link (of a planar beam on its axis)"""
     mass: Annotated[float, Quantity("kg", above=0.0)]
     """its mass"""
 
@@ -242,7 +242,7 @@ class RigidBody(Record):
     link: str
     """the link that carries it"""
     at: Point
-    """the joint's point: the bore that carries it"""
+    """where: anywhere on a beam's axis or on a rigid link; on an elastic solid a bore, as of a joint"""
     mass: Annotated[float, Quantity("kg", above=0.0)]
     """its mass"""
     inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]

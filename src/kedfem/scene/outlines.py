@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, field_validator, model_validator
 
 from kedfem.scene.base import Fault, Record, refuse
-from kedfem.scene.points import XYZ, Point
+from kedfem.scene.points import XYZ, Point, is_construction
 from kedfem.scene.units import PositiveLength, fault
 
 CHORDS = 64  # an arc as so many chords, for the checks only
@@ -39,7 +39,8 @@ CORNER: TypeAdapter[XYZ] = TypeAdapter(Point)
 
 def outline_item(value: object) -> XYZ | Arc:
     """An arc if it is a table, else a corner."""
-    return Arc.model_validate(value) if isinstance(value, (dict, Arc)) else CORNER.validate_python(value)
+    arc = isinstance(value, Arc) or (isinstance(value, dict) and not is_construction(value))
+    return Arc.model_validate(value) if arc else CORNER.validate_python(value)
 
 
 def stored_item(item: XYZ | Arc) -> object:

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.scene.faults import fault_lines, line
 from kedfem.scene.hints import Where
-from kedfem.scene.points import UNPLACED, XYZ, Point, construction_of, known_points
+from kedfem.scene.points import UNPLACED, XYZ, Point, construction_of, is_construction, known_points
 from kedfem.scene.units import fault
 
 POINT: TypeAdapter[XYZ] = TypeAdapter(Point)
@@ -49,7 +49,7 @@ class Placement(Mapping[str, XYZ]):
         if self._unknown:  # the points are no table, which is a fault of its own
             return UNPLACED
         where, value = self._raw[name]
-        if where[0] == "joints" and isinstance(value, Mapping) and isinstance(value.get("at"), Mapping):
+        if where[0] == "joints" and isinstance(value, Mapping) and by_link(value.get("at")):
             raise fault(f"must be one point, got {name!r}, which has one for each of its links")
         if name in self._pending:
             circle = " → ".join([*self._pending[self._pending.index(name) :], name])
@@ -86,3 +86,8 @@ class Placement(Mapping[str, XYZ]):
                 return POINT.validate_python(value["at"])
         except (ValidationError, KeyError, TypeError):
             return UNPLACED
+
+
+def by_link(at: object) -> bool:
+    """Whether a joint has a point for each of its links."""
+    return isinstance(at, Mapping) and not is_construction(at)

@@ -10,7 +10,7 @@ from kedfem.scene.apart import Apart
 from kedfem.scene.checks import fidelity, link_names
 from kedfem.scene.parts import NONE, Entry, Parts
 from kedfem.scene.points import XYZ
-from kedfem.scene.shapes import Polyline
+from kedfem.scene.shapes import Bar, Polyline
 
 if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
@@ -85,17 +85,25 @@ def beam_faults(parts: Parts) -> Iterator[str]:
 
 def obstacles(parts: Parts, name: str) -> Iterator[str]:
     """Why a beam cannot be planar, as fault lines."""
+    whose = f"for the planar beam {name!r}"
     shape = parts.links[name].record.shape if parts.links[name].record is not None else None
     if isinstance(shape, Polyline):
         for key in ("smooth", "up"):
             if getattr(shape, key):
                 yield parts.links[name].fault("shape", "must be left out for a planar beam, got one", key)
-    whose = f"for the planar beam {name!r}"
+    if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
+        yield parts.links[name].fault("shape", f"must be along z {whose}, got {vector(shape.upward)}", "up")
     yield from joint_obstacles(parts, name, whose)
     if parts.gravity[2] != 0.0:
         yield f"gravity: must lie in the xy plane {whose} [m/s^2], got {vector(parts.gravity)}"
     for load in parts.loads.values():
         yield from leaving(load, whose)
+    for body in parts.bodies.values():
+        centre = getattr(body.record, "centre", None)
+        if centre is not None and body.record.link == name and math.dist(centre, body.record.at) > FLAT:
+            yield body.fault(
+                "centre", f"must be its point {vector(body.record.at)} {whose} [m], got {vector(centre)}"
+            )
     yield from plane_obstacles(parts, name)
 
 

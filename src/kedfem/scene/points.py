@@ -12,10 +12,13 @@ from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapV
 
 from kedfem.scene.base import Record
 from kedfem.scene.units import Angle, Length, Number, PositiveLength, Quantity, fault
-from kedfem.scene.wording import shown, unknown_name
+from kedfem.scene.wording import nearest, shown, unknown_name
 
 XYZ = tuple[float, float, float]
 AXES: dict[str, XYZ] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+MARKS = {"from", "between", "along", "distances"}
+"""Keys that tell one construction of a point from others."""
+FARTHEST = 1e100  # m: squares of distances can still be told
 UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a point that is named but could not be constructed
 
 _known_points: ContextVar[Mapping[str, XYZ] | None] = ContextVar("known_points", default=None)
@@ -31,7 +34,9 @@ def known_points(points: Mapping[str, XYZ]) -> Iterator[None]:
         _known_points.reset(token)
 
 
-def padded(value: object, what: str = "a point: a name, or two or three coordinates [m]") -> object:
+def padded(
+    value: object, what: str = "a point: a name, two or three coordinates [m], or a construction"
+) -> object:
     """Two or three coordinates as three: z = 0 unless given."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)) and len(value) in {2, 3}:
@@ -40,7 +45,12 @@ def padded(value: object, what: str = "a point: a name, or two or three coordina
 
 
 def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
-    """The coordinates of a point field: looked up if it holds a name."""
+    """The coordinates of a point field: looked up if it holds a name, worked out if it holds a construction."""
+    if isinstance(value, Mapping):
+        xyz = construction_of(value).model_validate(value).xyz()
+        if not all(math.isfinite(x) and abs(x) < FARTHEST for x in xyz):
+            raise fault("must be constructed from points that are known and near, got one at no place")
+        return xyz
     if not isinstance(value, str):
         return coordinates(padded(value))
     points = _known_points.get()
@@ -54,10 +64,13 @@ def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
 
 
 def unit_axis(value: object, components: ValidatorFunctionWrapHandler) -> Any:
-    """The unit vector of an axis given as 'x', 'y', 'z' or a vector."""
+    """The unit vector of an axis given as 'x', 'y', 'z', a vector, or by two points."""
     if isinstance(value, str) and value in AXES:
         return AXES[value]
-    vector = components(padded(value, "'x', 'y', 'z' or a vector"))
+    if isinstance(value, Mapping):
+        vector = AxisPoints.model_validate(value).vector()
+    else:
+        vector = components(padded(value, "'x', 'y', 'z', a vector, or { from = point, to = point }"))
     size = math.hypot(*vector)
     if size == 0.0:
         raise fault("must be a direction, got a vector of length zero")
@@ -73,6 +86,20 @@ Point = Annotated[tuple[Length, Length, Length], WrapValidator(placed)]
 Axis = Annotated[tuple[Number, Number, Number], WrapValidator(unit_axis)]
 Acceleration = Annotated[float, Quantity("m/s^2")]
 AccelerationVector = Annotated[tuple[Acceleration, Acceleration, Acceleration], BeforeValidator(as_vector)]
+
+
+class AxisPoints(Record):
+    """The direction of an axis from one point to another."""
+
+    start: Point = Field(alias="from")
+    """the point that it comes from"""
+    end: Point = Field(alias="to")
+    """the point that it goes to"""
+
+    def vector(self) -> XYZ:
+        """From one to the other [m]."""
+        x, y, z = (q - p for p, q in zip(self.start, self.end, strict=True))
+        return (x, y, z)
 
 
 class PolarPoint(Record):
@@ -174,10 +201,17 @@ class LinePoint(Record):
 
 
 def construction_of(value: Mapping[str, Any]) -> type[PolarPoint | CirclesPoint | BetweenPoint | LinePoint]:
-    """The construction that the keys of a point mean."""
+    """The construction that the keys of a point mean, or are likely to."""
+    if not MARKS & value.keys():
+        value = {nearest(str(key), MARKS) or key: item for key, item in value.items()}
     if "between" in value:
         return BetweenPoint
     if "along" in value:
         return LinePoint
     several = "distances" in value or isinstance(value.get("from"), (list, tuple))
     return CirclesPoint if several else PolarPoint
+
+
+def is_construction(value: Mapping[str, Any]) -> bool:
+    """Whether a table at a joint's `at` is a construction, not points by link."""
+    return bool({"from", "between"} & value.keys())

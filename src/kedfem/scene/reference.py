@@ -44,8 +44,10 @@ as *where: what was wanted, what was got*.
 
 * **Units** are SI (m, kg, s, N, Pa, rad, Hz). A string may carry another unit of the same kind: `"25.4 mm"`,
   `"600 rpm"`, `"60 deg"`, `"70 GPa"`. Hertz do not count as a rotational speed nor rpm as a frequency.
-* **Points** are two or three coordinates (z = 0 if left out), the name of a point in `[points]`, or
-  `joints.NAME` for the place of a joint. **Axes** are `"x"`, `"y"`, `"z"` or a vector of any length.
+* **Points** are two or three coordinates (z = 0 if left out), the name of a point in `[points]`,
+  `joints.NAME` for the place of a joint, or one of the constructions below, wherever a point stands:
+  `at = {{ between = ["A", "B"], fraction = 0.3 }}`. **Axes** are `"x"`, `"y"`, `"z"`, a vector of any length, or two
+  points: `axis = {{ from = "A", to = "B" }}`.
   **Vectors** are two or three components; the third is 0 if left out.
 * **One reference position:** all points, shapes and axes hold where the linkage is drawn; the drive's angle
   counts from there. Where joints have points of their own on each link, this position is the closed one.
@@ -73,7 +75,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("The file", "", [scene.Scene]),
     (
         "[points]",
-        "Each is a list of coordinates or one of these constructions.",
+        "Each is a list of coordinates or one of these constructions, which may stand in place of any other point too.",
         [points.PolarPoint, points.CirclesPoint, points.LinePoint, points.BetweenPoint],
     ),
     ("[materials.NAME]", "", [materials.Material]),

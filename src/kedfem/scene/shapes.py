@@ -31,29 +31,47 @@ def level(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
     return points
 
 
-def not_upright(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
-    """Two points that are not one above the other: across and along z must differ from the line."""
-    P, Q = points
-    if math.dist(P[:2], Q[:2]) == 0.0:
-        raise fault(f"must be two points of different x or y, got ({P[0]:.6g}, {P[1]:.6g}) for both")
-    return points
-
-
 UPRIGHT = 1 - 1e-6  # cosine between a line and `up` from which they count as one direction
+STEEP = 0.9  # cosine between a line and z from which x is up unless given
 
 TwoPoints = Annotated[tuple[Point, Point], AfterValidator(different)]
+
+
+def along_up(pairs: list[tuple[XYZ, XYZ]], up: XYZ | None) -> list[Fault]:
+    """Segments along `up`, to which no direction is nearest."""
+    for i, (P, Q) in enumerate(pairs if up is not None else ()):
+        length = math.dist(P, Q)
+        along = sum((q - p) * u for p, q, u in zip(P, Q, up or (), strict=True)) / length
+        if abs(along) > UPRIGHT:
+            return [(("up",), f"must not be along the line, got that of points[{i}] to points[{i + 1}]")]
+    return []
 
 
 class Bar(Record):
     """A straight bar of rectangular section that ends exactly at two points; solid or beam."""
 
     kind: Literal["bar"] = "bar"
-    between: Annotated[TwoPoints, AfterValidator(not_upright)]
-    """the two ends"""
+    between: TwoPoints
+    """the two ends, in any direction"""
     width: PositiveLength
-    """across the line, in the xy plane"""
+    """across the line, in the xy plane unless `up` says otherwise"""
     thickness: PositiveLength
-    """across line and width: along z for a bar in an xy plane"""
+    """across line and width: along z for a bar in an xy plane, else as near to `up` as can be"""
+    up: Axis | None = None
+    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: the thickness is as near to it as can be; z if not
+    given, x for a bar that is steeper than 64°"""
+
+    @model_validator(mode="after")
+    def _not_along_up(self) -> Self:
+        refuse(along_up([self.between], self.up))
+        return self
+
+    @property
+    def upward(self) -> XYZ:
+        """`up`, as given or as it is if not given."""
+        P, Q = self.between
+        steep = abs(Q[2] - P[2]) >= STEEP * math.dist(P, Q)
+        return self.up or ((1.0, 0.0, 0.0) if steep else (0.0, 0.0, 1.0))
 
 
 class PlateLink(Record):
@@ -125,8 +143,8 @@ class Polyline(Record):
     section: SectionShape | None = None
     """another section, instead of width and thickness"""
     up: Axis | None = None
-    """`"x"`, `"y"`, `"z"` or a vector: the thickness is as near to it as can be (on a smooth curve: at its first point);
-    z if not given, x for a line along z"""
+    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: the thickness is as near to it as can be (on a
+    smooth curve: at its first point); z if not given, x for a segment that is steeper than 64°"""
 
     @model_validator(mode="after")
     def _one_section(self) -> Self:
@@ -141,18 +159,9 @@ class Polyline(Record):
                 for key in ("width", "thickness")
                 if key not in given
             ]
-        refuse([*faults, *self._along_up()])
-        return self
-
-    def _along_up(self) -> list[Fault]:
-        """Segments along `up`, to which no direction is nearest."""
         pairs = list(pairwise(self.points))[: 1 if self.smooth else None]
-        for i, (P, Q) in enumerate(pairs if self.up is not None else ()):
-            length = math.dist(P, Q)
-            along = sum((q - p) * u for p, q, u in zip(P, Q, self.up or (), strict=True)) / length
-            if abs(along) > UPRIGHT:
-                return [(("up",), f"must not be along the line, got that of points[{i}] to points[{i + 1}]")]
-        return []
+        refuse([*faults, *along_up(pairs, self.up)])
+        return self
 
     @property
     def of_section(self) -> SectionShape:
