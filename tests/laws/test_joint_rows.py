@@ -115,7 +115,9 @@ def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_
         assert_allclose(other, force[0], atol=1e-8 * np.abs(force[0]).max())
 
 
-@pytest.mark.parametrize("kind", list(SOLIDS))
+@pytest.mark.parametrize(
+    "kind", ["cylindrical, bores", pytest.param("prismatic, bores", marks=pytest.mark.long)]
+)
 def test_no_answer_of_solids_depends_on_how_the_scene_lies(kind: str, tmp_path: Path) -> None:
     """All solids in mesh files, which may lie as they like; bores are found there."""
     R, shift = moved(3)

@@ -136,7 +136,7 @@ def test_the_same_law_drives_a_motor() -> None:
         assert apart(followed, nominal) < 1e-3 * largest(nominal)
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid"])
+@pytest.mark.parametrize("fidelity", ["plane", pytest.param("solid", marks=pytest.mark.long)])
 def test_meshed_links_bear_springs_too(fidelity: str) -> None:
     followed, nominal = (
         places(four_bar(frames, fidelity, springs=line(50.0), steps=72))

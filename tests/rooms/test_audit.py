@@ -69,7 +69,12 @@ KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+DAILY = {"beams", "from rest", "spatial beams", "beams that are followed", "planes", "solids"}
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(x, marks=() if x in DAILY else pytest.mark.long) for x in KINDS]
+)
 def test_what_the_steps_leave_over_falls_with_the_square_of_the_step(kind: str) -> None:
     name, links, analysis = KINDS[kind]
     long, short = (audited(example(name, steps, links, **analysis))[0] for steps in (360, 720))

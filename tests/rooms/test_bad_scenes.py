@@ -435,7 +435,7 @@ def paths(table, above=""):
 
 
 @pytest.mark.parametrize(
-    "base", [pytest.param(x, marks=pytest.mark.long if x == "solid" else ()) for x in BASES]
+    "base", [pytest.param(x, marks=() if x == "beam" else pytest.mark.long) for x in BASES]
 )
 def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
     for path in paths(tomllib.loads(BASES[base])):

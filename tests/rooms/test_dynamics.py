@@ -66,7 +66,7 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
     ("kind", "steps", "bound"),
     [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)],
 )
-@pytest.mark.parametrize("rho_inf", [1.0, 0.8])
+@pytest.mark.parametrize("rho_inf", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps))
     _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps, solver="literal"))

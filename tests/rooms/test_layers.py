@@ -465,6 +465,7 @@ SIZES = {
 }
 
 
+@pytest.mark.long
 class TestRandomLayers:
     @settings(max_examples=4)
     @given(**SIZES)

@@ -191,6 +191,7 @@ def engine(fidelity: str) -> dict[str, Any]:
     return raw
 
 
+@pytest.mark.long
 def test_a_guided_piston_under_gas_is_that_of_solids() -> None:
     a, b = histories(engine("plane")), histories(engine("solid"))
     for name in ("probes/rod_edge/stress", "joints/A/force", "joints/guide/force", "drive/torque"):

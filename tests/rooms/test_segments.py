@@ -51,7 +51,7 @@ def ready(raw: dict[str, Any]) -> Prepared:
 # -- reduced ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid"])
+@pytest.mark.parametrize("fidelity", ["plane", pytest.param("solid", marks=pytest.mark.long)])
 def test_reduced_segments_keep_to_their_tolerance(fidelity: str) -> None:
     raw = bars(fidelity=fidelity, segments=3)
     full = histories(meshed(scene_from(raw)))

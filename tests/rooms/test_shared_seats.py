@@ -109,7 +109,7 @@ def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
             assert moment < 1e-8 * np.abs(row[f"joints/{hinge}/force"]).max()
 
 
-@pytest.mark.parametrize("kind", ["beam", "plate"])
+@pytest.mark.parametrize("kind", ["beam", pytest.param("plate", marks=pytest.mark.long)])
 def test_torque_of_a_driven_hub_that_carries_a_pin(kind: str) -> None:
     """A lever and a swing on the crank's two pins: driven slowly, the torque is that of rigid links."""
     raw = with_dyad(
