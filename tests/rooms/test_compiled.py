@@ -23,6 +23,28 @@ def test_a_change_in_any_kernel_begins_a_new_folder(tmp_path: Path) -> None:
     assert compiled.kernel_folder(tmp_path) != first
 
 
+def test_a_change_in_what_a_kernel_imports_begins_a_new_folder(tmp_path: Path) -> None:
+    """Constants of other files are frozen in what is compiled; a slide was once computed as a distance."""
+    root = tmp_path / "package"
+    (root / "room").mkdir(parents=True)
+    kernel, constants, other = (root / name for name in ("loop_kernel.py", "room/kinds.py", "room/other.py"))
+    kernel.write_text("from package.room.kinds import TURN, SLIDE\n")
+    constants.write_text("TURN, SLIDE = 0, 1\n")
+    other.write_text("")
+    first = compiled.kernel_folder(root)
+    other.write_text("x = 1\n")
+    assert compiled.kernel_folder(root) == first
+    constants.write_text("TURN, SLIDE = 1, 0\n")
+    assert compiled.kernel_folder(root) != first
+
+
+def test_the_kinds_of_actions_and_the_options_of_the_compiler_are_in_it() -> None:
+    from kedfem.compiled import ROOT, _imported
+
+    files = _imported(ROOT / "dynamics" / "actions_kernel.py", ROOT)
+    assert {ROOT / "dynamics" / "action.py", ROOT / "compiled.py"} <= files
+
+
 @pytest.mark.skipif("NUMBA_CACHE_DIR" in os.environ, reason="the user has chosen a folder")
 def test_what_is_compiled_goes_there() -> None:
     from kedfem.dynamics.kernel import times

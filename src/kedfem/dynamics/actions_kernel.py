@@ -121,13 +121,13 @@ def evaluate_all(t, x, v, before, table, forces, values):  # type: ignore[no-unt
 @compiled
 def on_curve(x, at, height):  # type: ignore[no-untyped-def]
     """A curve at x: linear between its points, held outside."""
-    if x <= at[0]:
+    k = np.searchsorted(at, x, side="right")
+    if k == 0:
         return height[0]
-    for k in range(1, len(at)):
-        if x < at[k]:
-            s = (x - at[k - 1]) / (at[k] - at[k - 1])
-            return height[k - 1] + s * (height[k] - height[k - 1])
-    return height[-1]
+    if k == len(at):
+        return height[-1]
+    s = (x - at[k - 1]) / (at[k] - at[k - 1])
+    return height[k - 1] + s * (height[k] - height[k - 1])
 
 
 @compiled

@@ -137,7 +137,7 @@ def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link])
         If a load does not fit its link.
     """
     out = _none(scene, linkage)
-    loads = patterns(scene, dict(links))
+    loads = patterns(scene, dict(links), prescribed=True)
     for name, link in links.items():
         body = linkage.bodies.index(name)
         out.add_link(body, link)

@@ -28,6 +28,7 @@ from kedfem.links.seats import (
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,
+    Factor,
     ForceLoad,
     Load,
     PressureLoad,
@@ -36,6 +37,7 @@ from kedfem.scene import (
     TorqueLoad,
     factor_table,
     load_factor,
+    path_parameter,
     time_grid,
 )
 
@@ -51,7 +53,7 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
-    table : times and factors, of a load that turns with a link that no drive leads: an action (`actions.followers`)
+    table : times and factors, of a load that turns with a link whose frame does: an action (`actions.followers`)
     """
 
     forces: Float[np.ndarray, "n d"]
@@ -61,8 +63,14 @@ class Pattern:
     table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
 
-def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern, ...]]:
+def patterns(
+    scene: Scene, links: Mapping[str, Link], prescribed: bool = False
+) -> dict[str, tuple[Pattern, ...]]:
     """All loads P on links or their segments, by key, [KED, eqs. (15)(16)], gravity first.
+
+    Parameters
+    ----------
+    prescribed : the links only move as given, whatever their frames are
 
     Raises
     ------
@@ -75,20 +83,32 @@ def patterns(scene: Scene, links: Mapping[str, Link]) -> dict[str, tuple[Pattern
             out[key].append(Pattern(link.m1 * as_rows(link, np.asarray(scene.gravity)), False, _always))
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
-            out[key] += found if scene.driven else [_led(scene, f"loads.{name}", load, x) for x in found]
+            own = links[key].fit is not None and not prescribed
+            out[key] += [_led(scene, f"loads.{name}", load, x) for x in found] if own else found
     return {key: tuple(found) for key, found in out.items()}
 
 
 def _led(scene: Scene, where: str, load: Load, pattern: Pattern) -> Pattern:
-    """A load of a link that goes where its own motion takes it: no nominal orientation tells its direction."""
+    """A load of a link whose frame is its own: no nominal orientation tells its direction."""
     if pattern.share is not None:
+        frames = "co-rotational frames" if scene.driven else "a scene without a drive"
         raise SceneError(
-            f"{where}.frame: must be 'link' for a torque in a scene without a drive, got 'world'"
+            f"{where}.frame: must be 'link' for a torque in space with {frames}, which know no fixed axis in a link that "
+            "bends, got 'world'"
         )
     turns = (
         pattern.follows and pattern.forces[:, :2].any()
     )  # ψ of a planar beam takes a torque however it has turned
-    return replace(pattern, table=factor_table(load.factor, time_grid(scene).end)) if turns else pattern
+    return replace(pattern, table=_over_time(scene, load.factor)) if turns else pattern
+
+
+def _over_time(scene: Scene, factor: Factor) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times and factors of a load, linear between; of one over the drive's angle at the time steps."""
+    grid = time_grid(scene)
+    if factor.over == "time":
+        return factor_table(factor, grid.end)
+    t = grid.step * np.arange(grid.steps + 1)
+    return tuple(t.tolist()), tuple(load_factor(factor, t, path_parameter(scene, t)[0]).tolist())
 
 
 def _always(t: Times, phi: Times) -> Times:

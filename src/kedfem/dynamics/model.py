@@ -107,7 +107,8 @@ class Model:
     def coordinates(self) -> int:
         """Generalised coordinates once the joints share theirs."""
         held = sum(len(joint.keep) for joint in self.joints)
-        return self.unknowns - held + int(self.joints[0].B.shape[1]) - sum(len(x.gap) for x in self.rows)
+        rows = sum(int(np.isinf(x.stiffness).sum()) for x in self.rows)  # springs constrain nothing
+        return self.unknowns - held + int(self.joints[0].B.shape[1]) - rows
 
 
 def elastic_model(
@@ -146,7 +147,10 @@ def elastic_model(
         raise SceneError(
             "links: must hold a link that the drive does not simply carry along, got rigid ones only"
         )
-    carried = tuple(replace(x, loads=patterns(scene, {x.link.name: x.link})[x.link.name]) for x in carried)
+    carried = tuple(
+        replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
+        for x in carried
+    )
     numbers = {key: k for k, key in enumerate(links)}
     sliders = tuple(
         _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None

@@ -137,8 +137,13 @@ def quasi_static(
 ) -> list[list[NodalOf]]:
     """Deflections that turn with their links without vibrating: K δ = P − M R0'' − M ([α]× + [ω]×²) δ.
 
-    The inertia of the turning deflection is put in by sweeps, as far as they converge (drive well below the first
-    frequency); with stress stiffness, K_σ δ, by GMRES.
+    The inertia of the turning deflection is put in by iteration where that converges (a drive well below the first
+    frequency), else, and with stress stiffness K_σ δ, by GMRES.
+
+    Raises
+    ------
+    SolveError
+        If no deflection is found.
 
     Returns
     -------
@@ -154,11 +159,8 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
     g, _ = coupled(parts, R, load, instant.tie)
-    if instant.turnings is not None:
-        g = _stiffened(links, parts, R, g, spin, instant.turnings)
-        return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
     before = np.inf
-    for _ in range(TURNING_SWEEPS):
+    for _ in range(TURNING_SWEEPS if instant.turnings is None else 0):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
         new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)], instant.tie)
         change, size = _change(new, g)
@@ -166,33 +168,49 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
             break
         before, g = change, new
         if change <= CONVERGED * size:
-            break
-    return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
+            return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
+    found = _turned_static(links, parts, instant, g, coupled(parts, R, load, instant.tie)[0])
+    return [x @ R_.T for x, R_ in zip(found, R, strict=True)]
 
 
-def _stiffened(
-    links: Sequence[Link], parts: Sequence[Substructure], R: Sequence[Rotation], g: Sequence[NodalOf],
-    spin: Sequence[Rotation], turnings: Sequence[Callable[[Nodal], Nodal]],
+def _turned_static(
+    links: Sequence[Link], parts: Sequence[Substructure], instant: Instant, guess: Sequence[NodalOf],
+    static: Sequence[NodalOf],
 ) -> list[NodalOf]:  # fmt: skip
-    """The deflection with stress stiffness, which need not be small beside K0: (1 + K0⁻¹ (M spin + k P)) g = g0."""
-    ends = np.cumsum([x.size for x in g])[:-1]
+    """The deflection by GMRES: inertia and stress stiffness need not be small, (1 + K0⁻¹ (M spin + k P)) g = g0.
+
+    Parameters
+    ----------
+    guess, static : where it begins, and g0, link frames
+
+    Raises
+    ------
+    SolveError
+        If it is not found.
+    """
+    R = [now.R for now in instant.at]
+    spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
+    ends = np.cumsum([x.size for x in static])[:-1]
+    none = [np.zeros_like(x) for x in static]
+    fixed = np.concatenate([y.ravel() for y in coupled(parts, R, none, instant.tie)[0]])
 
     def applied(x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-        each = [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
-        forces = [
-            mass_times(link.mass, y @ S.T) + k(y)
-            for link, y, S, k in zip(links, each, spin, turnings, strict=True)
-        ]
-        return np.asarray(x + np.concatenate([y.ravel() for y in coupled(parts, R, forces)[0]]))
+        each = [y.reshape(z.shape) for y, z in zip(np.split(x, ends), static, strict=True)]
+        forces = [mass_times(link.mass, y @ S.T) for link, y, S in zip(links, each, spin, strict=True)]
+        if instant.turnings is not None:
+            forces = [f + k(y) for f, k, y in zip(forces, instant.turnings, each, strict=True)]
+        solved = np.concatenate([y.ravel() for y in coupled(parts, R, forces, instant.tie)[0]])
+        return np.asarray(x + solved - fixed)
 
-    start = np.concatenate([x.ravel() for x in g])
+    start, first = (np.concatenate([x.ravel() for x in each]) for each in (static, guess))
     operator = LinearOperator((len(start),) * 2, applied, dtype=float)
-    x, left = gmres(operator, start, rtol=CONVERGED, restart=KRYLOV, maxiter=4)
+    x, left = gmres(operator, start, x0=first, rtol=CONVERGED, restart=KRYLOV, maxiter=4)
     if left:
         raise SolveError(
-            'analysis.initial: must be a deflection that can be found, got none: take initial = "rest"'
+            "analysis.initial: must be a quasi-static deflection that can be found, got none: the drive turns too near "
+            'a natural frequency of the links; take initial = "rest", a slower drive or stiffer links'
         )
-    return [y.reshape(z.shape) for y, z in zip(np.split(x, ends), g, strict=True)]
+    return [y.reshape(z.shape) for y, z in zip(np.split(x, ends), static, strict=True)]
 
 
 def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, float]:

@@ -248,6 +248,7 @@ def first_states(
         )
         each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
         return rigid_start(model.links, model.joints, states, each)
+    every = (*every, *followers(model))
     if every:
         more = still_forces(
             Forces(every, model.links, h), motion,

@@ -79,6 +79,11 @@ def motor_faults(parts: Parts) -> Iterator[str]:
         if kind in EVERY_JOINT - {wanted} and motor.has(key):
             got = f"got {joint.name!r}, which is {kind}"
             yield motor.fault("joint", f"must name a {wanted} joint for a {key}, {got}")
+        elif key == "force" and motor.has(key) and GROUND not in link_names(joint):
+            reason = "its force would keep the direction as drawn while the slide turns"
+            yield motor.fault(
+                "joint", f"must name a prismatic joint on the ground ({reason}), got {joint.name!r}"
+            )
         yield from held_joint_faults(parts, motor, joint)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from kedfem.scene.drives import Drive
+from kedfem.scene.faults import line
 from kedfem.scene.free import any_following
 from kedfem.scene.links import GROUND, Joint
 from kedfem.scene.parts import Entry, Parts
@@ -63,6 +64,21 @@ def moving_faults(parts: Parts) -> Iterator[str]:
         if drive.has("shaft_stiffness") and driven is not None and driven.word("kind") == "prismatic":
             yield drive.fault(
                 "shaft_stiffness", f"must be given for a hinge, got {driven.name!r}, which is prismatic"
+            )
+
+
+def gear_frame_faults(parts: Parts) -> Iterator[str]:
+    """Gears where their constraint equations would be left out."""
+    for gear in parts.gears.values():
+        if any_following(parts):
+            got = "frames that follow" if parts.driven else "no drive, so that frames follow"
+            yield line(
+                gear.where,
+                f"must stand with a drive and nominal frames (others do not hold gears), got {got}",
+            )
+        if parts.analysis.raw.get("stiffening") is True:
+            yield line(
+                gear.where, "must stand without analysis.stiffening (which does not hold gears), got it"
             )
 
 

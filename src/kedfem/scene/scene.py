@@ -38,7 +38,7 @@ from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
-from kedfem.scene.moving import moving_faults
+from kedfem.scene.moving import gear_frame_faults, moving_faults
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
@@ -223,5 +223,6 @@ def cross_faults(parts: Parts) -> list[str]:
         initial_faults,
         undriven_faults,
         moving_faults,
+        gear_frame_faults,
     )
     return [fault for check in checks for fault in check(parts)]

@@ -1,0 +1,94 @@
+"""Loads that turn with a link that bends: one answer with and without a drive; refusals where there is none."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.errors import SceneError
+from kedfem.scene import scene_from
+from tests.moving import bar, inverted, ran, state
+
+I = 0.02 * 0.005**3 / 12  # noqa: E741
+FOLLOWING = 2 * 2.1e11 * I  # N at the tip of a metre: P L²/EI = 2
+
+
+def cantilever(
+    held: str, load: dict[str, Any], fidelity: str = "beam", initial: str = "rest"
+) -> dict[str, Any]:
+    """A slender steel cantilever that is loaded slowly; held by a drive that hardly turns, or welded."""
+    link = bar(fidelity, [0, 0], [1.0, 0], 8)
+    link["shape"] |= {"width": 0.005, "thickness": 0.02}
+    raw: dict[str, Any] = {
+        "links": {"arm": link},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "loads": {"P": {"kind": "force", "link": "arm", "at": [1.0, 0], "vector": [0, FOLLOWING], **load}},
+        "damping": {"beta": 0.02},
+        "analysis": {
+            "end_time": 0.5,
+            "step": 2e-3,
+            "rho_inf": 0.6,
+            "frames": "following",
+            "initial": initial,
+        },
+    }
+    if held == "drive":
+        motion = {"kind": "cycloidal", "angle": 1e-9, "rise": 1.0}
+        return raw | {"drive": {"joint": "A", "motion": motion}}
+    return raw | {"joints": {"A": {"kind": "weld", "links": ["ground", "arm"], "at": [0, 0]}}}
+
+
+def tip(raw: dict[str, Any], k: int = -1) -> np.ndarray:
+    """Displacement of the arm's end at a time point."""
+    ready, blocks = ran(raw)
+    links = ready.model.links
+    last = max(range(len(links)), key=lambda j: float(links[j].nodes[:, 0].max()))
+    return state(blocks, last, "u")[k, int(links[last].nodes[:, 0].argmax()), :2]
+
+
+RAMPED = {"frame": "link", "factor": {"time": [0.0, 0.3], "value": [0.0, 1.0]}}
+
+
+def test_a_load_turns_with_the_link_itself_with_and_without_a_drive() -> None:
+    """A follower force bends a cantilever further than the nominal frame says: the same tip, whatever holds the root."""
+    driven, welded = tip(cantilever("drive", RAMPED)), tip(cantilever("weld", RAMPED))
+    assert_allclose(driven, welded, atol=1e-4)
+    world = tip(cantilever("drive", {**RAMPED, "frame": "world"}))
+    assert np.linalg.norm(driven - world) > 0.05  # m
+
+
+def test_a_factor_over_the_angle_of_the_drive_is_that_over_time() -> None:
+    raw = cantilever("drive", RAMPED)
+    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 0.5}
+    over = {"over": "angle", "at": [0.0, 0.15], "value": [0.0, 1.0]}
+    by_angle = cantilever("drive", {"frame": "link", "factor": over}) | {"drive": raw["drive"]}
+    assert_allclose(tip(by_angle), tip(raw), atol=1e-9)
+
+
+def test_a_quasi_static_start_has_loads_that_turn_with_the_link() -> None:
+    raw = cantilever("drive", {"frame": "link", "vector": [0, FOLLOWING / 40]}, initial="quasi-static")
+    assert_allclose(tip(raw, 0), tip(raw), atol=1e-4)
+    assert np.linalg.norm(tip(raw)) > 0.01  # m
+
+
+def test_a_motor_on_a_slide_between_moving_links_is_refused_with_the_reason() -> None:
+    raw = inverted() | {"motors": {"m": {"joint": "S", "force": 10.0}}}
+    with pytest.raises(
+        SceneError, match=r"m.joint: must name a prismatic joint on the ground .*while the slide turns"
+    ):
+        scene_from(raw)
+
+
+def test_gears_without_a_drive_are_refused_with_the_reason() -> None:
+    links = {"one": bar("beam", (0, 0), (0.3, 0)), "two": bar("beam", (0.5, 0), (0.7, 0))}
+    joints = {
+        "A": {"kind": "revolute", "links": ["ground", "one"], "at": [0, 0]},
+        "B": {"kind": "revolute", "links": ["ground", "two"], "at": [0.5, 0]},
+    }
+    gears = {"g": {"joints": ["A", "B"], "teeth": [20, 40]}}
+    raw = {"links": links, "joints": joints, "gears": gears, "analysis": {"end_time": 0.1, "step": 1e-3}}
+    with pytest.raises(
+        SceneError, match=r"gears.g: must stand with a drive and nominal frames .*got no drive"
+    ):
+        scene_from(raw)
