@@ -231,8 +231,8 @@ def bench(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="One of: accuracy, beams, elements, following, growth, kinematics, plane, ports, reduction, solvers, "
-            "start, steps, suite.",
+            help="One of: accuracy, beams, elements, following, growth, kinematics, levels, plane, ports, reduction, "
+            "solvers, start, steps, suite.",
         ),
     ],
     folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.accuracy.budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
 from kedfem.dynamics.history import Block
@@ -101,8 +102,8 @@ def cheapest(found: StepEstimate, wanted: float, channels: Collection[str] | Non
 
 
 def watched(name: str) -> bool:
-    """Whether a channel's error is followed: probes, joint forces, drives."""
-    return name.startswith(("probes/", "drive/")) or name.endswith(("/force", "/moment"))
+    """Whether a channel's error is followed: those of the budget, and moments of joints."""
+    return kind_of_name(name) is not None or (name.startswith("joints/") and name.endswith("/moment"))
 
 
 @dataclass

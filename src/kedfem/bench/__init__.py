@@ -9,6 +9,7 @@ from kedfem.bench.elements import bench_elements
 from kedfem.bench.following import bench_following
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.kinematics import bench_kinematics
+from kedfem.bench.levels import bench_levels
 from kedfem.bench.machine import Watch
 from kedfem.bench.plane import bench_plane
 from kedfem.bench.ports import bench_ports
@@ -28,6 +29,7 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "elements": bench_elements,
     "following": bench_following,
     "beams": bench_beams,
+    "levels": bench_levels,
     "suite": bench_suite,
     "kinematics": bench_kinematics,
     "reduction": bench_reduction,

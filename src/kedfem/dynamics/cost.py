@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.transient import steps_of, transient
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
@@ -43,8 +44,7 @@ class Cost:
 
 def estimated_cost(scene: Scene, model: Model) -> Cost:
     """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
-    N = np.array([float(link.unknowns) for link in model.links])
-    fill = N**1.5 * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
+    N, fill, levels = _unknowns(model), _fill(model), scene.analysis.levels or 1
     bandwidth, rate = _machine()
     small = bool((N <= SMALL).all())
     step = (LOOP if small else OVERHEAD) + float(
@@ -53,11 +53,25 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     if any(link.fit is not None for link in model.links):
         step *= SWEEPS
     return Cost(
-        factor=FACTOR_FLOPS * float(fill.sum()) / rate,
-        steps=time_grid(scene).steps * step,
-        memory=float((FACTOR_BYTES * fill + LINK_BYTES * N).sum()) + ASSEMBLY_BYTES * float(N.max()),
+        factor=levels * FACTOR_FLOPS * float(fill.sum()) / rate,
+        steps=(2**levels - 1) * time_grid(scene).steps * step,
+        memory=levels * factor_bytes(model) + LINK_BYTES * float(N.sum()) + ASSEMBLY_BYTES * float(N.max()),
         frame_bytes=120.0 * sum((link.full or link).n for link in model.links),
     )
+
+
+def factor_bytes(model: Model) -> float:
+    """Memory of the factors of all links, for one step size."""
+    return FACTOR_BYTES * float(_fill(model).sum())
+
+
+def _unknowns(model: Model) -> Float[np.ndarray, " L"]:
+    return np.array([float(link.unknowns) for link in model.links])
+
+
+def _fill(model: Model) -> Float[np.ndarray, " L"]:
+    thin = [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
+    return np.asarray(_unknowns(model) ** 1.5 * thin)
 
 
 def tried_cost(
@@ -75,17 +89,17 @@ def tried_cost(
         If the first steps cannot be taken.
     """
     cost = estimated_cost(scene, model)
-    N = np.array([float(link.unknowns) for link in model.links])
+    N = _unknowns(model)
     weight = float((N * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]).sum())
     if weight > TRIED:
         return cost
     start = perf_counter()
-    solver = steps_of(scene, model)
+    solvers = level_steps(scene, model)
     factor, total = perf_counter() - start, time_grid(scene).steps
 
     def seconds(steps: int) -> float:
         first = perf_counter()
-        for block in transient(_begun(scene, steps), linkage, along, model, solver):
+        for block in leveled(_begun(scene, steps), linkage, along, model, solvers):
             look(block)
         return perf_counter() - first
 

@@ -70,14 +70,33 @@ def level_scenes(scene: Scene) -> list[Scene]:
     return out
 
 
+def most_levels(model: Model) -> int:
+    """How many levels' factors fit in this machine's memory, at most 3; of links so large that none would, 1."""
+    from kedfem.dynamics.cost import factor_bytes
+
+    return max(1, min(MOST, int(memory() / max(factor_bytes(model), 1.0))))
+
+
+def memory() -> float:
+    """Bytes of this machine."""
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
+
+
 def level_steps(scene: Scene, model: Model) -> list[Steps]:
     """The solver of each level, coarsest first, its matrices factored.
 
     Raises
     ------
     SolveError
-        If an effective matrix is not positive definite.
+        If the factors of all levels do not fit in memory, or an effective matrix is not positive definite.
     """
+    levels, fit = scene.analysis.levels or 1, most_levels(model)
+    if levels > max(fit, 1):
+        most = "1" if fit == 1 else f"at most {fit}"
+        raise SolveError(
+            f"analysis.levels: must be {most} with {model.unknowns:,} unknowns: each level has matrices of its own, "
+            f"and {levels} sets of them do not fit in {memory() / 1e9:.3g} GB of memory, got {levels}"
+        )
     return [steps_of(each, model) for each in level_scenes(scene)]
 
 

@@ -1,0 +1,174 @@
+"""Levels in time on the source's four-bar at 600 rpm: error against the truth, as estimated, and processor time."""
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import prepared
+from kedfem.accuracy.resolution import step_error
+from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.bench.machine import Watch, machine, table, write_page
+from kedfem.bench.scenes import DAMPED, EYE, four_bar_of
+from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.results.recording import recording, rows
+from kedfem.scene import scene_from
+
+TURN = 0.1  # s
+SHOWN = {"stress": "probes/stress/stress", "torque": "drive/torque"}
+MARCHES = ((500, 1), (1000, 1), (2000, 1), (4000, 1), (250, 2), (500, 2), (1000, 2), (250, 3), (500, 3))
+BEAMS, PLATES = {"fidelity": "beam", "mesh": {"elements": 1}}, {"reduced": True, "functions": 8}
+HEADER = ("levels, steps a turn", "stress", "estimated", "torque", "estimated", "seconds", "order 2 needs")
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One start, damping, kind of frames and of links; steps a turn of the truth, in three levels."""
+
+    title: str
+    link: Mapping[str, Any]
+    damped: bool = True
+    truth: int = 2000
+    analysis: Mapping[str, Any] | None = None
+
+
+STILL, REST = {"initial": "quasi-static"}, {"initial": "rest"}
+CASES = (
+    Case("Equation (20), quasi-static start", BEAMS, analysis=STILL),
+    Case("Co-rotational, quasi-static start", BEAMS, analysis=STILL | {"frames": "following"}),
+    Case("Plates of solids, reduced, quasi-static start", PLATES, analysis=STILL),
+    Case("Co-rotational, from rest: a jump", BEAMS, analysis=REST | {"frames": "following"}),
+    Case("Equation (20), from rest, undamped", BEAMS, False, 4000, REST),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Marched:
+    """Channels over time, what is known of their error, processor and wall seconds of the steps with their rows."""
+
+    values: dict[str, Float[np.ndarray, "T c"]]
+    estimate: StepEstimate
+    seconds: float
+    wall: float
+
+
+def bench_levels(folder: Path, quick: bool, watch: Watch) -> str:
+    """Tables of all cases, and what a second core brings."""
+    lines = [
+        "# Levels in time",
+        "",
+        f"Regenerate with `kedfem bench levels`. Measured on: {machine()}.",
+        "",
+        *BEFORE,
+    ]
+    cases = CASES[:2] if quick else CASES
+    for number, case in enumerate(cases):
+        watch("levels", number, len(cases))
+        lines += ["", f"## {case.title}", "", *table(HEADER, _rows(case, quick))]
+    watch("cores", 0, 0)
+    lines += ["", "## Two cores", "", *_cores(quick), ""]
+    text = "\n".join(lines)
+    write_page(folder, "levels", text)
+    return text
+
+
+BEFORE = (
+    "The source's four-bar (Nath and Ghosh 1980), 600 rpm, two turns, one 3-node beam a link (plates of 20-node",
+    "hexahedra reduced to eight functions where it says so), 2 % damping at 20 and 200 Hz, ρ∞ = 0.95. Largest error in",
+    "time of the rocker's stress and of the drive's torque, of their peaks, against three levels from 2,000 steps a",
+    "turn (4,000 undamped); beside it what the run itself estimates: a single level from its local errors, several from",
+    "their differences. Seconds: processor time of the steps with their rows. The last column extrapolates the error of",
+    "a single level's finest march, of order 2, to that of the levels.",
+)
+
+
+def _ready(case: Case, steps: int, levels: int) -> Prepared:
+    shape = (
+        {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
+        if case.link is BEAMS
+        else {"kind": "plate_link", **EYE}
+    )
+    raw = four_bar_of(shape, dict(case.link))
+    raw["points"]["B"]["angle"] = 0 if case.link is BEAMS else "60 deg"
+    if case.damped:
+        raw["damping"] = DAMPED
+    raw["analysis"] = {"end_time": 2 * TURN, "step": TURN / steps, "levels": levels, **(case.analysis or {})}
+    raw["output"] = {"probes": {"stress": {"link": "rocker", "at": "M", "quantity": "stress"}}}
+    return prepared(scene_from(raw))[0]
+
+
+def _marched(ready: Prepared) -> _Marched:
+    scene, model = ready.scene, ready.model
+    solvers = level_steps(scene, model)
+    recorded = [each for each in recording(scene, model) if each.channel.name in SHOWN.values()]
+    running, found = step_error(ready), []
+    followed = StepWatch(ready, recorded, running)
+    since, clock = process_time(), perf_counter()
+    for block in leveled(scene, ready.linkage, ready.path, model, solvers):
+        values = rows(recorded, block)
+        found.append(values)
+        followed.add(block, values)
+        running.add(block)
+    spent, wall = process_time() - since, perf_counter() - clock
+    joined = {name: np.concatenate([x[name] for x in found]) for name in found[0]}
+    return _Marched(joined, followed.estimate, spent, wall)
+
+
+def _rows(case: Case, quick: bool) -> list[tuple[str, ...]]:
+    truth = _marched(_ready(case, 1000 if quick else case.truth, 3)).values
+    out, second, steps_of_second = [], 0.0, 1
+    for steps, levels in MARCHES[::4] if quick else MARCHES:
+        now = _marched(_ready(case, steps, levels))
+        stride = (len(truth[SHOWN["torque"]]) - 1) / (len(now.values[SHOWN["torque"]]) - 1)
+        errors = {what: _error(now.values[name], truth[name], stride) for what, name in SHOWN.items()}
+        if levels == 1:
+            second, steps_of_second = errors["stress"], steps
+        needs = steps_of_second * float(np.sqrt(second / errors["stress"]))
+        cells = [text for what, name in SHOWN.items() for text in (errors[what], now.estimate.errors[name])]
+        marches = " + ".join(f"{steps * 2**k:,}" for k in range(levels))
+        last = "" if levels == 1 else f"{float(f'{needs:.2g}'):,.0f}"
+        out.append((marches, *(f"{100 * x:.2g} %" for x in cells), f"{now.seconds:.2f}", last))
+    return out
+
+
+def _error(found: Float[np.ndarray, "T c"], truth: Float[np.ndarray, "U c"], stride: float) -> float:
+    """Largest difference at the time points that both have, of the peak."""
+    if stride >= 1:
+        truth = truth[:: round(stride)]
+    else:
+        found = found[:: round(1 / stride)]
+    return float(np.linalg.norm(found - truth, axis=1).max() / np.linalg.norm(truth, axis=1).max())
+
+
+@contextmanager
+def _allowed(count: int) -> Iterator[None]:
+    """So many of the cores that this process may use."""
+    every = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(every)[:count])
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, every)
+
+
+def _cores(quick: bool) -> list[str]:
+    """Wall time of levels on one core and on all of them, in turn."""
+    rows_ = []
+    for case in CASES[:1] if quick else CASES[:3]:
+        for levels in (2, 3):
+            ready = _ready(case, 1000, levels)
+            walls: dict[int, list[float]] = {1: [], 2: []}
+            for _ in range(1 if quick else 5):
+                for count, times in walls.items():
+                    with _allowed(count):
+                        times.append(_marched(ready).wall)
+            one, two = (min(times) for times in walls.values())
+            rows_.append((case.title, str(levels), f"{one:.2f}", f"{two:.2f}", f"{one / two:.2f}"))
+    return table(("case", "levels", "one core [s]", "two [s]", "ratio"), rows_)
