@@ -122,6 +122,9 @@ def mesh(
     ] = None,
     unknowns: Annotated[int | None, typer.Option(help="About so many unknowns.")] = None,
     element: Annotated[str, typer.Option(metavar="KIND", help="hex27, hex20, hex8 or tet10.")] = "hex27",
+    min_quality: Annotated[
+        float | None, typer.Option(metavar="NUMBER", help="Least scaled Jacobian of the elements.")
+    ] = None,
     scale: Annotated[
         float | None, typer.Option(help="Metres per unit of the file, if not its own unit.")
     ] = None,
@@ -140,8 +143,8 @@ def mesh(
 
     shape = {"kind": "cad", "file": part.name, "solid": solid, "scale": scale}
     sizes = {"size": size, "elements_across": across, "unknowns": unknowns}
-    given = {"shape": _given(shape), "mesh": _given(sizes), "element": element}
-    link = link_from(given)
+    given = {"shape": _given(shape), "mesh": _given(sizes), "element": element, "min_quality": min_quality}
+    link = link_from(_given(given))
     with _progress() as watch:
         watch("mesh", 0, 0)
         made = part_mesh(link, part.parent)

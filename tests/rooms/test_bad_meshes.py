@@ -140,16 +140,16 @@ class TestMeshFile:
         )
         assert message == (
             "links.arm: elements must not be inverted or folded, got scaled Jacobian -1 in element 1 "
-            "at (1.5, 0.5, 0.5); refine the mesh or mend the mesh file"
+            "at (1500, 500, 500) mm; refine the mesh or mend the mesh file"
         )
 
     def test_mirrored_mesh(self, tmp_path):
         message = mesh_file(tmp_path, CUBE * [1, 1, -1], [("hexahedron", CORNERS)])
-        assert message.endswith("at (0.5, 0.5, -0.5); the order of their nodes is mirrored")
+        assert message.endswith("at (500, 500, -500) mm; the order of their nodes is mirrored")
 
     def test_element_without_volume(self, tmp_path):
         message = mesh_file(tmp_path, CUBE * [1, 1, 0], [("hexahedron", CORNERS)])
-        assert "got scaled Jacobian 0 in element 0 at (0.5, 0.5, 0)" in message
+        assert "got scaled Jacobian 0 in element 0 at (500, 500, 0) mm" in message
 
 
 def test_quality_below_the_gate_names_the_element():
@@ -160,7 +160,7 @@ def test_quality_below_the_gate_names_the_element():
         checked_mesh("links.rocker", mesh, 0.1)
     assert str(caught.value) == (
         "links.rocker: scaled Jacobian must be at least 0.1 everywhere, "
-        "got 0.0995 in element 1 at (2, 10, 0); refine the mesh (mesh.size, mesh.elements_across), "
+        "got 0.0995 in element 1 at (2000, 10000, 0) mm; refine the mesh (mesh.size, mesh.elements_across), "
         "change the shape there, or lower min_quality"
     )
 

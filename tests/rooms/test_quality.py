@@ -52,7 +52,7 @@ def test_histogram_counts_every_element_once():
 def test_refusal_counts_the_others_and_names_three():
     message = refusal(sheared(), 0.9)
     assert (
-        "got 0.0499 in element 3 at (6.5, 10.5, 0.5) and 2 more, as at (4.5, 2, 0.5), (2.5, 1, 0.5);"
+        "got 0.0499 in element 3 at (6500, 10500, 500) mm and 2 more, as at (4500, 2000, 500) mm, (2500, 1000, 500) mm;"
         in message
     )
     assert "more" not in refusal(sheared(), 0.1)
@@ -69,6 +69,6 @@ def test_refusal_counts_the_others_and_names_three():
 def test_refusal_names_the_nearest_face_and_what_to_suppress(kind, radius, words):
     faces = (face("end", "plane", np.nan, [[0, 1, 2, 3]]), face("bore", kind, radius, [[24, 25, 26, 27]]))
     message = refusal(replace(sheared(), faces=faces), 0.1)
-    assert f"at (6.5, 10.5, 0.5) {words}" in message
+    assert f"at (6500, 10500, 500) mm {words}" in message
     assert "suppress a fillet or small feature there" in message
     assert message.endswith("or lower min_quality")

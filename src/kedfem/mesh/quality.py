@@ -10,6 +10,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.flat import QuadMesh
 from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, Face, SolidMesh, shape_gradients
+from kedfem.mesh.places import in_mm
 from kedfem.mesh.simplices import TET10
 
 Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
@@ -166,8 +167,7 @@ def checked_mesh(where: str, mesh: Mesh, min_quality: float | None) -> Mesh:
 
 def _place(mesh: SolidMesh | QuadMesh, quality: Quality, element: int, limit: float) -> str:
     """Where an element is, near which face, and how many others are below the limit."""
-    x, y, z = quality.centres[element]
-    words = f"in element {element} at ({x:.6g}, {y:.6g}, {z:.6g})"
+    words = f"in element {element} at {in_mm(quality.centres[element])}"
     if isinstance(mesh, SolidMesh) and mesh.faces:
         words += f" near {_described(_nearest_face(mesh, quality.centres[element]))}"
     others = [other for other in quality.worst_elements(4) if other != element][:3]
@@ -175,7 +175,7 @@ def _place(mesh: SolidMesh | QuadMesh, quality: Quality, element: int, limit: fl
     count = int((quality.scaled_jacobian < limit).sum()) - 1
     if not others:
         return words
-    places = ", ".join("({:.6g}, {:.6g}, {:.6g})".format(*quality.centres[other]) for other in others)
+    places = ", ".join(in_mm(quality.centres[other]) for other in others)
     return f"{words} and {count} more, as at {places}"
 
 

@@ -8,6 +8,7 @@ from rich.text import Text
 from kedfem.links.rounds import CLOSED
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.hexahedra import Face
+from kedfem.mesh.places import in_mm
 from kedfem.output.words import with_prefix
 from kedfem.report.links import ELEMENTS
 
@@ -19,12 +20,11 @@ def mesh_tables(name: str, mesh: SolidMesh) -> list[Table]:
     quality = mesh_quality(mesh)
     table = Table(title=Text(name), show_header=False)
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    x, y, z = quality.centre
     table.add_row("way", Text(mesh.way))
     table.add_row("elements", f"{len(mesh.cells)} {ELEMENTS[mesh.cell_type]}")
     table.add_row("unknowns", str(3 * len(mesh.points)))
     table.add_row("extent", " × ".join(with_prefix(float(side), "m") for side in high - low))
-    table.add_row("worst scaled Jacobian", f"{quality.least:.3f} at ({x:.4g}, {y:.4g}, {z:.4g})")
+    table.add_row("worst scaled Jacobian", f"{quality.least:.3f} at {in_mm(quality.centre)}")
     bars = Table(title="Scaled Jacobian of the elements", show_header=False)
     edges, counts = quality.histogram()
     for count, low_end in zip(counts, edges, strict=False):
@@ -39,7 +39,9 @@ def _seats(mesh: SolidMesh) -> Table:
         title="Faces", caption="lengths in mm; for joints.NAME.faces, where a joint does not find its own"
     )
     for column in ("face", "kind", "radius", "position", "axis or normal"):
-        table.add_column(column, justify="left" if column in ("face", "kind") else "right", no_wrap=True)
+        left = column in ("face", "kind")
+        whole = column == "face"  # names are there to be copied: what is too wide breaks elsewhere
+        table.add_column(column, justify="left" if left else "right", no_wrap=whole, overflow="fold")
     rows = [(face_kind(mesh, face), face) for face in mesh.faces if face.kind != "other"]
     for kind, face in sorted(rows, key=lambda row: KINDS.index(row[0])):
         radius = "" if np.isnan(face.radius) else f"{1e3 * face.radius:.4g}"

@@ -13,6 +13,7 @@ import numpy as np
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
+from kedfem.mesh.places import in_mm
 from kedfem.mesh.session import gmsh_options
 
 Format = Literal["STEP", "IGES", "BREP"]
@@ -232,6 +233,6 @@ def _check_any(gmsh: ModuleType, file: CadFile, solids: list[int]) -> None:
     X = gmsh.model.occ.getCenterOfMass(1, free[0]) if free else (0.0, 0.0, 0.0)
     raise MeshError(
         f"{file.where}: must hold a solid, got faces that do not close ({len(faces)} of them, "
-        f"{len(free)} free edges, one at ({X[0]:.6g}, {X[1]:.6g}, {X[2]:.6g}) [m]) in {file.path}; "
+        f"{len(free)} free edges, one at {in_mm(X)}) in {file.path}; "
         "close them, or export the part as a solid"
     )

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.solids import CadFace
+from kedfem.mesh.places import in_mm
 
 _ACCURACY = 1e-4  # of points, in sizes of the face: what translators between CAD systems leave
 _SKEW = 1e-3
@@ -157,6 +158,6 @@ def _outward_sign(gmsh: ModuleType, where: str, tags: tuple[int, int], extent: f
         both = "both sides" if ahead[np.flatnonzero(ahead == behind)[0]] else "neither side"
         raise MeshError(
             f"{where}: must be a closed solid that does not cut itself, got face {tag} with material on "
-            f"{both} at ({X[0]:.6g}, {X[1]:.6g}, {X[2]:.6g}) [m]; mend the part in CAD"
+            f"{both} at {in_mm(X)}; mend the part in CAD"
         )
     return 1.0 if behind.sum() >= ahead.sum() else -1.0

@@ -14,6 +14,7 @@ from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
 from kedfem.mesh.layered.sweep import swept
+from kedfem.mesh.places import in_mm
 from kedfem.mesh.quality import mesh_quality
 
 _GOOD = 0.3  # scaled Jacobian from which no smaller size and no other direction is tried
@@ -182,6 +183,6 @@ def _not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
     if quality.least < _LEAST:
         raise OtherWayError(
             f"{solid.name}: layers must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
-            "at ({:.6g}, {:.6g}, {:.6g})".format(*quality.centre)
+            f"at {in_mm(quality.centre)}"
         )
     return mesh

@@ -13,6 +13,7 @@ from kedfem.mesh.layered.fills import Rim, mapped
 from kedfem.mesh.layered.mapping import Mapping
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.polygons import polygon_quads
+from kedfem.mesh.places import in_mm
 from kedfem.mesh.plane import PlaneQuads, quadratic_quads
 
 _BETTER = 0.05  # by which gmsh's quadrilaterals must be better than mapped ones
@@ -78,7 +79,7 @@ def _check_cusps(where: str, plan: Plan) -> None:
         place = plan.in_space(point, plan.heights[int(np.argmax(region.material))])
         raise OtherWayError(
             f"{where}: edges of its layers must meet at angles of at least {np.degrees(CUSP):.0f}°, got two that "
-            "touch at ({:.6g}, {:.6g}, {:.6g})".format(*place)
+            f"touch at {in_mm(place)}"
         )
 
 
