@@ -162,6 +162,15 @@ class Snapshot:
     k: int
     states: list[LinkMoment]
 
+    def copied(self) -> "Snapshot":
+        """The same in arrays of its own, which keep nothing else alive."""
+        motion = self.motion.at(np.array([self.k]))
+        states = [
+            LinkMoment(**{f.name: np.copy(getattr(each, f.name)) for f in fields(LinkMoment)})
+            for each in self.states
+        ]
+        return Snapshot(self.step, motion, 0, [replace(x, strain=float(x.strain)) for x in states])
+
     @property
     def t(self) -> float:
         """Time [s]."""

@@ -4,6 +4,7 @@ Stress = elasticity : sym(gradient), and the gradient is again scalar: d (n, n) 
 Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,6 +143,16 @@ class StressRecovery:
     cell_type: str
     values: sp.csr_array | None = None
 
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return self.link.n if self.values is None else self.values.shape[0]
+
+    @property
+    def stressed(self) -> int:
+        """Number of places with a stress of their own: a planar beam has both its outer fibres at each node."""
+        return 2 * self.points if self.link.kind == "beam" else self.points
+
     def at_points(self, state: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p d"]:
         """What coefficients (of position, of displacement) mean at the points."""
         return state if self.values is None else np.asarray(self.values @ state)
@@ -182,6 +193,54 @@ def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float
     top, bottom = (m @ g.ravel() for m in recovery.matrices)
     out = np.zeros((recovery.link.n, 6))
     out[:, 0] = np.where(np.abs(top) >= np.abs(bottom), top, bottom)
+    return out
+
+
+def stress_modes(
+    recovery: StressRecovery, link: Link, modes: Float[np.ndarray, "r k"]
+) -> Float[np.ndarray, "p 6 r"]:
+    """Stresses of states (r, dn) of a link, full or reduced, at all places of `recovery.stressed` at once.
+
+    Returns
+    -------
+    (p, 6, r) [Pa]: five deviatoric components, whose norm is the von Mises stress (√3/2 (xx − yy), (2 zz − xx − yy)/2,
+    √3 xy, √3 yz, √3 zx), then the mean of xx, yy, zz
+    """
+    of, r = recovery.link, len(modes)
+    states = modes.reshape(r, link.n, link.d).transpose(1, 2, 0)
+    if link.Q is not None:
+        states = (link.Q @ states.reshape(link.n, -1)).reshape(of.n, link.d, r)
+    if of.meshed:
+        return _meshed_modes(recovery, np.ascontiguousarray(states))
+    flat = states.reshape(-1, r)
+    if of.kind == "spatial_beam":
+        xx, xy, zx = (m @ flat for m in recovery.matrices)
+    else:
+        xx = np.concatenate([m @ flat for m in recovery.matrices])
+        xy = zx = np.zeros_like(xx)
+    return _deviatoric([xx, 0 * xx, 0 * xx, xy, 0 * xx, zx])
+
+
+def _meshed_modes(recovery: StressRecovery, states: Float[np.ndarray, "n d r"]) -> Float[np.ndarray, "n 6 r"]:
+    """`stress_modes` of a meshed link: λ tr(ε) 1 + 2 μ ε, in reference axes: what is asked for depends on none."""
+    of, (n, d, r) = recovery.link, states.shape
+    lam, mu = of.lame
+    H = [(G @ states.reshape(n, -1)).reshape(n, d, r) for G in recovery.matrices]
+    trace = lam * np.sum([H[i][:, i] for i in range(d)], axis=0)
+    zero = np.zeros((n, r))
+    direct = [2 * mu * H[i][:, i] + trace if i < d else zero for i in range(3)]
+    shear = [mu * (H[i][:, j] + H[j][:, i]) if max(i, j) < d else zero for i, j in COMPONENTS[3:]]
+    return _deviatoric([*direct, *shear])
+
+
+def _deviatoric(stress: Sequence[Float[np.ndarray, "p r"]]) -> Float[np.ndarray, "p 6 r"]:
+    """Five components whose norm is the von Mises stress, and the mean of xx, yy, zz."""
+    xx, yy, zz, xy, yz, zx = stress
+    root = np.sqrt(3.0)
+    out = np.empty((len(xx), 6, xx.shape[1]))
+    out[:, 0], out[:, 1] = root / 2 * (xx - yy), zz - (xx + yy) / 2
+    out[:, 2], out[:, 3], out[:, 4] = root * xy, root * yz, root * zx
+    out[:, 5] = (xx + yy + zz) / 3
     return out
 
 

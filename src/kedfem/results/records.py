@@ -36,6 +36,38 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
+class Peak:
+    """The highest von Mises stress of a link over all steps.
+
+    Parameters
+    ----------
+    stress : [Pa]
+    link
+        Its name.
+    place : (3,) [m]
+        As drawn, in the reference position.
+    node
+        Number of the point in the link, in the order of ``envelope.vtu``.
+    step, time, angle
+        Number of the step, [s], and the drive's angle [rad] or travel [m].
+    near
+        What is near, in words, where stress is not what it seems: a sharp corner, a point force, a joint; else empty.
+    away
+        The highest stress away from such places, where `near` is not empty and there is one.
+    """
+
+    stress: float
+    link: str
+    place: tuple[float, float, float]
+    node: int
+    step: int
+    time: float
+    angle: float
+    near: str = ""
+    away: "Peak | None" = None
+
+
+@dataclass(frozen=True, slots=True)
 class Results:
     """A results file as it was read.
 

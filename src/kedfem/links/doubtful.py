@@ -1,0 +1,70 @@
+"""Where stress is not what it seems: at sharp re-entrant edges it grows with every refinement of the mesh."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import cKDTree
+
+from kedfem.links.record import Link
+from kedfem.links.surface import boundary, neighbours, surface
+
+SHARP = np.cos(np.radians(30))  # between facets at their common edge; those of rounds differ by a few degrees there
+
+
+def re_entrant(link: Link) -> Bool[np.ndarray, " n"]:
+    """Nodes of a meshed link that lie on edges where its surface bends inwards without a round."""
+    full = link.full or link
+    out = np.zeros(full.n, bool)
+    if not full.meshed:
+        return out
+    facets, corners, _ = boundary(full)
+    first, second = neighbours(full, facets)
+    of, mesh = surface(full, facets), full.basis.mesh
+    numbers = mesh.facets[:, facets].T
+    common = (numbers[first][:, :, None] == numbers[second][:, None, :]).any(axis=2)
+    edge = np.nanmean(np.where(common[:, :, None], corners[first], np.nan), axis=1)
+    normals = [_nearest_normal(of.x[each], of.normals[each], edge) for each in (first, second)]
+    sharp = (normals[0] * normals[1]).sum(axis=1) < SHARP
+    inwards = (normals[0] * (corners[second].mean(axis=1) - edge)).sum(axis=1) > 0
+    found = sharp & inwards
+    ends = np.where(common[found], numbers[first[found]], -1)
+    for pair in ends:
+        a = pair[pair >= 0]
+        out[a] = True
+        if full.d == 3:  # nodes between
+            x, y = full.X[a[0]], full.X[a[-1]]
+            on = np.linalg.norm(full.X - x, axis=1) + np.linalg.norm(full.X - y, axis=1)
+            out |= on < (1 + 1e-3) * np.linalg.norm(y - x)
+    return out
+
+
+def _nearest_normal(
+    x: Float[np.ndarray, "e q 3"], normals: Float[np.ndarray, "e q 3"], at: Float[np.ndarray, "e 3"]
+) -> Float[np.ndarray, "e 3"]:
+    nearest = np.linalg.norm(x - at[:, None], axis=2).argmin(axis=1)
+    return np.asarray(normals[np.arange(len(x)), nearest])
+
+
+def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
+    """Nodes of a meshed link in whose stress such places have a part: within `reach`, or in an element with one of them.
+
+    Parameters
+    ----------
+    at : (k, 3) the places, as drawn [m]
+    """
+    full = link.full or link
+    out = np.zeros(full.n, bool)
+    if not len(at):
+        return out
+    near = cKDTree(at).query(full.X)[0]
+    touching = (near[full.cells] < 1e-6 * full.size).any(axis=1)
+    out[full.cells[touching].ravel()] = True
+    return np.asarray(out | (near <= reach(full)))
+
+
+def reach(link: Link) -> float:
+    """Volume over surface: half the thickness of a plate, a quarter of a square bar's width [m]. No mesh changes it."""
+    facets, _, _ = boundary(link)
+    area = float(surface(link, facets).dA.sum())
+    if link.d == 2:  # edges times the thickness, and both sides
+        area += 2 * float(link.volume.sum()) / link.thickness
+    return float(link.volume.sum()) / area

@@ -1,0 +1,250 @@
+"""The stress envelope: the highest stresses at every point of the links over all steps, and when they occur.
+
+The steps of a link lie in the span of a few modes, found as they come. So its stress is a product, modes' stress times
+coordinates, of a few columns; and `envelope_kernel` leaves out most of the times by bounds. Rigid links have no stress.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link
+from kedfem.links.recovery import StressRecovery, stress_modes
+from kedfem.links.reduced import rigid_modes
+from kedfem.results.records import Peak
+
+EXACT = 1e-6  # of a link's highest stress: what may be missing of an envelope
+NOTHING = 1e-13  # of a link's displacement: rounding, which no mode is made for
+DECADES = 1e-4  # of the largest: singular values that one look at a Gram matrix tells
+SOME = 64  # steps of which new modes are made at a time
+SAMPLE = 1000  # points at which the stress of a mode is judged
+WAITING = 192_000_000  # bytes of histories, at most, that are looked at together
+STEPS = 1024  # and steps
+VON_MISES, LARGEST, SMALLEST = range(3)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkEnvelope:
+    """Extremes over all steps at the points of a link or of a segment of one.
+
+    stress : (3, p) highest von Mises, largest and smallest principal stress [Pa]; of a rigid link nan
+    step : (3, p) of each
+    """
+
+    link: str
+    recovery: StressRecovery
+    stress: Float[np.ndarray, "3 p"]
+    step: Int[np.ndarray, "3 p"]
+
+
+class Modes:
+    """Modes of a link's deformation, found from its steps, and their stresses.
+
+    basis : (r, dn) orthonormal, without rigid motion
+    parts : (p, 6, r) as the kernel wants them
+    """
+
+    def __init__(self, link: Link, recovery: StressRecovery) -> None:
+        self.link, self.recovery = link, recovery
+        self.rigid = np.linalg.qr(rigid_modes(link))[0].T
+        self.basis = np.zeros((0, link.unknowns))
+        self.parts = np.zeros((recovery.stressed, 6, 0))
+        self.gain = 0.0  # highest stress of a mode, so far
+
+    def coordinates(self, G: Float[np.ndarray, "T k"], highest: float) -> Float[np.ndarray, "T r"]:
+        """Of steps G (T, dn); new modes are made for what is left over, until its stress is nothing.
+
+        Parameters
+        ----------
+        highest : stress so far [Pa]
+        """
+        floor = NOTHING * _largest(G)
+        G = G - (G @ self.rigid.T) @ self.rigid
+        C = np.zeros((len(G), 0))
+        while True:
+            new = self.basis[C.shape[1] :]
+            added = G @ new.T
+            G -= added @ new
+            C = np.hstack([C, added])
+            size = _largest(G)
+            stress = max(highest, self._stress_of(C[np.argmax((C**2).sum(axis=1))]) if C.size else 0.0)
+            allowed = max(floor, EXACT * stress / self.gain if self.gain else 0.0)
+            if size <= allowed or len(self.basis) + len(self.rigid) >= self.basis.shape[1]:
+                return C
+            self._extend(G, allowed)
+
+    def _stress_of(self, c: Float[np.ndarray, " r"]) -> float:
+        """Highest von Mises stress at one time."""
+        return float(np.sqrt(((self.parts[:, :5] @ c) ** 2).sum(axis=1).max(initial=0.0)))
+
+    def _extend(self, G: Float[np.ndarray, "T k"], allowed: float) -> None:
+        """More modes, the principal directions of what is left over at some steps."""
+        size = (G**2).sum(axis=1)
+        even = np.linspace(0, len(G) - 1, min(SOME, len(G))).astype(int)
+        some = G[np.union1d(even, np.argsort(size)[-SOME // 2 :])]
+        values, vectors = np.linalg.eigh(some @ some.T)
+        sizes = np.sqrt(np.maximum(values, 0.0))
+        kept = np.flatnonzero(sizes > max(DECADES * sizes[-1], allowed / 2))[::-1]
+        kept = kept[: self.basis.shape[1] - len(self.basis) - len(self.rigid)]
+        found = vectors[:, kept].T @ some / sizes[kept, None]
+        for _ in range(2):
+            found = found - (found @ self.rigid.T) @ self.rigid
+            found = found - (found @ self.basis.T) @ self.basis
+            found = np.linalg.qr(found.T)[0].T
+        stress = stress_modes(self.recovery, self.link, found)
+        seen = stress[:: 1 + len(stress) // SAMPLE]
+        deviator = np.sqrt((seen[:, :5] ** 2).sum(axis=1))
+        self.gain = max(self.gain, float((deviator + np.abs(seen[:, 5])).max(initial=0.0)))
+        self.basis = np.vstack([self.basis, found])
+        self.parts = np.concatenate([self.parts, stress], axis=2)
+
+
+@dataclass
+class Envelope:
+    """Looks at blocks of steps as they come; a pure consumer of them.
+
+    model : whose steps they are
+    recoveries : per link, then per prescribed rigid link
+    worst : the instant of the highest stress so far
+    """
+
+    model: Model
+    recoveries: Sequence[StressRecovery]
+    worst: Snapshot | None = None
+    evaluated: int = 0
+    _modes: list[Modes | None] = field(default_factory=list, repr=False)
+    _stress: list[Float[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
+    _step: list[Int[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
+    _waiting: list[Block] = field(default_factory=list, repr=False)
+    _when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list, repr=False)
+
+    def __post_init__(self) -> None:
+        for link, recovery in zip(self.model.links, self.recoveries, strict=False):
+            self._modes.append(None if link.rigid else Modes(link, recovery))
+            self._stress.append(np.full((3, recovery.stressed), -np.inf))
+            self._step.append(np.zeros((3, recovery.stressed), np.int64))
+
+    def add(self, block: Block) -> None:
+        """Look at a block, with others that wait or later."""
+        self._waiting.append(block)
+        self._when.append(np.stack([block.motion.t, block.motion.phi]))
+        steps = sum(map(len, self._waiting))
+        if steps >= STEPS or 9 * 8 * steps * self.model.unknowns >= WAITING:
+            self.flush()
+
+    def flush(self) -> None:
+        """Look at all that waits."""
+        if not self._waiting:
+            return
+        blocks, self._waiting = self._waiting, []
+        before = self._highest()
+        for i, modes in enumerate(self._modes):
+            if modes is not None:
+                G = np.concatenate([block.links[i].g.reshape(len(block), -1) for block in blocks])
+                self._look(i, modes, G, blocks[0].step)
+        if self._highest() > before or self.worst is None:
+            _, step = max(((x[0].max(), k[0][x[0].argmax()]) for x, k in self._stressed()), default=(0.0, 0))
+            block = next((b for b in blocks if b.step <= step < b.step + len(b)), blocks[0])
+            k = max(0, int(step) - block.step)
+            self.worst = block.part(k, k + 1).at(0).copied()
+
+    def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int) -> None:
+        from kedfem.results.envelope_kernel import LEVELS, enveloped, residuals_of
+
+        C = np.ascontiguousarray(modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0)))))
+        residuals = np.zeros((LEVELS, -(-len(C) // 2), C.shape[1]))
+        residuals_of(C, residuals)
+        parts = np.ascontiguousarray(modes.parts)
+        self.evaluated += enveloped(parts, C, residuals, first, self._stress[i], self._step[i])
+
+    def _stressed(self) -> list[tuple[Float[np.ndarray, "3 p"], Int[np.ndarray, "3 p"]]]:
+        every = zip(self._modes, self._stress, self._step, strict=True)
+        return [(x, k) for modes, x, k in every if modes is not None]
+
+    def _highest(self) -> float:
+        return max((float(x[0].max()) for x, _ in self._stressed()), default=-np.inf)
+
+    def links(self) -> list[LinkEnvelope]:
+        """What was found, per link or segment, then per prescribed rigid link; at the links' own points."""
+        self.flush()
+        out = []
+        names = [*self.model.links, *(carried.link for carried in self.model.carried)]
+        for i, (link, recovery) in enumerate(zip(names, self.recoveries, strict=True)):
+            points = recovery.points
+            if i >= len(self._modes) or self._modes[i] is None:
+                out.append(
+                    LinkEnvelope(
+                        link.name, recovery, np.full((3, points), np.nan), np.zeros((3, points), int)
+                    )
+                )
+                continue
+            stress = self._stress[i].reshape(3, -1, points)  # both fibres of a planar beam
+            chosen = stress.argmax(axis=1)[:, None]
+            stress = np.take_along_axis(stress, chosen, 1)[:, 0] * [[1.0], [1.0], [-1.0]]
+            step = np.take_along_axis(self._step[i].reshape(3, -1, points), chosen, 1)[:, 0]
+            out.append(LinkEnvelope(link.name, recovery, stress, step))
+        return out
+
+    def when(self) -> Float[np.ndarray, "2 T"]:
+        """Time [s] and position of the drive at every step that was looked at."""
+        return np.concatenate(self._when, axis=1) if self._when else np.zeros((2, 0))
+
+
+def peaks(
+    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"],
+    near: Sequence[Sequence[str]] | None = None,
+) -> dict[str, Peak]:  # fmt: skip
+    """The highest von Mises stress of each link that has stress, and away from places where it means little.
+
+    Parameters
+    ----------
+    found : per link or segment
+    when : time and drive at every step
+    near : per link or segment what each point is near to, in words; empty where stress is what it seems
+    """
+    out: dict[str, Peak] = {}
+    away: dict[str, Peak] = {}
+    for k, each in enumerate(found):
+        if not each.stress.shape[1] or np.isnan(each.stress).all():
+            continue
+        words = None if near is None else near[k]
+        peak = _peak(each, when, np.ones(each.stress.shape[1], bool), words)
+        out[each.link] = max(out.get(each.link, peak), peak, key=lambda x: x.stress)
+        sound = np.array([not word for word in words]) if words is not None else np.ones(1, bool)
+        if words is not None and sound.any():
+            peak = _peak(each, when, sound, words)
+            away[each.link] = max(away.get(each.link, peak), peak, key=lambda x: x.stress)
+    return {
+        name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()
+    }
+
+
+def highest(every: Mapping[str, Peak]) -> Peak | None:
+    """Of all links; away from doubtful places that of all links, too."""
+    if not every:
+        return None
+    peak = max(every.values(), key=lambda x: x.stress)
+    sound = [x for each in every.values() if (x := each.away if each.near else each) is not None]
+    return replace(peak, away=max(sound, key=lambda x: x.stress, default=None)) if peak.near else peak
+
+
+def _peak(
+    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], among: np.ndarray, words: Sequence[str] | None
+) -> Peak:
+    node = int(np.where(among, each.stress[VON_MISES], -1.0).argmax())
+    step = int(each.step[VON_MISES, node])
+    link = each.recovery.link
+    place = each.recovery.at_points((link.full or link).X)[node]
+    time, angle = when[:, step] if step < when.shape[1] else (0.0, 0.0)
+    return Peak(
+        float(each.stress[VON_MISES, node]), each.link, (float(place[0]), float(place[1]), float(place[2])),
+        node, step, float(time), float(angle), words[node] if words is not None else "",
+    )  # fmt: skip
+
+
+def _largest(G: Float[np.ndarray, "T k"]) -> float:
+    return float(np.sqrt((G**2).sum(axis=1).max(initial=0.0)))
