@@ -1,6 +1,6 @@
 """The whole job: a scene in; time series, animation, plots and a picture out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from time import perf_counter
@@ -29,18 +29,22 @@ from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
-from kedfem.output.vtu import AnimationWriter, remove_animation, write_cells
-from kedfem.output.words import clock, moment
-from kedfem.results import Channel, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
+from kedfem.output.vtu import AnimationWriter, remove_animation, write_cells, write_frame, write_points
+from kedfem.output.words import clock, moment, stress_at
+from kedfem.results import Channel, Peak, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
 from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.doubtful import AWAY, doubtful, reason
+from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
 from kedfem.results.undetermined import undetermined, undetermined_warning
+from kedfem.results.writer import add_peaks
 from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
+WORST, ENVELOPE = "worst.vtu", "envelope.vtu"
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
 T = TypeVar("T")
@@ -49,20 +53,11 @@ Watch = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Peak:
-    """The highest von Mises stress of all animation frames [Pa]: where and when; the frame's file."""
-
-    stress: float
-    link: str
-    time: float
-    angle: float
-    frame: FilePath
-
-
-@dataclass(frozen=True, slots=True)
 class Run:
     """What a run leaves: results, files, highest stress, seconds per stage, warnings for the user, choices made.
 
+    peaks, peak : highest stress over all steps, of each link that has stress, and of all
+    worst : the frame of that instant, a VTU file
     balance : of energy and momentum, as far as it was kept account of
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     sizes : plain sizes of the scene, for a look at its units
@@ -72,6 +67,7 @@ class Run:
     folder: FilePath
     results: Results
     peak: Peak | None
+    worst: FilePath
     seconds: dict[str, float]
     warnings: tuple[str, ...] = ()
     reduction: Reduction | None = None
@@ -80,6 +76,11 @@ class Run:
     budget: Budget | None = None
     sizes: Sizes | None = None
     step: StepEstimate | None = None
+
+    @property
+    def peaks(self) -> Mapping[str, Peak]:
+        """The highest stress of each link."""
+        return self.results.peaks
 
 
 def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
@@ -110,18 +111,23 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
-    recoveries = clock.timed("recovery", lambda: _recoveries(scene, ready.model))
+    recoveries = clock.timed("recovery", lambda: _recoveries(ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
     watched = _Watched(recorded, untold, efforts, recoveries)
-    peak, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
+    envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
+    doubts = doubtful(scene, ready.model, recoveries)
+    add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
     known = step.errors if step.levels > 1 else None
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), known))
     add_notes(folder / "results.h5", attributes(found))
     results = read_results(folder / "results.h5")
+    peak = highest(results.peaks)
+    _write_envelope(folder / ENVELOPE, envelope, doubts)
+    _write_worst(folder / WORST, ready, recoveries, envelope)
     warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)
     plain = sizes(scene, ready.model)
@@ -134,11 +140,61 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *balance_warning(account.balance, scene.analysis.stiffening),
         *efforts.warnings(),
         *undetermined_warning(untold),
+        *peak_warning(peak),
         *warnings,
     )
     return Run(
-        folder, results, peak, clock.seconds, warnings, reduction, plan, account.balance, found, plain, step
+        folder,
+        results,
+        peak,
+        folder / WORST,
+        clock.seconds,
+        warnings,
+        reduction,
+        plan,
+        account.balance,
+        found,
+        plain,
+        step,
     )
+
+
+def peak_warning(peak: Peak | None) -> tuple[str, ...]:
+    """A warning where the highest stress is not what it seems, with the highest one elsewhere."""
+    if peak is None or not peak.near:
+        return ()
+    said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
+    away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
+    return (said + away,)
+
+
+def _write_envelope(file: FilePath, envelope: Envelope, doubts: list[list[str]]) -> None:
+    """Highest stresses at every point and when they occur, on the links as drawn, for ParaView."""
+    every = envelope.links()
+    time = envelope.when()[0]
+    drawn = [each.recovery.at_points((each.recovery.link.full or each.recovery.link).X) for each in every]
+    parts = [
+        (each.link, points, each.recovery.cells, each.recovery.cell_type)
+        for each, points in zip(every, drawn, strict=True)
+    ]
+    stress = np.concatenate([each.stress for each in every], axis=1)
+    when = np.where(np.isnan(stress), np.nan, time[np.concatenate([each.step for each in every], axis=1)])
+    values: dict[str, np.ndarray] = {}
+    for k, name in enumerate(("highest von Mises", "largest principal", "smallest principal")):
+        values |= {f"{name} stress [Pa]": stress[k], f"time of {name} stress [s]": when[k]}
+    values["depends on mesh or joint"] = np.array([float(bool(x)) for each in doubts for x in each])
+    write_points(file, parts, values)
+
+
+def _write_worst(
+    file: FilePath, ready: Prepared, recoveries: list[StressRecovery], envelope: Envelope
+) -> None:
+    """The frame of the highest stress, whether or not it is one of the animation."""
+    if envelope.worst is not None:
+        animation = ready.scene.output.animation
+        exaggeration = animation.exaggeration if animation else 1.0
+        fields = link_fields(ready.model, recoveries, envelope.worst, exaggeration)
+        write_frame(file, envelope.worst.t, fields)
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:
@@ -196,9 +252,9 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
 
 
-def _recoveries(scene: Scene, model: Model) -> list[StressRecovery]:
+def _recoveries(model: Model) -> list[StressRecovery]:
     links = [*model.links, *(carried.link for carried in model.carried)]
-    return [stress_recovery(link) for link in links] if scene.output.animation else []
+    return [stress_recovery(link) for link in links]
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,12 +268,12 @@ class _Watched:
 
 
 def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
-             folder: FilePath, watch: Watch) -> tuple[Peak | None, Seen, StepEstimate]:  # fmt: skip
+             folder: FilePath, watch: Watch) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
-    peak: Peak | None = None
+    envelope = Envelope(model, watched.recoveries)
     seen = watcher(ready)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
@@ -237,16 +293,18 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 values = rows(watched.recorded, block)
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
+                envelope.add(block)
                 seen.add(block)
                 errors.add(block, values)
                 for k in range(len(block)):
                     if block.step + k in wanted:
-                        peak = _framed(ready, watched.recoveries, frames, block.at(k), peak)
+                        _frame(ready, watched.recoveries, frames, block.at(k))
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
             writer.note(errors.estimate.notes)
-    return peak, seen, errors.estimate
+    envelope.flush()
+    return envelope, seen, errors.estimate
 
 
 @dataclass
@@ -283,23 +341,18 @@ class _Table:
 
 def _remove_derived(folder: FilePath) -> None:
     """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
-    for name in (TABLE, PICTURE, MESH):
+    for name in (TABLE, PICTURE, MESH, WORST, ENVELOPE):
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
 
 
-def _framed(ready: Prepared, recoveries: list[StressRecovery], frames: AnimationWriter, snapshot: Snapshot,
-            peak: Peak | None) -> Peak | None:  # fmt: skip
-    """Write one frame; the higher of its peak stress and the highest so far."""
+def _frame(
+    ready: Prepared, recoveries: list[StressRecovery], frames: AnimationWriter, snapshot: Snapshot
+) -> None:
+    """Write one frame."""
     animation = ready.scene.output.animation
     fields = link_fields(ready.model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
-    file = frames.add(snapshot.t, fields)
-    highest = max(fields, key=lambda f: float(f.von_mises.max()))
-    node = int(highest.von_mises.argmax())
-    stress = float(highest.von_mises[node])
-    if peak is not None and stress <= peak.stress:
-        return peak
-    return Peak(stress, highest.name, snapshot.t, snapshot.phi, file)
+    frames.add(snapshot.t, fields)
 
 
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:
@@ -310,14 +363,14 @@ def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath
         write_plots(results, folder / PLOTS)
     if not (scene.output.picture and peak):
         return ()
-    title = f"{scene.title or 'kedfem'}: highest stress, t = {peak.time:.4g} s"
+    title = f"{scene.title or 'kedfem'}: highest stress {stress_at(peak)}, t = {peak.time:.4g} s"
     if clock(scene) != "time":
         title += f", drive {moment(scene, peak.time, peak.angle)}"
     animation = scene.output.animation
     if animation and animation.exaggeration != 1.0:
         title += f", deformation × {animation.exaggeration:g}"
     try:
-        write_picture(peak.frame, folder / PICTURE, title)
+        write_picture(folder / WORST, folder / PICTURE, title)
     except OutputError as err:
         return (str(err),)
     return ()

@@ -320,6 +320,7 @@ def _say_where(folder: Path) -> None:
         ("results.csv", "the same as a table"),
         ("animation.pvd", "animation, open in ParaView"),
         ("plots", "plots"),
+        ("envelope.vtu", "highest stresses over all steps, for ParaView"),
         ("worst.png", "picture of the highest stress"),
         ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
     ):

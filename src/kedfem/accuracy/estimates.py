@@ -157,7 +157,7 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
         return None
     warned = geometric_warning(geometric)
     remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
-    how = f"links turn by up to {np.degrees(geometric.turn):.2g} deg against their rigid motion"
+    how = f"the elastic rotation of links is up to {np.degrees(geometric.turn):.2g} deg"
     return Share(
         "frames", dict.fromkeys(kinds, geometric.estimate), how, f"{how}; {remedy}" if remedy else ""
     )

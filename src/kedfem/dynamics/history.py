@@ -165,11 +165,9 @@ class Snapshot:
     def copied(self) -> "Snapshot":
         """The same in arrays of its own, which keep nothing else alive."""
         motion = self.motion.at(np.array([self.k]))
-        states = [
-            LinkMoment(**{f.name: np.copy(getattr(each, f.name)) for f in fields(LinkMoment)})
-            for each in self.states
-        ]
-        return Snapshot(self.step, motion, 0, [replace(x, strain=float(x.strain)) for x in states])
+        names = [f.name for f in fields(LinkMoment) if f.name != "strain"]
+        states = [replace(x, **{name: getattr(x, name).copy() for name in names}) for x in self.states]
+        return Snapshot(self.step, motion, 0, states)
 
     @property
     def t(self) -> float:

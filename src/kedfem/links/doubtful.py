@@ -7,7 +7,9 @@ from scipy.spatial import cKDTree
 from kedfem.links.record import Link
 from kedfem.links.surface import boundary, neighbours, surface
 
-SHARP = np.cos(np.radians(30))  # between facets at their common edge; those of rounds differ by a few degrees there
+SHARP = np.cos(
+    np.radians(30)
+)  # between facets at their common edge; those of rounds differ by a few degrees there
 
 
 def re_entrant(link: Link) -> Bool[np.ndarray, " n"]:

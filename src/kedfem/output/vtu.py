@@ -1,7 +1,7 @@
 """The ParaView animation: one VTU file per frame with all links in it, and a PVD file that lists them."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -135,6 +135,48 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
         vtu.write(str(part), content, binary=True, compression="zlib")
 
 
+def write_points(
+    path: Path, parts: Sequence[tuple[str, np.ndarray, np.ndarray, str]], values: Mapping[str, np.ndarray]
+) -> None:
+    """Links as drawn with values at their points.
+
+    Parameters
+    ----------
+    parts : name, points (n, 3), elements (e, m) and their type
+    values : of all points of all parts, one after the other
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import meshio
+    from meshio import vtu
+
+    first = np.cumsum([0, *(len(points) for _, points, _, _ in parts)])
+    cells = [(kind, (of + n).astype(np.int32)) for (_, _, of, kind), n in zip(parts, first, strict=False)]
+    names = list(dict.fromkeys(name for name, *_ in parts))
+    link = [np.full(len(of), names.index(name), np.int32) for name, _, of, _ in parts]
+    points = np.concatenate([points for _, points, _, _ in parts])
+    content = meshio.Mesh(points, cells, point_data=dict(values), cell_data={"link": link})
+    with replacing(path) as part:
+        vtu.write(str(part), content, binary=True, compression="zlib")
+        said = f"<UnstructuredGrid><FieldData>{_numbers(names)}</FieldData>".encode()
+        part.write_bytes(part.read_bytes().replace(b"<UnstructuredGrid>", said, 1))
+
+
+def write_frame(path: Path, time: float, fields: Fields) -> None:
+    """One frame on its own.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with replacing(path) as part:
+        _write_vtu(part, time, fields)
+
+
 def write_cells(
     path: Path, parts: Sequence[tuple[np.ndarray, np.ndarray, str]], name: str, values: Sequence[np.ndarray]
 ) -> None:
@@ -233,10 +275,14 @@ def _merged(fields: Fields) -> Any:
 
 def _field_data(time: float, fields: Fields) -> str:
     """The frame's time, and which number in the cell data is which link."""
-    numbers = "".join(
-        f'<DataArray type="Int32" Name={quoteattr("link " + field.name)} NumberOfTuples="1" format="ascii">'
-        f"{index}</DataArray>"
-        for index, field in enumerate(fields)
-    )
+    numbers = _numbers([field.name for field in fields])
     moment = f'<DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{float(time)!r}'
     return f"<FieldData>{moment}</DataArray>{numbers}</FieldData>"
+
+
+def _numbers(names: Sequence[str]) -> str:
+    return "".join(
+        f'<DataArray type="Int32" Name={quoteattr("link " + name)} NumberOfTuples="1" format="ascii">'
+        f"{index}</DataArray>"
+        for index, name in enumerate(names)
+    )

@@ -1,7 +1,10 @@
 """Numbers in words."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from kedfem.results import Peak
 from kedfem.scene import Scene
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
@@ -35,6 +38,16 @@ def moment(scene: Scene, time: float, angle: float) -> str:
         case "drive travel":
             return with_prefix(angle, "m")
     return f"{np.degrees(angle):.1f}°"
+
+
+def place_of(point: Iterable[float]) -> str:
+    """A point in words, rounded to a micrometre: no 2.8e-19."""
+    return f"({', '.join(f'{round(x, 6) + 0.0:g}' for x in point)}) m"
+
+
+def stress_at(peak: Peak) -> str:
+    """How high, in which link, and where."""
+    return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} as drawn"
 
 
 def percent(x: float) -> str:

@@ -1,19 +1,22 @@
 """What a run found: largest values, balance, seconds."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
 from kedfem.accuracy.budget import Budget, percent
 from kedfem.analysis import Run
-from kedfem.output.words import NOTHING, clock, moment, with_prefix
+from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
 from kedfem.report.plan import chosen_table
+from kedfem.results import Peak
 from kedfem.results.audit import Balance
 from kedfem.scene import Scene
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
-    """Largest values of every channel, the highest stress of the frames, and the seconds spent."""
+    """Largest values of every channel, the highest stress of every link, and the seconds spent."""
     before = [] if done.plan is None else [chosen_table(done.plan)]
     table = Table(title=Text(scene.title or "Largest values"))
     for column in ("channel", "component", "largest", clock(scene)):
@@ -31,17 +34,26 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
             continue
         at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
         table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), at)
-    if done.peak:
-        p = done.peak
-        at = moment(scene, p.time, p.angle)
-        table.add_row(f"links/{p.link}", "von_mises", with_prefix(p.stress, "Pa"), at)
-        table.caption = "links: the highest stress of all animation frames"
     balance = [] if done.balance is None else [balance_table(done.balance)]
     spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
     errors = [] if done.budget is None else [budget_table(done.budget)]
-    return [*before, table, *errors, *balance, spent]
+    stress = [stress_table(scene, done.peaks)] if done.peaks else []
+    return [*before, table, *stress, *errors, *balance, spent]
+
+
+def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
+    """The highest stress of each link over all steps, and away from where it is not what it seems."""
+    table = Table(title="Highest von Mises stress, over all steps")
+    for column in ("link", "stress", "at, as drawn", clock(scene), "near"):
+        table.add_column(column, justify="right" if column == "stress" else "left", overflow="fold")
+    for name, peak in peaks.items():
+        for label, each in ((name, peak), ("  away from it", peak.away)):
+            if each is not None:
+                at = moment(scene, each.time, each.angle)
+                table.add_row(label, with_prefix(each.stress, "Pa"), place_of(each.place), at, each.near)
+    return table
 
 
 def budget_table(found: Budget) -> Table:

@@ -13,12 +13,13 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
 
 from kedfem.results.files import claimed, ready_folder, replacing
 from kedfem.results.reader import read_results
-from kedfem.results.records import Channel, Results
+from kedfem.results.records import Channel, Peak, Results
 from kedfem.results.table import write_csv
 from kedfem.results.writer import ResultsWriter, add_notes
 
 __all__ = [
     "Channel",
+    "Peak",
     "Results",
     "ResultsWriter",
     "add_notes",

@@ -218,9 +218,7 @@ def peaks(
         if words is not None and sound.any():
             peak = _peak(each, when, sound, words)
             away[each.link] = max(away.get(each.link, peak), peak, key=lambda x: x.stress)
-    return {
-        name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()
-    }
+    return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
 
 
 def highest(every: Mapping[str, Peak]) -> Peak | None:

@@ -82,19 +82,19 @@ def below(s, vm, sign, limit):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def looked_at(part, C, t, first, s, highest, at, i):  # type: ignore[no-untyped-def]
+def looked_at(part, c, step, s, highest, at, i):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
     """One point at one time: stress s and its von Mises s[6]; better extremes are kept."""
-    vm = stress_at(part, C[t], s)
+    vm = stress_at(part, c, s)
     s[6] = vm
     if vm > highest[0, i]:
-        highest[0, i], at[0, i] = vm, first + t
+        highest[0, i], at[0, i] = vm, step
     more, less = not below(s, vm, 1.0, highest[1, i]), not below(s, vm, -1.0, highest[2, i])
     if more or less:
         largest, smallest = principal(s, vm)
         if more and largest > highest[1, i]:
-            highest[1, i], at[1, i] = largest, first + t
+            highest[1, i], at[1, i] = largest, step
         if less and -smallest > highest[2, i]:
-            highest[2, i], at[2, i] = -smallest, first + t
+            highest[2, i], at[2, i] = -smallest, step
 
 
 @compiled
@@ -127,7 +127,8 @@ def enveloped(parts, C, residuals, first, highest, at):  # type: ignore[no-untyp
             size[0, j] = np.sqrt(vm)
             size[1, j] = 2 / 3 * size[0, j] + abs(part[5, j])
         for k in range(anchors):
-            looked_at(part, C, min(k * width, T - 1), first, ends[k], highest, at, i)
+            t = min(k * width, T - 1)
+            looked_at(part, C[t], first + t, ends[k], highest, at, i)
             count += 1
         for k in range(anchors - 1):
             top = 0
@@ -152,7 +153,7 @@ def enveloped(parts, C, residuals, first, highest, at):  # type: ignore[no-untyp
                     place[top, 0], place[top, 1] = level - 1, 2 * window
                     continue
                 low[top + 1], high[top + 1] = low[top], high[top]
-                looked_at(part, C, middle, first, high[top + 1], highest, at, i)
+                looked_at(part, C[middle], first + middle, high[top + 1], highest, at, i)
                 count += 1
                 if level == 0:
                     top -= 1

@@ -7,8 +7,8 @@ import numpy as np
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.records import Channel, Results
-from kedfem.results.writer import ANGLE, FORMAT, TIME
+from kedfem.results.records import Channel, Peak, Results
+from kedfem.results.writer import ANGLE, FORMAT, PEAKS, TIME
 
 WANTED = "a results file of kedfem"
 
@@ -80,7 +80,18 @@ def _results(file: Any) -> Results:
         notes={key: _plain(value) for key, value in file["notes"].attrs.items()},
         reason=file.attrs["reason"],
         version=file.attrs["kedfem_version"],
+        peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
     )
+
+
+def _peak(group: Any) -> Peak:
+    said = group.attrs
+    x, y, z = map(float, said["place [m]"])
+    return Peak(
+        float(said["von_mises [Pa]"]), said["link"], (x, y, z), int(said["node"]), int(said["step"]),
+        float(said["time [s]"]), float(said["drive [rad or m]"]), said["near"],
+        _peak(group["away"]) if "away" in group else None,
+    )  # fmt: skip
 
 
 def _series(file: Any) -> list[Any]:

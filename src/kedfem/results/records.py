@@ -89,6 +89,8 @@ class Results:
         Why the run was interrupted, else empty.
     version
         The kedfem that wrote the file.
+    peaks
+        Link → its highest stress over all steps; of a whole elastic run, of links that have stress.
     """
 
     time: Float[np.ndarray, " n"]
@@ -100,3 +102,4 @@ class Results:
     notes: Mapping[str, str | float] = field(default_factory=dict)
     reason: str = ""
     version: str = ""
+    peaks: Mapping[str, Peak] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
-from kedfem.results.records import Channel
+from kedfem.results.records import Channel, Peak
 
 FORMAT = 1
 """Version of the file's layout."""
@@ -22,6 +22,7 @@ CHUNK_ROWS = 512
 SPARE_SPACE = 1_000_000
 """Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
 
+PEAKS = "peaks"
 TIME = Channel("time", (), "s", "", "time")
 ANGLE = Channel("angle", (), "rad", "", "drive angle from the drawn position")
 
@@ -238,6 +239,35 @@ class ResultsWriter:
         if isinstance(error, BlockingIOError):
             return OutputError(f"{self.path}: must not be in use, got another run that is writing it")
         return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")
+
+
+def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
+    """Store the highest stress of each link, ``peaks/LINK``, in a file that is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r+", locking="best-effort") as file:
+            for name, peak in peaks.items():
+                _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+
+
+def _lay_peak(group: Any, peak: Peak) -> None:
+    group.attrs.update(
+        {
+            "von_mises [Pa]": peak.stress, "place [m]": peak.place, "node": peak.node, "step": peak.step,
+            "time [s]": peak.time, "drive [rad or m]": peak.angle, "near": peak.near, "link": peak.link,
+        }
+    )  # fmt: skip
+    if peak.away is not None:
+        _lay_peak(group.create_group("away"), peak.away)
 
 
 def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
