@@ -18,6 +18,7 @@ from kedfem.links.section import rectangle
 from kedfem.links.segments import Segments, beam_segments, segmented, space_segments
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
+from tests.laws.strategies import examples
 from tests.runs import Ran, ran
 from tests.scenes import arm, constant_speed
 from tests.verification.mechanisms import four_bar
@@ -94,7 +95,7 @@ def force(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=seeds)
 def test_force_is_the_gradient_of_the_strain_energy(kind: str, seed: int) -> None:
     """By central differences along random directions, whose error is of order 1e-10."""
@@ -110,7 +111,7 @@ def test_force_is_the_gradient_of_the_strain_energy(kind: str, seed: int) -> Non
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=seeds)
 def test_a_turn_of_the_whole_turns_the_force_and_keeps_the_energy(kind: str, seed: int) -> None:
     rng, link = np.random.default_rng(seed), PARTS[kind]
@@ -122,7 +123,7 @@ def test_a_turn_of_the_whole_turns_the_force_and_keeps_the_energy(kind: str, see
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=10)
+@settings(max_examples=examples(10))
 @given(seed=seeds)
 def test_force_has_neither_resultant_nor_moment_about_the_deformed_shape(kind: str, seed: int) -> None:
     rng, link = np.random.default_rng(seed), PARTS[kind]

@@ -21,6 +21,7 @@ from tests.laws.strategies import (
     LAW,
     MATERIAL,
     Motion,
+    examples,
     hexahedra,
     motions,
     patch,
@@ -237,7 +238,7 @@ def test_strain_energy_and_stresses_do_not_depend_on_the_frame(
 
 
 @pytest.mark.parametrize("nodes", FORMS)
-@settings(LAW, max_examples=8)
+@settings(LAW, max_examples=examples(8))
 @given(seeds)
 def test_a_linear_displacement_is_held_by_the_surface_alone(nodes: int, seed: int) -> None:
     """The patch test on curved elements: no force at the nodes inside, the one stress at all nodes and points."""
@@ -275,7 +276,7 @@ def test_rigid_modes_cause_no_stress(mesh: SolidMesh) -> None:
     assert np.abs(rows @ rigid_modes(link.X)).max() < 1e-11 * np.abs(rows.toarray()).max()
 
 
-@settings(LAW, max_examples=6)  # the vector form is slow
+@settings(LAW, max_examples=examples(6))  # the vector form is slow
 @given(hexahedra(), st.floats(-0.5, 0.45))
 def test_stiffness_is_that_of_the_vector_form(mesh: SolidMesh, nu: float) -> None:
     """Six scalar matrices against scikit-fem's own linear elasticity on the vector-valued element."""

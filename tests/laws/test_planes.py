@@ -22,6 +22,7 @@ from tests.laws.strategies import (
     LAW,
     MATERIAL,
     Motion,
+    examples,
     planar_rotations,
     plane,
     quadrilaterals,
@@ -141,7 +142,7 @@ def test_linear_fields_pass_the_patch_test_in_plane_stress(mesh: QuadMesh, seed:
     assert np.abs(force[inner]).max() < 1e-11 * np.abs(force).max()
 
 
-@settings(LAW, max_examples=6)  # the vector form is slow
+@settings(LAW, max_examples=examples(6))  # the vector form is slow
 @given(quadrilaterals(), st.floats(-0.5, 0.45))
 def test_stiffness_is_that_of_the_vector_form(mesh: QuadMesh, nu: float) -> None:
     """Three scalar matrices against scikit-fem's own linear elasticity on the vector-valued element."""

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from kedfem.motion.newton import orthonormal, rotation
-from tests.laws.strategies import LAW, rotations, vectors
+from tests.laws.strategies import LAW, examples, rotations, vectors
 from tests.linkages import (
     JointTable,
     cardan,
@@ -35,7 +35,7 @@ def sliders(joints: JointTable) -> tuple[str, ...]:
     return ("slider",) if "guide" in joints else ()
 
 
-@settings(LAW, max_examples=5)  # each follows two linkages over a turn
+@settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
 @given(joint_tables, rotations, vectors)
 def test_the_motion_does_not_depend_on_where_the_scene_lies(
     joints: JointTable, Q: np.ndarray, s: np.ndarray
@@ -51,7 +51,7 @@ def test_the_motion_does_not_depend_on_where_the_scene_lies(
     assert_allclose(there.p2, here.p2 @ Q.T - there.R2 @ s, atol=1e-11)
 
 
-@settings(LAW, max_examples=5)  # each follows two linkages over a turn
+@settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
 @given(joint_tables, st.integers(1, 1000), st.floats(0.0, 6.28))
 def test_every_turn_is_the_same(joints: JointTable, turns: int, phase: float) -> None:
     scene = linkage_scene(joints, sliders=sliders(joints))

@@ -34,6 +34,7 @@ from kedfem.motion.rigid import resting
 from kedfem.motion.rows import perpendiculars
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from
+from tests.laws.strategies import examples
 from tests.scenes import bar
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -116,7 +117,7 @@ def test_turns_are_counted_on(one: int, other: int) -> None:
 
 @pytest.mark.parametrize(("one", "other"), FORMS)
 @given(seed=seeds, whole=vectors, angle=st.floats(-3, 3))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
     one: int, other: int, seed: int, whole: np.ndarray, angle: float
 ) -> None:
@@ -133,7 +134,7 @@ def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
 
 @pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
 @given(seed=seeds)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: int) -> None:
     """Forces · δx = Q δq by central differences, from any deformed and tilted state."""
     rng = np.random.default_rng(seed)

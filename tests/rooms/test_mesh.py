@@ -1,7 +1,6 @@
 """The mesh room: every shape fills what it should with good hexahedra, bores and arcs exact."""
 
 import math
-import os
 import signal
 import threading
 from pathlib import Path
@@ -33,6 +32,7 @@ from kedfem.mesh.quality import scaled_jacobian
 from kedfem.mesh.relaxation import distortion, relaxed
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import Extrusion, LinkScene, part_geometry
+from tests.laws.strategies import examples
 
 HERE = Path()
 GEOMETRY = Path(__file__).parents[2] / "geometry"
@@ -184,7 +184,7 @@ class TestPlateLink:
         assert error[2] < error[1] / 12
         assert error[2] < 1e-8
 
-    @settings(max_examples=25 if os.environ.get("CI") else 10, deadline=None, derandomize=True)
+    @settings(max_examples=examples(25), deadline=None, derandomize=True)
     @given(st.floats(0.1, 1), st.floats(0.15, 0.8), st.floats(1.1, 20), st.integers(1, 4))
     def test_is_made_of_good_elements(self, waist, bore, length, across):
         mesh = plate(0.06 * length, 0.06 * waist, 0.06, 0.06 * bore, across=across)
