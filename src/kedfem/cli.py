@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
 
 from kedfem.errors import KedfemError, SceneError
+from kedfem.terminal import terminal
 
 USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
 KINDS = ("four-bar", "slider-crank", "single-arm")
@@ -22,7 +22,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-out, err = Console(highlight=False), Console(stderr=True, highlight=False)
+out, err = terminal(), terminal(stderr=True)
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
 
 

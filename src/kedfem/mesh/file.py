@@ -95,7 +95,11 @@ def _solid_cells(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
         if block.dim == 3:
             found[block.type] = found.get(block.type, 0) + len(block.data)
     if len(found) == 1 and (kind := next(iter(found))) in _ACCEPTED and found[kind]:
-        return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
+        try:
+            return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
+        except (OverflowError, ValueError, TypeError):
+            wanted = "must number its nodes with whole numbers of at most 18 digits"
+            raise MeshError(f"{where}: {wanted}, got others in {path}") from None
     got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
     raise MeshError(f"{where}: must hold elements of one kind ({', '.join(_ACCEPTED)}), got {got} in {path}")
 

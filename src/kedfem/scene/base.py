@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
@@ -10,10 +11,12 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, V
 from pydantic_core import InitErrorDetails
 
 from kedfem.scene.units import fault
+from kedfem.scene.wording import shown
 
 Fault = tuple[tuple[str | int, ...], str]
 """Place in a record, and message."""
 
+LONGEST, LONGEST_FILE = 100, 255  # names become parts of file names
 NAME = re.compile(r"[^\W_](?:[\w \-]*\w)?")
 
 
@@ -38,12 +41,32 @@ class Record(BaseModel):
 def checked_name(name: str) -> str:
     """A name of a part of the scene: letters, digits, ``_``, ``-`` and inner spaces."""
     if not NAME.fullmatch(name):
-        raise fault(f"must be a name of letters, digits, '_', '-' and inner spaces, got {name!r}")
+        raise fault(f"must be a name of letters, digits, '_', '-' and inner spaces, got {shown(name)}")
+    if len(name) > LONGEST:
+        raise fault(f"must be a name of at most {LONGEST} letters, got one of {len(name)}: {shown(name)}")
     return name
 
 
+def checked_file(name: str) -> str:
+    """A path without control characters, none of its parts too long for a disk."""
+    if control := [character for character in name if unicodedata.category(character) == "Cc"]:
+        raise fault(f"must be a path without control characters, got {control[0]!r}")
+    longest = max(len(part.encode()) for part in name.replace("\\", "/").split("/"))
+    if longest > LONGEST_FILE:
+        raise fault(f"must be a path of names of at most {LONGEST_FILE} bytes, got one of {longest}")
+    return name
+
+
+def checked_line(text: str) -> str:
+    """One line without control characters."""
+    if control := [character for character in text if unicodedata.category(character) == "Cc"]:
+        raise fault(f"must be a line without control characters, got {control[0]!r}")
+    return text
+
+
 Name = Annotated[str, AfterValidator(checked_name)]
-FileName = Annotated[str, StringConstraints(min_length=1)]
+FileName = Annotated[str, StringConstraints(min_length=1), AfterValidator(checked_file)]
+Line = Annotated[str, AfterValidator(checked_line)]
 
 
 def plain(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 import tomllib
 from collections.abc import Mapping
 from contextvars import ContextVar
@@ -19,6 +20,9 @@ from kedfem.scene.points import known_points
 from kedfem.scene.shapes import PartGeometry
 from kedfem.scene.units import si_number
 
+MOST_TEXT = 50_000_000  # bytes of a scene, part or table
+DEEPEST = 100  # tables in tables
+DOTTED = re.compile(rf"\s*\[*\s*(?:[\w\-]+\s*\.\s*){{{DEEPEST},}}")
 scene_folder: ContextVar[Path] = ContextVar("scene_folder", default=Path())
 sketched: ContextVar[bool] = ContextVar("sketched", default=False)
 """Whether elastic links of the scene under validation may lack shape and material."""
@@ -33,6 +37,13 @@ def file_text(path: Path) -> str:
         No such file, not a file, not readable, not text.
     """
     try:
+        found = path.stat()
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+            raise SceneError(f"{path}: must be a regular file, got a pipe or a device")
+        if found.st_size > MOST_TEXT:
+            raise SceneError(
+                f"{path}: must be at most {MOST_TEXT / 1e6:g} MB, got {found.st_size / 1e6:.4g} MB"
+            )
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"{path}: must be a file, got nothing there") from None
@@ -40,6 +51,8 @@ def file_text(path: Path) -> str:
         raise SceneError(
             f"{path}: must be text in UTF-8, got other bytes at position {reason.start}"
         ) from None
+    except ValueError:  # a zero byte in its name
+        raise SceneError("must be a path without control characters, got one with a zero byte") from None
     except OSError as reason:
         raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
 
@@ -53,8 +66,13 @@ def toml_table(path: Path) -> tuple[dict[str, Any], str]:
         Not readable, empty or not TOML; the line is named.
     """
     text = file_text(path)
+    for k, line in enumerate(text.splitlines(), start=1):
+        if DOTTED.match(line):
+            raise SceneError(f"{path}, line {k}: must be nested less than {DEEPEST} deep, got more")
     try:
         table = tomllib.loads(text)
+    except RecursionError:
+        raise SceneError(f"{path}: must be nested less than {DEEPEST} deep, got more") from None
     except tomllib.TOMLDecodeError as reason:
         found = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(reason), re.DOTALL)
         number = found[2] if found else str(len(text.splitlines()))

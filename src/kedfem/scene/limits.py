@@ -79,7 +79,7 @@ def link_of(entry: Entry) -> str | None:
 def analysis_faults(parts: Parts) -> Iterator[str]:
     """An analysis whose end or step is missing, given twice or impossible with the drive."""
     analysis = parts.analysis
-    if not analysis.raw:
+    if not analysis.raw and analysis.record is None:
         return
     if analysis.has("turns") and analysis.has("end_time"):
         yield analysis.fault("turns", "must stand without end_time, got both")

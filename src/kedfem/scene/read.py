@@ -78,6 +78,9 @@ def scene_from(
     token = scene_folder.set(Path(folder))
     try:
         scene = Scene.model_validate(raw)
+    except RecursionError:
+        wanted = "must not be nested, nor have points that are constructed from each other, hundreds deep"
+        raise SceneError(f"the scene: {wanted}, got more") from None
     finally:
         scene_folder.reset(token)
     scene._source, scene._folder, scene._stem = source, Path(folder), stem

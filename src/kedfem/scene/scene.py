@@ -17,7 +17,7 @@ from pydantic import (
 
 from kedfem.errors import SceneError
 from kedfem.scene.analysis import Analysis, Output
-from kedfem.scene.base import Name, Record, plain
+from kedfem.scene.base import Line, Name, Record, plain
 from kedfem.scene.checks import (
     drive_faults,
     gear_faults,
@@ -44,7 +44,9 @@ from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
 from kedfem.scene.springs import Spring
+from kedfem.scene.timing import time_grid
 
+MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than a disk holds
 GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
 
 
@@ -59,7 +61,7 @@ class Scene(Record):
         With all faults of the scene.
     """
 
-    title: str = ""
+    title: Line = ""
     """a line about the scene, for pictures and summaries"""
     gravity: AccelerationVector = (0.0, 0.0, 0.0)
     """acceleration of free fall; none if not given"""
@@ -165,6 +167,8 @@ class Scene(Record):
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
             raise SceneError(list(dict.fromkeys(faults)))
+        if (steps := time_grid(scene).steps) > MOST_STEPS:
+            raise SceneError(f"analysis: must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")
         scene._doubts = tuple(bare_numbers(given, cls))
         if scene.analysis.frames is None:
             scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))

@@ -66,6 +66,7 @@ USUAL = (
     "N/mm",
 )  # fmt: skip
 """Units as they are usually written, for hints."""
+HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine's: its powers would overflow
 OVERFLOW = 10**308  # whole numbers in TOML have no end
 CYCLES = {"hertz"}
 TURNING = {
@@ -180,6 +181,9 @@ class Quantity:
         got = f"got {value!r}" if isinstance(value, str) else f"got {number:.12g}"
         if not math.isfinite(number):
             raise fault(f"must be finite{self.bracket}, {got}")
+        if abs(number) > HUGE or (self.above == 0.0 and 0.0 < number < 1.0 / HUGE):
+            bound = f"at most {HUGE:g} in size" if abs(number) > HUGE else f"at least {1.0 / HUGE:g}"
+            raise fault(f"must be {bound}{self.bracket}, {got}")
         if not (self.above < number < self.below and self.least <= number <= self.most):
             raise fault(f"must be {self.bounds}{self.bracket}, {got}")
 
