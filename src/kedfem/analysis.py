@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of
 from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
 from kedfem.accuracy.histories import Histories
+from kedfem.accuracy.locking import Locking
 from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
@@ -21,8 +22,9 @@ from kedfem.accuracy.stability import stability_warning
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.model import Model, segments, ways
-from kedfem.dynamics.transient import Steps
+from kedfem.dynamics.transient import Steps, eased_warning
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
@@ -116,7 +118,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
-    watched = _Watched(recorded, untold, efforts, recoveries)
+    watched = _Watched(recorded, untold, efforts, recoveries, Locking(ready.model))
     envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
@@ -141,6 +143,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *efforts.warnings(),
         *undetermined_warning(untold),
         *peak_warning(peak),
+        *watched.locking.warnings(),
+        *eased_warning(solvers),
+        *coarse_steps(scene),
         *warnings,
     )
     return Run(
@@ -265,6 +270,7 @@ class _Watched:
     untold: dict[str, str]
     efforts: CrossChecks
     recoveries: list[StressRecovery]
+    locking: Locking
 
 
 def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
@@ -294,6 +300,7 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
                 envelope.add(block)
+                watched.locking.add(block)
                 seen.add(block)
                 errors.add(block, values)
                 for k in range(len(block)):

@@ -64,7 +64,7 @@ class FollowingSteps:
         self.actions, self.tolerance = actions, tolerance
         c_M, c_K = effective_coefficients(scheme, damping)
         self.parts = [held_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
-        self.factorisations, self.sweeps = len(self.parts), 0
+        self.factorisations, self.sweeps, self.eased = len(self.parts), 0, 0
         self.scale, self._too_far = rounding(links), too_far(links)
         self.mixing, self.stacks = Mixing(), stacks(links)
         self._acting = acting_on(actions, links)
@@ -159,6 +159,7 @@ class FollowingSteps:
             if not moved <= self._too_far:
                 break
             if settled:
+                self.eased += bool(sizes.sum() > self.tolerance**2 * max(self.scale, moved))
                 self.scale = max(self.scale, moved)
                 now, self._turned = self._acted(now, before, F, acting, t)
                 return self._ended(state, now, R, frames, forces)

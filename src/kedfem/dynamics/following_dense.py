@@ -50,7 +50,7 @@ class FollowingDense:
         self.parts = [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
         self.factorisations = len(self.parts)
         self._closure = closure(joints, [part.W for part in self.parts])
-        self._counts = np.array([0.0, rounding(links), 0.0, 0.0, too_far(links)])
+        self._counts = np.array([0.0, rounding(links), 0.0, 0.0, too_far(links), 0.0])
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]
@@ -65,6 +65,11 @@ class FollowingDense:
     def sweeps(self) -> int:
         """Taken so far."""
         return int(self._counts[0])
+
+    @property
+    def eased(self) -> int:
+        """Steps whose iterations were taken as converged at a tolerance EASIER times larger."""
+        return int(self._counts[5])
 
     def begin(self, states: Sequence[LinkState]) -> State:
         """The loop's own state, from link states."""

@@ -135,6 +135,8 @@ def follow_block(  # type: ignore[no-untyped-def]
             )
             allowed = tolerance if sweep < PATIENCE else EASIER * tolerance
             settled = moved <= allowed * allowed * max(counts[1], reached)
+            if settled and moved > tolerance * tolerance * max(counts[1], reached):
+                counts[5] += 1
             if not settled:
                 mixed(memory, counts, sweep, change.ravel())
             reached = advanced(change, u1, u)

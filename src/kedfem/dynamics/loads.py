@@ -41,6 +41,9 @@ from kedfem.scene import (
     time_grid,
 )
 
+MISSED = 0.05  # of a load's integral over time; a jump between two steps is less
+FINER, MOST = 16, 400_000  # points in a step, and in all, at which factors over an angle are looked at
+
 Times = Float[np.ndarray, " t"]
 Vector = Float[np.ndarray, "3"]
 
@@ -109,6 +112,30 @@ def _over_time(scene: Scene, factor: Factor) -> tuple[tuple[float, ...], tuple[f
         return factor_table(factor, grid.end)
     t = grid.step * np.arange(grid.steps + 1)
     return tuple(t.tolist()), tuple(load_factor(factor, t, path_parameter(scene, t)[0]).tolist())
+
+
+def coarse_steps(scene: Scene) -> tuple[str, ...]:
+    """A warning for each load whose factor does something between the time steps that these do not see."""
+    grid, out = time_grid(scene), []
+    steps = grid.step * np.arange(grid.steps + 1)
+    phi = path_parameter(scene, steps)[0] if scene.driven else np.zeros_like(steps)
+    for name, load in scene.loads.items():
+        sampled = load_factor(load.factor, steps, phi)
+        if load.factor.over == "time":
+            fine = np.array(factor_table(load.factor, grid.end)[0])
+            fine = fine[(fine > 0) & (fine < grid.end)]
+        else:
+            fine = grid.step / FINER * np.arange(min(FINER * grid.steps, MOST) + 1)
+        t = np.union1d(steps, fine)
+        angle = path_parameter(scene, t)[0] if scene.driven else np.zeros_like(t)
+        value = load_factor(load.factor, t, angle)
+        missed = np.trapezoid(np.abs(value - np.interp(t, steps, sampled)), t)
+        if missed > MISSED * np.trapezoid(np.abs(value), t):
+            out.append(
+                f"loads.{name}: its table is finer than the time step of {grid.step:.3g} s: what the steps see of it "
+                f"is off by {100 * missed / np.trapezoid(np.abs(value), t):.0f} %; take a smaller step"
+            )
+    return tuple(out)
 
 
 def _always(t: Times, phi: Times) -> Times:

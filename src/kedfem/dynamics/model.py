@@ -20,7 +20,7 @@ from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_p
 from kedfem.links.build import bare_links, parted
 from kedfem.links.record import Link
 from kedfem.links.recovery import PointRows, point_rows
-from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, wave_frequency
+from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, rigid_functions, wave_frequency
 from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights, rigid_seat
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
@@ -40,6 +40,7 @@ from kedfem.scene import (
 
 T = TypeVar("T")
 
+LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
 RESOLVED = 30.0  # ω h of rigid links whose frames follow: they deform by (turn in a step / 30)²; from 100 on sweeps fail
 
 
@@ -183,10 +184,29 @@ def _made_rigid(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
     elastic = [link for key, link in links.items() if key not in made]
     out = dict(links)
     for key in made:
+        _with_extent(links[key])
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         followed = links[key].fit is not None
         out[key] = rigid(links[key], min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
     return out
+
+
+def _with_extent(link: Link) -> None:
+    """Refuse a rigid link whose mass has no extent along one of its directions: nothing tells its functions along it.
+
+    Raises
+    ------
+    SceneError
+        If the least second moment of its mass about the centre is nothing beside the largest.
+    """
+    F = rigid_functions(link)
+    A = F.T @ np.asarray(link.mass[0] @ F)
+    second = np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0])
+    if second[0] < LAMINA * second[-1]:
+        raise SceneError(
+            f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "
+            "plane (such as a body with Ixx + Iyy = Izz on a link of next to no mass): give the body some thickness"
+        )
 
 
 def keys(name: str, link: Segments) -> list[str]:

@@ -24,7 +24,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.segment import CONVERGED, FREE, first_history
+from kedfem.dynamics.segment import CONVERGED, EASIER, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nodal
 from kedfem.dynamics.stiffening import Stiffening, stiffening
@@ -39,6 +39,7 @@ from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_g
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
+BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 Steps = CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | FollowingSteps | FollowingDense
@@ -109,7 +110,7 @@ def transient(
                 except Stuck as stuck:
                     if stuck.taken:
                         yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
-                    raise SolveError(_stuck(first + k + stuck.taken, part, stuck)) from None
+                    raise SolveError(_stuck(model, first + k + stuck.taken, part, stuck)) from None
             else:
                 rows, forcing = joint_rows(model.rows, part), forcings(model, part)
                 if isinstance(solver, ActedSteps):
@@ -162,13 +163,30 @@ def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge
     )  # fmt: skip
 
 
-def _stuck(step: int, part: RigidMotion, stuck: Stuck) -> str:
+def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
     """What to do about a step that does not settle."""
-    k = stuck.taken
+    k, beams = stuck.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
+    needed = " (a beam in space needs about 32 elements where it bends by a quarter arc)" * (
+        stuck.link in beams
+    )
     return (
         f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
         f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from "
-        "sweep to sweep: give it more elements or segments, take a smaller step, or more numerical damping (rho_inf)"
+        "sweep to sweep: give it more elements or segments"
+        + needed
+        + ", take a smaller step, or more numerical damping "
+        "(rho_inf)"
+    )
+
+
+def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
+    """A warning where iterations of steps were taken as converged at an eased tolerance."""
+    eased = sum(each.eased for each in solvers if isinstance(each, FollowingSteps | FollowingDense))
+    if not eased:
+        return ()
+    return (
+        f"the iterations of {eased} steps with frames that follow converged to {EASIER:g} times the tolerance only "
+        "(stiff springs or hubs): take a smaller step to see whether results change",
     )
 
 
@@ -307,8 +325,8 @@ def drive_range(scene: Scene) -> tuple[float, float]:
 
 
 def _finite(block: Block, advice: str) -> Iterator[Block]:
-    """The block, up to where a displacement is not finite any more."""
-    fine = np.all([np.isfinite(link.g[:, 0]).all(axis=1) for link in block.links], axis=0)
+    """The block, up to where a displacement is not finite any more, or beyond all measure."""
+    fine = np.all([np.abs(link.g).max(axis=(1, 2)) < BEYOND for link in block.links], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
     if k:
         yield block.part(0, k)

@@ -139,7 +139,10 @@ def _slice(
         part = solid_link(link.name, SolidMesh(link.X[used], cells, faces, link.way), material, link.axes)
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
-    assert distance.max() <= SAME * link.size  # noqa: S101
+    if distance.max() > SAME * link.size:
+        raise MeshError(
+            f"links.{link.name}.segments: must keep the nodes of the link, got some that it does not have"
+        )
     return part, same
 
 

@@ -1,0 +1,114 @@
+"""What once was silent: beams that lock, loads between the steps, eased tolerances, growth, mass in a plane."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kedfem.accuracy.locking import Locking
+from kedfem.accuracy.prepared import meshed
+from kedfem.dynamics import transient
+from kedfem.dynamics.loads import coarse_steps
+from kedfem.dynamics.transient import _finite
+from kedfem.errors import SceneError, SolveError
+from kedfem.scene import scene_from
+from tests.moving import bar, ran
+from tests.rooms.test_driven_efforts import arm
+
+
+@pytest.mark.parametrize(("elements", "least", "most"), [(4, 30.0, 200.0), (16, 0.0, 0.0)])
+def test_a_run_says_that_beams_in_space_lock(elements: int, least: float, most: float) -> None:
+    """Against planar beams the arm bends too little by 56 and 0.9 %; below 2 % nothing is said."""
+    raw = arm("spatial", elements)
+    raw["analysis"] |= {"end_time": 0.1, "step": 1e-3}
+    raw["links"]["arm"]["shape"]["up"] = [0, 0, 1]  # 4 mm high in the plane
+    ready, blocks = ran(raw)
+    locking = Locking(ready.model)
+    for block in blocks:
+        locking.add(block)
+    found = locking.warnings()
+    assert len(found) == (1 if least else 0)
+    if found:
+        assert "links.arm: its beams in space are too stiff by some" in found[0]
+        assert f"{elements} elements): take" in found[0]
+        assert least < float(found[0].split("stiff by some ")[1].split(" %")[0]) < most
+
+
+def loaded(factor: dict[str, Any]) -> tuple[str, ...]:
+    raw = arm("beam", 2)
+    load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1.0], "factor": factor}
+    return coarse_steps(scene_from(raw | {"loads": {"P": load}}))
+
+
+def test_a_pulse_between_two_steps_is_told_and_jumps_are_not() -> None:
+    """Steps of 0.5 ms: a pulse of 0.3 ms between two of them is not seen at all; a jump is, but for a part of a step."""
+    pulse = {"time": [0.0201, 0.02025, 0.0204], "value": [0.0, 1.0, 0.0]}
+    (message,) = loaded(pulse)
+    assert message.startswith(
+        "loads.P: its table is finer than the time step of 0.0005 s: what the steps see of it is off by 100 %"
+    )
+    assert loaded({"time": [0.05, 0.0501], "value": [0.0, 1.0]}) == ()
+    assert loaded({"over": "angle", "at": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}) == ()
+
+
+def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> None:
+    """A tolerance near rounding is eased in some of the steps, the usual one in none."""
+    raw = arm("beam", 2)
+    raw["analysis"] |= {"end_time": 0.02}
+    ready = meshed(scene_from(raw))
+
+    def eased() -> int:
+        steps = transient.steps_of(ready.scene, ready.model)
+        list(transient.transient(ready.scene, ready.linkage, ready.path, ready.model, steps))
+        assert (
+            transient.eased_warning([steps]) == ()
+            or "the iterations of" in transient.eased_warning([steps])[0]
+        )
+        return int(steps.eased)  # type: ignore[union-attr]
+
+    assert eased() == 0
+    monkeypatch.setattr(transient, "CONVERGED", 1e-12)
+    assert eased() > 0
+
+
+@pytest.mark.parametrize("value", [np.inf, np.nan, 1e50])
+def test_growth_in_any_function_ends_a_run(value: float) -> None:
+    """Not only in the first function, and not only at infinity."""
+    raw = arm("beam", 2)
+    raw["analysis"] |= {"end_time": 0.01}
+    block = ran(raw)[1][1]
+    g = block.links[0].g.copy()
+    g[2, -1, 1] = value
+    every = _finite(replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]), "")
+    assert len(next(every)) == 2
+    with pytest.raises(SolveError, match="got none at step 3"):
+        next(every)
+
+
+def test_a_rigid_link_whose_mass_lies_in_a_plane_is_refused() -> None:
+    """A lamina on a carrier of next to no mass: nothing tells how the link's functions move across it."""
+    light = {"density": 1e-3, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}
+    raw: dict[str, Any] = {
+        "materials": {"light": light},
+        "links": {"plate": bar("rigid", [0, 0], [0.3, 0]) | {"material": "light"}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "plate"], "at": [0, 0]}},
+        "bodies": {
+            "sheet": {
+                "kind": "rigid_body",
+                "link": "plate",
+                "at": [0, 0],
+                "mass": 1.0,
+                "inertia": [0.01, 0.02, 0.03, 0, 0, 0],
+                "centre": [0, 0, 0],
+            }
+        },
+        "gravity": [0, -9.81, 0],
+        "analysis": {"end_time": 0.01, "step": 1e-3},
+    }
+    with pytest.raises(
+        SceneError, match=r"links.plate: a rigid link must have mass along all its directions"
+    ):
+        meshed(scene_from(raw))
+    raw["bodies"]["sheet"]["inertia"] = [0.012, 0.02, 0.03, 0, 0, 0]
+    assert meshed(scene_from(raw)).model.links
