@@ -37,7 +37,7 @@ def plate(outline: list[list[float]], fidelity: str, size: float) -> Any:
     return bare_link(scene_from(raw), "crank")
 
 
-BLOCK = [[0.0, -0.05], [0.4, -0.05], [0.4, 0.05], [0.0, 0.05]]
+BLOCK = [[0.0, -0.05], [0.2, -0.05], [0.2, 0.05], [0.0, 0.05]]
 ANGLE = [[0.0, -0.02], [0.3, -0.02], [0.3, 0.02], [0.1, 0.02], [0.1, 0.1], [0.0, 0.1]]
 
 
@@ -50,7 +50,7 @@ def test_the_indicator_is_the_error_of_the_mesh_in_the_energy_norm(fidelity: str
         x, y = link.X[:, 0], link.X[:, 1]
         g = np.zeros((link.n, link.d))
         g[:, 0], g[:, 1] = -9 * y * np.cos(9 * x), np.sin(9 * x)
-        fine = plate(BLOCK, fidelity, 0.01)
+        fine = plate(BLOCK, fidelity, 0.0125)
         energies = []
         for each in (link, fine):
             x, y = each.X[:, 0], each.X[:, 1]

@@ -194,12 +194,12 @@ def test_at_60_rpm_frames_are_nominal_and_the_step_is_what_is_needed() -> None:
 
 
 def test_at_600_rpm_frames_follow_and_beams_of_five_nodes_are_few() -> None:
-    """Three beam5 a link; what the quasi-static start leaves in the flywheel's joint is told."""
+    """Three beam5 a link or four leave 0.3 % and less."""
     plan = planned(scene_from(beams("600 rpm")))
     assert plan.scene.analysis.frames == "following"
     assert all(link.element == "beam5" and link.mesh.elements <= 4 for link in plan.scene.links.values())
     assert any("nominal frames would be off by" in note for note in plan.notes)
-    assert any("joints/D/force" in note for note in plan.notes)
+    assert plan.reached
 
 
 def test_a_scene_that_states_all_but_its_frames_has_no_other_trial() -> None:

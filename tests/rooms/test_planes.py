@@ -342,7 +342,7 @@ def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) ->
     scene = scene_from(quick(raw))
     done = analyse(scene)
     assert done.peak is not None
-    mesh = meshio.read(sorted(tmp_path.glob("*.vtu"))[-1])
+    mesh = meshio.read(sorted(tmp_path.glob("animation_*.vtu"))[-1])
     assert {block.type for block in mesh.cells} == {"quad9"}
     assert not mesh.point_data["displacement"][:, 2].any()
     assert not mesh.point_data["stress"][:, [2, 4, 5]].any()

@@ -18,7 +18,7 @@ import numpy as np
 
 from kedfem.accuracy.budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, geometric_warning
-from kedfem.accuracy.histories import Histories, histories, relative_errors
+from kedfem.accuracy.histories import Histories, counted, extent, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
@@ -38,10 +38,10 @@ LARGE = 100_000  # unknowns of a model for which no companion is made: its funct
 FUNCTIONS = 1e-3  # tolerance of the companion's functions: differences of runs need no better ones
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 SLOW = 1000  # the same where no compiled loop runs them
-ORDERS = 1.0, 2.0  # between which the observed order in the step is believed
+ORDERS = 1.3, 2.0  # between which the observed order in the step is believed
 REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
 SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
-LOCAL = 0.1  # of η: stress at a point, of its peak, beside what the compliance does
+LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
 SLIGHT = 1e-12
 
 
@@ -116,8 +116,7 @@ def budget(
     kinds = wanted(ready)
     small = companion(ready)
     limits = list(_limits(ready, found))
-    shares: list[Share | None] = [reduction_share(reduction)]
-    shares.append(frames_share(seen.geometric, kinds))
+    shares: list[Share | None] = [reduction_share(reduction), frames_share(seen.geometric, kinds)]
     if small is None:
         shares += [
             _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step),
@@ -127,9 +126,11 @@ def budget(
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
     small = replace(small, scene=spanned(small.scene, small.model))
     try:
-        base = histories(small) if ran is None or not own else ran
+        base = histories(small) if ran is None or not own else replace(ran, size=extent(ready.model))
+        counts = by_kind(counted(base))
+        shares[1] = frames_share(seen.geometric, [kind for kind in kinds if kind in counts])
         errors = step_errors(small, base) if step is None else step
-        shares.append(_step_share(errors))
+        shares.append(_step_share({name: error for name, error in errors.items() if name in counted(base)}))
         shares.append(_mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")

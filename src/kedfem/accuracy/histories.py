@@ -10,9 +10,13 @@ from kedfem.accuracy.budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.model import Model
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 
+FAINT = (
+    1e-4  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
+)
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 
 
@@ -23,11 +27,13 @@ class Histories:
     time : (T,) [s]
     channels : name → (channel, values (T, c))
     kept : states at the steps that were asked for
+    size : of the linkage [m]
     """
 
     time: Float[np.ndarray, " T"]
     channels: Mapping[str, tuple[Channel, Float[np.ndarray, "T c"]]]
     kept: tuple[Snapshot, ...] = ()
+    size: float = 0.0
 
 
 def histories(
@@ -55,7 +61,13 @@ def histories(
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))
         for each in recorded
     }
-    return Histories(np.concatenate(times), channels, tuple(kept))
+    return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model))
+
+
+def extent(model: Model) -> float:
+    """Size of a linkage as drawn [m]."""
+    nodes = np.concatenate([(link.full or link).nodes for link in model.links])
+    return float(np.ptp(nodes, axis=0).max())
 
 
 def asked_for(name: str) -> bool:
@@ -70,17 +82,29 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
     """
     end = min(found.time[-1], reference.time[-1]) * (1 + 1e-12)
     here = found.time <= end
-    units: dict[str, float] = {}
-    for channel, values in reference.channels.values():
-        units[channel.unit] = max(units.get(channel.unit, 0.0), float(np.abs(values).max()))
     errors = {}
-    for name, (channel, wanted) in reference.channels.items():
-        size = float(np.linalg.norm(wanted, axis=1).max())
-        if asked_for(name) and name in found.channels and size > NOTHING * units[channel.unit]:
+    for name, size in counted(reference).items():
+        channel, wanted = reference.channels[name]
+        if name in found.channels:
             values = _columns(found.channels[name], channel)[here]
             there = _at(found.time[here], reference.time, wanted)
             errors[name] = float(np.linalg.norm(values - there, axis=1).max()) / size
     return errors
+
+
+def counted(reference: Histories) -> dict[str, float]:
+    """Channel that counts → its largest value; those that hold next to nothing are left out."""
+    units: dict[str, float] = {}
+    for channel, values in reference.channels.values():
+        units[channel.unit] = max(units.get(channel.unit, 0.0), float(np.abs(values).max()))
+    sizes = {
+        name: float(np.linalg.norm(values, axis=1).max())
+        for name, (_, values) in reference.channels.items()
+        if asked_for(name)
+    }
+    least = {unit: NOTHING * value for unit, value in units.items()}
+    least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
+    return {name: size for name, size in sizes.items() if size > least[reference.channels[name][0].unit]}
 
 
 def worst(errors: Mapping[str, float]) -> float:

@@ -90,7 +90,7 @@ def varied(scene: Scene, variant: Variant) -> Scene:
         name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)
         for name, link in scene.links.items() if link.shape is not None and link.fidelity != "rigid"
     }  # fmt: skip
-    keys = {"accuracy": None, "reduction": variant.tolerance or scene.analysis.reduction}
+    keys = {"accuracy": "quick", "reduction": variant.tolerance or scene.analysis.reduction}
     changed = with_analysis(with_links(scene, links), **keys)
     if variant.steps != 1:
         changed = with_steps(changed, variant.steps * time_grid(scene).steps)

@@ -1,0 +1,187 @@
+"""The budget of runs against finest runs: ``python -m tests.budget`` writes docs/performance/budget.md.
+
+Truth is the largest difference in time of the worst channel of a kind, of its peak, from a run that has frames that
+follow where links bend, elements some times as fine and steps some times as short.
+"""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kedfem.accuracy.budget import Budget, by_kind
+from kedfem.accuracy.estimates import budget, watcher
+from kedfem.accuracy.histories import histories, relative_errors
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import first_reduced
+from kedfem.scene import scene_from
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+PAGE = Path("docs/performance/budget.md")
+COUNTED = 1e-3  # truths below are not judged: nobody asks whether 0.01 % is 0.03 %
+Raw = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run, and the finest one that it is judged by."""
+
+    name: str
+    raw: Raw
+    fine: Raw
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a run says of its errors, and what they are, by kind."""
+
+    name: str
+    found: Budget
+    true: dict[str, float]
+
+    @property
+    def least(self) -> float:
+        """The smallest ratio of estimate and truth, over kinds whose truth counts."""
+        ratios = [self.found.together[kind] / true for kind, true in self.true.items() if true > COUNTED]
+        return min(ratios, default=1.0)
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """Estimate and truth of the worst kind."""
+        return self.found.worst, max(self.true.values())
+
+    @property
+    def ratio(self) -> float:
+        """Of these."""
+        said, true = self.worst
+        return max(said, COUNTED) / max(true, COUNTED)
+
+
+def four_bar(speed: float, steps: int, links: Raw, turns: float = 1.0, **analysis: Any) -> Raw:
+    raw = tomllib.loads((EXAMPLES / "four_bar_beams" / "scene.toml").read_text())
+    raw["drive"]["motion"]["speed"] = f"{speed} rpm"
+    raw["analysis"] = {"turns": turns, "steps_per_turn": steps, "initial": "quasi-static", **analysis}
+    for link in raw["links"].values():
+        link.update(links)
+    return raw
+
+
+def arm(steps: int, links: Raw, sudden: bool, frames: str) -> Raw:
+    """An arm that swings, or that is struck at its tip while it does."""
+    shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
+    raw: Raw = {
+        "links": {"arm": {"material": "steel", "shape": shape, "fidelity": "beam", **links}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.2}},
+        "damping": {"ratio": 0.02, "frequencies": [50, 500]},
+        "analysis": {"end_time": 0.25, "step": 0.25 / steps, "frames": frames},
+        "output": {"probes": {
+            "tip": {"link": "arm", "at": [0.5, 0], "quantity": "displacement"},
+            "root": {"link": "arm", "at": [0.1, 0.01], "quantity": "stress"},
+        }},
+    }  # fmt: skip
+    if sudden:
+        raw["loads"] = {"blow": {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 50, 0]}}
+    return raw
+
+
+def beams(element: str, count: int) -> Raw:
+    return {"element": element, "mesh": {"elements": count}}
+
+
+FINE = beams("beam5", 4)
+
+
+def cases() -> Iterator[Case]:
+    """Thirty: beams, quadrilaterals, hexahedra; nominal and following; 60 to 600 rpm; smooth and sudden."""
+    for speed in (60, 150, 300, 600):
+        fine = four_bar(speed, 4320, FINE, frames="following")
+        for element, count in (("beam3", 1), ("beam5", 1), ("beam5", 3)):
+            name = f"{speed} rpm, {count} {element} a link, nominal"
+            yield Case(name, four_bar(speed, 720, beams(element, count)), fine)
+        for element, count in (("beam3", 2), ("beam5", 2)) if speed > 60 else ():
+            raw = four_bar(speed, 720, beams(element, count), frames="following")
+            yield Case(f"{speed} rpm, {count} {element} a link, following", raw, fine)
+    for speed in (60, 150):
+        fine = four_bar(speed, 4320, FINE, frames="following")
+        yield Case(f"{speed} rpm, 2 beam5, 120 steps a turn", four_bar(speed, 120, beams("beam5", 2)), fine)
+        rest = {"initial": "rest", "turns": 0.5}
+        raw = four_bar(speed, 1440, beams("beam5", 1), **rest)
+        yield Case(
+            f"{speed} rpm, 1 beam5, from rest", raw, four_bar(speed, 11520, FINE, frames="following", **rest)
+        )
+    for fidelity, tail in (("plane", []), ("solid", [1])):
+        fine = four_bar(60, 1440, {"fidelity": fidelity, "mesh": {"elements": [16, 2, *tail]}}, 0.5)
+        for along in (4, 8):
+            links = {"fidelity": fidelity, "mesh": {"elements": [along, 1, *tail]}}
+            yield Case(f"60 rpm, {fidelity} {along} × 1 a link", four_bar(60, 720, links, 0.5), fine)
+    for sudden in (False, True):
+        word = "struck" if sudden else "swung"
+        fine = arm(8000, FINE, sudden, "following")
+        for frames, count in (("nominal", 1), ("following", 2)):
+            yield Case(
+                f"arm {word}, {count} beam3, {frames}", arm(1000, beams("beam3", count), sudden, frames), fine
+            )
+
+
+def judged(case: Case, known: dict[str, Any] | None = None) -> Judged:
+    """Run a case and its finest one; solids on functions, as tight as the truth needs."""
+    ready = _small(case.raw)
+    seen = watcher(ready)
+    base = histories(ready, look=seen.add)
+    found = budget(ready, seen, None, base)
+    key = repr(case.fine)
+    if known is None or key not in known:
+        fine = histories(_small(case.fine))
+        if known is not None:
+            known[key] = fine
+    else:
+        fine = known[key]
+    return Judged(case.name, found, by_kind(relative_errors(base, fine)))
+
+
+def _small(raw: Raw) -> Prepared:
+    return first_reduced(meshed(scene_from(raw)), 1e-4)
+
+
+def page(found: list[Judged]) -> str:
+    """The table of docs/performance/budget.md."""
+    ratios = np.array([each.ratio for each in found])
+    within = np.mean((ratios > 1 / 3) & (ratios < 3))
+    lines = [
+        "# What a run says of its errors, against what they are", "",
+        "Written by `python -m tests.budget`. Truth: the largest difference in time of the worst channel of a kind,",
+        "of its peak, from a run with frames that follow, finer elements and shorter steps. In percent:",
+        "estimate / truth. Worst: the largest of each. Truths below 0.1 % are not judged.", "",
+        f"Of {len(found)} runs {100 * within:.0f} % are within a factor of three at their worst; the least ratio of",
+        f"estimate and truth of any kind is {min(each.least for each in found):.2f}.", "",
+        "| run | displacement | stress | joint forces | drive | ratio at worst |",
+        "| --- | ---: | ---: | ---: | ---: | ---: |",
+    ]  # fmt: skip
+    for each in found:
+        cells = [_cell(each, kind) for kind in ("displacement", "stress", "joint forces", "drive")]
+        lines.append(f"| {each.name} | {' | '.join(cells)} | {each.ratio:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(each: Judged, kind: str) -> str:
+    return (
+        f"{100 * each.found.together[kind]:.2g} / {100 * each.true[kind]:.2g}" if kind in each.true else "-"
+    )
+
+
+def main(say: Callable[[str], None] = print) -> None:
+    known: dict[str, Any] = {}
+    found = []
+    for case in cases():
+        found.append(judged(case, known))
+        said, true = found[-1].worst
+        say(f"{case.name}: {100 * said:.2g} / {100 * true:.2g} %, least ratio {found[-1].least:.2f}")
+    PAGE.write_text(page(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

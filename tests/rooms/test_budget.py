@@ -1,0 +1,40 @@
+"""What runs say of their errors is what they are: a few of the thirty of docs/performance/budget.md, or all."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kedfem.accuracy.budget import budget_warning
+from tests.budget import Judged, cases, judged
+
+FEW = (
+    "60 rpm, 1 beam3 a link, nominal",
+    "300 rpm, 2 beam5 a link, following",
+    "150 rpm, 2 beam5, 120 steps a turn",
+    "60 rpm, plane 4 × 1 a link",
+)
+
+
+def honest(found: list[Judged]) -> None:
+    """Never below a third of the truth; nothing above 5 % without a warning."""
+    for each in found:
+        assert each.least > 1 / 3, each.name
+        assert budget_warning(each.found) or max(each.true.values()) < 0.05, each.name
+
+
+def test_a_few_runs_say_how_wrong_they_are() -> None:
+    found = [judged(case) for case in cases() if case.name in FEW]
+    assert len(found) == len(FEW)
+    honest(found)
+    assert all(1 / 3 < each.ratio < 3 for each in found)
+
+
+@pytest.mark.long
+def test_thirty_runs_say_how_wrong_they_are() -> None:
+    known: dict[str, Any] = {}
+    found = [judged(case, known) for case in cases()]
+    assert len(found) == 30
+    honest(found)
+    ratios = np.array([each.ratio for each in found])
+    assert np.mean((ratios > 1 / 3) & (ratios < 3)) >= 0.9
