@@ -43,11 +43,14 @@ def segments(kind: str, count: int = 2) -> tuple[Link, Segments]:
     if kind == "plane":
         link = mapped_plane((12, 2), lambda r, s: (r, 0.05 * (s - 0.5)), 0.04, SOFT)
     else:
-        link = mapped_link((12, 1, 1), lambda r, s, t: (r, 0.05 * (s - 0.5), 0.04 * (t - 0.5)), SOFT, 20)
+        nodes = 10 if kind == "tetrahedra" else 20
+        link = mapped_link((12, 1, 1), lambda r, s, t: (r, 0.05 * (s - 0.5), 0.04 * (t - 0.5)), SOFT, nodes)
     return link, segmented(link, SOFT, count, ENDS, ())
 
 
-PARTS = {kind: segments(kind)[1].parts[0] for kind in ("beam", "plane", "solid", "spatial_beam")}
+PARTS = {
+    kind: segments(kind)[1].parts[0] for kind in ("beam", "plane", "solid", "tetrahedra", "spatial_beam")
+}
 KINDS = list(PARTS)
 
 
@@ -208,6 +211,7 @@ def test_segments_of_a_beam_in_nominal_frames_are_the_whole_beam(kind: str) -> N
     [
         ("plane", {2: 3e-6, 6: 1.3e-5, 12: 1.5e-4}),
         ("solid", {2: 2e-6, 6: 8e-5, 12: 1.4e-3}),
+        ("tetrahedra", {2: 6e-5, 6: 3e-4, 12: 6e-4}),
     ],
 )
 def test_cuts_of_meshed_links_make_them_hardly_softer(kind: str, wanted: dict[int, float]) -> None:

@@ -23,7 +23,7 @@ from tests import scenes
 from tests.rooms.test_dynamics import four_bar
 from tests.scenes import bar, cycloidal
 
-KINDS = ["beam", "bar", "plane", "spatial"]
+KINDS = ["beam", "bar", "tetrahedra", "plane", "spatial"]
 TURNED = 0.7  # rad
 
 
@@ -35,6 +35,8 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 def arm(kind: str, **analysis: Any) -> dict[str, Any]:
     """A cantilever that swings under its weight; spatial: a bent beam under weight across its plane."""
     link = bar(0.5, 0.02, 0.03, fidelity="solid", mesh={"elements": [10, 2, 1]})
+    if kind == "tetrahedra":
+        link |= {"element": "tet10"}
     if kind == "plane":
         link |= {"fidelity": "plane", "mesh": {"elements": [10, 2]}}
     if kind in {"beam", "spatial"}:

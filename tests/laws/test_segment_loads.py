@@ -13,7 +13,9 @@ from tests.scenes import bar, constant_speed
 
 
 def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
-    segments = {"segments": 4} if analysis.get("frames") else {}
+    segments: dict[str, Any] = {"segments": 4} if analysis.get("frames") else {}
+    if fidelity == "tet10":
+        fidelity, segments["element"] = "solid", "tet10"
     return scenes.arm(
         bar(0.4, 0.02, 0.01, fidelity=fidelity, **segments),
         constant_speed(1.0),
@@ -27,7 +29,7 @@ def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
     )
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid"])
+@pytest.mark.parametrize("fidelity", ["plane", "solid", "tet10"])
 def test_segments_carry_all_loads_of_the_whole_link(fidelity: str) -> None:
     """Resultants and moments of gravity, of a pressure over the whole upper face, of body and tip force."""
     found = []

@@ -9,6 +9,7 @@ from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
+from kedfem.mesh.tetrahedra import tetrahedral
 from kedfem.scene import Material
 
 Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -35,7 +36,7 @@ def mapped_mesh(
     cells = np.ravel_multi_index(tuple(np.moveaxis(index, -1, 0)), tuple(size))
     used, renumbered = np.unique(cells, return_inverse=True)
     mesh = SolidMesh(np.stack(mapping(r, s, t), axis=1)[used], renumbered.reshape(cells.shape))
-    return serendipity(mesh) if nodes == 20 else mesh
+    return {10: tetrahedral, 20: serendipity}.get(nodes, lambda same: same)(mesh)
 
 
 def box(lengths: tuple[float, float, float], start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mapping:

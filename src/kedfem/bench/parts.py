@@ -23,10 +23,11 @@ from kedfem.links.seats import Seat, joint_seat
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.hexahedra import linear, quadratic, serendipity
+from kedfem.mesh.tetrahedra import tetrahedral
 from kedfem.scene import Bar, LinkScene, Material, Meshing, PlateLink
 
 STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
-FORMS = {"hex27": quadratic, "hex20": serendipity, "hex8": linear}
+FORMS = {"hex27": quadratic, "hex20": serendipity, "tet10": tetrahedral, "hex8": linear}
 MODES = 3  # frequencies that are compared
 MANY = 20_000  # unknowns from which factoring is timed but once
 RIGID = 6
@@ -195,7 +196,7 @@ BAR = BenchPart(
     stressed=(0.15, 0.01, 0.0),
     near=1100.0,
     sizes=dict.fromkeys(
-        ("hex27", "hex20"), ((2, 1, 1), (4, 1, 1), (8, 1, 1), (12, 2, 2), (24, 3, 3), (36, 4, 4))
+        ("hex27", "hex20", "tet10"), ((2, 1, 1), (4, 1, 1), (8, 1, 1), (12, 2, 2), (24, 3, 3), (36, 4, 4))
     )
     | {"hex8": ((12, 2, 2), (24, 4, 4), (48, 6, 6), (72, 8, 8))},
     reference=(44, 5, 5),
@@ -211,7 +212,7 @@ PARTS = (
         force=(1.0, 0.0, 0.0),
         stressed=(-0.015, 0.0, 0.0),
         near=2000.0,
-        sizes=dict.fromkeys(("hex27", "hex20"), ((2, 1), (4, 1), (6, 2), (9, 2), (12, 3)))
+        sizes=dict.fromkeys(("hex27", "hex20", "tet10"), ((2, 1), (4, 1), (6, 2), (9, 2), (12, 3)))
         | {"hex8": ((4, 1), (8, 2), (16, 3), (20, 4))},
         reference=(16, 3),
     ),
@@ -222,7 +223,8 @@ PARTS = (
         stressed=(0.1, 0.0, 0.001),
         near=250.0,
         sizes=dict.fromkeys(
-            ("hex27", "hex20"), ((2, 1, 1), (4, 2, 1), (8, 4, 1), (16, 8, 1), (32, 16, 1), (40, 20, 1))
+            ("hex27", "hex20", "tet10"),
+            ((2, 1, 1), (4, 2, 1), (8, 4, 1), (16, 8, 1), (32, 16, 1), (40, 20, 1)),
         )
         | {"hex8": ((16, 8, 1), (32, 16, 1), (64, 32, 1), (96, 48, 1))},
         reference=(48, 24, 2),

@@ -82,10 +82,24 @@ def bare_link(scene: Scene, name: str) -> Link:
     link = scene.links[name]
     material = scene.materials[str(link.material)]
     if link.family == "solid":
-        return solid_link(name, link_mesh(name, link, scene.folder), material, link_axes(link))
+        return solid_link(
+            name, link_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
+        )
     if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
     return _beam(scene, name)
+
+
+def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]:
+    """Where joints, bodies, loads, springs and probes sit on a link [m], and the faces of it that joints name."""
+    joints = [joint for joint in scene.joints.values() if name in joint.links]
+    ends = [end for spring in scene.springs.values() for end in getattr(spring, "between", None) or ()]
+    singles = (*scene.loads.values(), *scene.bodies.values(), *scene.output.probes.values(), *ends)
+    here = [getattr(each, "at", None) for each in singles if each.link == name]
+    places = [at for at in here if at is not None]
+    points = {tuple(float(x) for x in at) for at in [*(joint.at for joint in joints), *places]}
+    named = {face for joint in joints for face in joint.faces.get(name, ())}
+    return tuple(sorted(points)), tuple(sorted(named))  # type: ignore[arg-type]
 
 
 def parted(scene: Scene, name: str, link: Link) -> Segments:

@@ -28,6 +28,7 @@ from kedfem.scene import Material
 HUBS_STIFF = (
     3.0  # of E A L of an element: stiffer ones resist being turned against their segment, softer ones bend
 )
+SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
 Interval = tuple[float, float]
 
@@ -90,7 +91,7 @@ def segmented(
     e = along(link, ends)
     s = link.X[link.cells] @ e  # (e, m)
     places = _places(count, ends @ e if len(ends) > 1 else s, whole)
-    slice_of = np.searchsorted(places, s.mean(axis=1))
+    slice_of = _smoothed(link, np.searchsorted(places, s.mean(axis=1)), count)
     found = [np.flatnonzero(slice_of == k) for k in range(count)]
     parts = [_slice(link, material, elements) for elements in found if len(elements)]
     cuts = [_cut(a, b, k) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
@@ -124,6 +125,26 @@ def _places(count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval]) 
         inside = (places > low) & (places < high)
         places[inside] = np.where(places[inside] - low < high - places[inside], low, high)
     return places
+
+
+def _smoothed(link: Link, slice_of: Int[np.ndarray, " e"], count: int) -> Int[np.ndarray, " e"]:
+    """The slice of each tetrahedron, those that stick out of one taken into that of more of their neighbours.
+
+    Hexahedra are in layers, and stay where they are.
+    """
+    if link.cell_type != "tetra10":
+        return slice_of
+    left, right = link.basis.mesh.f2t[:, link.basis.mesh.f2t[1] >= 0]
+    for _ in range(SMOOTHINGS):
+        beside = np.zeros((len(slice_of), count), dtype=int)
+        np.add.at(beside, (left, slice_of[right]), 1)
+        np.add.at(beside, (right, slice_of[left]), 1)
+        own = np.take_along_axis(beside, slice_of[:, None], axis=1)[:, 0]
+        moved = np.where(beside.max(axis=1) > own, beside.argmax(axis=1), slice_of)
+        if (moved == slice_of).all():
+            break
+        slice_of = moved
+    return slice_of
 
 
 def _slice(

@@ -16,7 +16,7 @@ from kedfem.mesh.plate import PlateSizes, plate_quads
 from kedfem.mesh.quads import quad_mesh
 from kedfem.mesh.quality import checked_mesh
 from kedfem.mesh.tetrahedra import FORMS
-from kedfem.mesh.ways import cad_mesh, file_axes
+from kedfem.mesh.ways import NOTHING, KeptWhole, cad_mesh, file_axes
 from kedfem.scene import (
     Arc,
     Bar,
@@ -35,7 +35,7 @@ MOST_ELEMENTS = 2_000_000
 _EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wider than the waist
 
 
-def link_mesh(name: str, link: LinkScene, folder: Path) -> SolidMesh:
+def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> SolidMesh:
     """The hexahedral mesh of a solid link, in the scene's reference position.
 
     Parameters
@@ -46,6 +46,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> SolidMesh:
         A solid link of a validated scene.
     folder : Path
         The folder that the names of part and mesh files refer to.
+    kept_whole : points and names
+        Where joints, loads and probes sit, and the faces that they name: a part from CAD keeps its blends there.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path) -> SolidMesh:
             mesh = placed(read, np.array(shape.origin), file_axes(shape))
         case Cad() as shape:
             key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
-            mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder)
+            mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
         case _:
             mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
     return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
+from kedfem.mesh.blends import points_in_file, swept_without_blends
 from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.file import silent
@@ -36,17 +37,22 @@ PATIENCE = 3600  # seconds after which it is given up though it takes no process
 
 T = TypeVar("T")
 Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
+#: Places of the scene [m] and names of faces at which a part keeps its blends.
+KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
+NOTHING: KeptWhole = ((), ())
 
 SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh)
 #: What is tried in turn, by `mesh.kind` and element.
 WAYS: dict[str | None, tuple[Way, ...]] = {
-    None: (*SWEEPS, filled_mesh),
-    "hexahedra": (*SWEEPS, subdivided_mesh),
+    None: (*SWEEPS, swept_without_blends, filled_mesh),
+    "hexahedra": (*SWEEPS, swept_without_blends, subdivided_mesh),
     "tet10": (filled_mesh,),
 }
 
 
-def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path) -> SolidMesh:
+def cad_mesh(
+    keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path, kept_whole: KeptWhole = NOTHING
+) -> SolidMesh:
     """hex27 or tet10 mesh of a part from CAD, where the scene has it, its faces known; kept between runs.
 
     Parameters
@@ -54,6 +60,7 @@ def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path
     keys : for messages
     name : the link's name, that of its solid in an assembly
     folder : what the file's name is relative to
+    kept_whole : places and faces of the part where no blend is left out
 
     Raises
     ------
@@ -61,10 +68,14 @@ def cad_mesh(keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path
         The file cannot be used, or no way gives a mesh.
     """
     file = folder / shape.file
-    said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element]
+    said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole]
     key = sha256(json.dumps(said).encode() + contents([file])).hexdigest()
     mesh: SolidMesh = kept(
-        "mesh", key, lambda: apart(keys.file, _made, keys, name, link, shape, file), itself, itself
+        "mesh",
+        key,
+        lambda: apart(keys.file, made_mesh, keys, name, link, shape, file, kept_whole),
+        itself,
+        itself,
     )
     return mesh
 
@@ -119,34 +130,39 @@ def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
         resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
 
 
-def _made(keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path) -> SolidMesh:
+def made_mesh(
+    keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path, kept_whole: KeptWhole = NOTHING
+) -> SolidMesh:
+    """What `cad_mesh` keeps, made in this process."""
     with solid_model(keys, file, name, shape) as (gmsh, solid):
         if link.mesh.size is not None and link.mesh.size > solid.extent:
             raise MeshError(
                 f"{keys.file}: must be larger than its mesh.size {link.mesh.size:.6g} [m], got {solid.extent:.6g}"
             )
-        mesh = with_faces(gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link))
+        mesh = with_faces(
+            gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, _wanted(link, shape, kept_whole))
+        )
     return placed(mesh, np.array(shape.origin), file_axes(shape))
 
 
-def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> SolidMesh:
+def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
     """The mesh; where there is none, or flat tetrahedra, one with tiny edges and faces of the CAD model healed away."""
     best: SolidMesh | None = None
     try:
-        best = _sized(where, gmsh, solid, link)
+        best = _sized(where, gmsh, solid, link, asked)
         if not best.tetrahedra or mesh_quality(best).least > FLAT:
             return best
     except MeshError:
         if link.mesh.kind is not None:
             raise
-    for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, sizing(link.mesh))):
+    for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, asked)):
         try:
-            mesh = filled_mesh(gmsh, mended, sizing(link.mesh))
+            mesh = filled_mesh(gmsh, mended, asked)
         except OtherWayError:
             continue
         if mesh_quality(mesh).least > FLAT:
             return replace(mesh, way=f"{mesh.way}; {words}")
-    return best or _sized(where, gmsh, solid, link)  # raises again
+    return best or _sized(where, gmsh, solid, link, asked)  # raises again
 
 
 def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
@@ -157,12 +173,19 @@ def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
 
 def sizing(mesh: Meshing) -> Sizing:
     """What the keys of a link's mesh ask for."""
-    return Sizing(size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers)
+    return Sizing(size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers, ignore=mesh.ignore)
 
 
-def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene) -> SolidMesh:
+def _wanted(link: LinkScene, shape: Cad, kept_whole: KeptWhole) -> Sizing:
+    """What the keys of a link's mesh ask for, and where nothing may be left out."""
+    points, names = kept_whole
+    inside = points_in_file(points, np.array(shape.origin), file_axes(shape))
+    return replace(sizing(link.mesh), kept=inside, named=names)
+
+
+def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
     """The mesh of the size asked for, or of the number of unknowns: then the nearest of at most TRIES."""
-    asked, wanted, element = sizing(link.mesh), link.mesh.unknowns, str(link.element)
+    wanted, element = link.mesh.unknowns, str(link.element)
     ways, form = WAYS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
     if wanted is None:
         return best_mesh(where, gmsh, solid, asked, form, ways)

@@ -191,14 +191,14 @@ def _closest(
         within = gmsh.model.isInside(2, tag, at, parametric=True) > 0
         away = float(np.linalg.norm(np.array(on) - middle))
         if not within:
-            away += _beyond(gmsh, tag, middle)
+            away += beyond(gmsh, tag, middle)
         away += (1 - abs(np.array(gmsh.model.getNormal(tag, at)) @ normal)) * 1e-3 * solid.extent
         if away < least:
             best, least = int(i), away
     return best
 
 
-def _beyond(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
+def beyond(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
     """How far a place is from the edges of a face [m]."""
     edges = gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False)
     on = [gmsh.model.getClosestPoint(1, edge, place)[0] for _, edge in edges]

@@ -82,10 +82,7 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
     """
     found: list[Float[np.ndarray, "3"]] = []
     obstacles: list[tuple[float, str]] = []
-    normals = {face.tag: _face_normals(gmsh, face) for face in solid.faces}
-    flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
-    for direction in _directions([normals[face.tag][0] for face in flat], [face.area for face in flat]):
-        slanted = [face for face in solid.faces if not _fits(normals[face.tag], direction)]
+    for direction, slanted in _slanted(gmsh, solid):
         if not slanted:
             found.append(direction)
         else:
@@ -96,6 +93,23 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
         obstacle = min(obstacles)[1] if obstacles else "it has no plane face"
         raise OtherWayError(f"{solid.name}: no layers along one direction, as {obstacle}")
     return tuple(found)
+
+
+def slanted_faces(gmsh: ModuleType, solid: Solid) -> list[list[CadFace]]:
+    """Of each direction with plane faces across it what is neither along nor across it, the least area first."""
+    every = [slanted for _, slanted in _slanted(gmsh, solid) if slanted]
+    return sorted(every, key=lambda faces: sum(face.area for face in faces))
+
+
+def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"], list[CadFace]]]:
+    """The directions with plane faces across them, the largest area first, and the faces in the way of each."""
+    normals = {face.tag: _face_normals(gmsh, face) for face in solid.faces}
+    flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
+    directions = _directions([normals[face.tag][0] for face in flat], [face.area for face in flat])
+    return [
+        (direction, [face for face in solid.faces if not _fits(normals[face.tag], direction)])
+        for direction in directions
+    ]
 
 
 def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
