@@ -58,10 +58,9 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
     change = 100 * (bare.volume / solid.volume - 1)
     if sizing.ignore is None and change > MOST:
         raise OtherWayError(f"{solid.name}: its small blends are {change:.2g} % of the volume")
+    count = "1 blend" if len(faces) == 1 else f"{len(faces)} blends"
     names = ", ".join(face.name for face in faces[:6]) + (", …" if len(faces) > 6 else "")
-    words = (
-        f"left out: {len(faces)} blends below {1e3 * small:.3g} mm ({names}), {change:+.2g} % of the volume"
-    )
+    words = f"left out: {count} below {1e3 * small:.3g} mm ({names}), {change:+.2g} % of the volume"
     return SolidMesh(mesh.points, mesh.cells, mesh.faces, f"{mesh.way}; {words}")
 
 
