@@ -3,12 +3,15 @@
 import re
 import stat
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from kedfem.accuracy.plan import planned
+from kedfem.analysis import Run
 from kedfem.mesh.session import SYSTEM_PACKAGES
+from kedfem.results import Peak, Results
 from kedfem.scene import read_scene, scene_from
 
 ROOT = Path(__file__).parents[1]
@@ -51,6 +54,27 @@ def test_the_scene_and_the_python_of_the_readme_run(
     }
     whole = scene.replace(scene[scene.index("[analysis]") : scene.index("[output.probes")], accurate)
     assert planned(scene_from(tomllib.loads(whole))).error < 0.02
+
+
+def test_the_page_on_python_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    known: dict[str, object] = {}
+    exec(compile(code, "docs/python.md", "exec"), known)
+    said = capsys.readouterr().out
+    assert re.search(r"\d+\.\d MPa in arm at \(.*\) m, t = 0\.\d+ s, drive ", said)
+    assert "complete drive_angle rad" in said
+    assert "steps" in known["stages"]  # type: ignore[operator]
+    for record, cells in (
+        (Run, r"^\| `Run`.*?\n\n"),
+        (Results, r"^\| `Results`.*?\n\n"),
+        (Peak, r"^`Peak`: .*"),
+    ):
+        (text,) = re.findall(cells, page, re.DOTALL | re.MULTILINE)
+        assert all(f"`{field.name}`" in text for field in fields(record))
 
 
 def test_every_command_of_the_readme_is_there() -> None:

@@ -42,7 +42,7 @@ from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
 from kedfem.results.undetermined import undetermined, undetermined_warning
-from kedfem.results.writer import add_peaks
+from kedfem.results.writer import add_peaks, drive_channel
 from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
@@ -289,7 +289,7 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
     notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
     notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
     with ResultsWriter(
-        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
     ) as writer:
         table = _Table(writer, channels, folder)
         if not wanted:

@@ -26,6 +26,7 @@ from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.rigid import RigidForces, rigid_forces
+from kedfem.results.writer import drive_channel
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
 
 
@@ -134,7 +135,7 @@ def _stepped(
     seen = sights(scene, linked, links)
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(
-        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
     ) as writer:
         if not wanted:
             remove_animation(folder, STEM)

@@ -282,7 +282,7 @@ def test_a_sketch_of_joints_alone_is_enough(run_kedfem: Command, tmp_path: Path)
     assert (results.status, len(results.time)) == ("complete", 181)
     with (folder / "results.csv").open(encoding="utf-8") as file:
         heading, *rows = csv.reader(file)
-    assert heading[:2] == ["time [s]", "angle [rad]"]
+    assert heading[:2] == ["time [s]", "drive angle [rad]"]
     assert len(rows) == 181
     assert not list(folder.glob("plots"))
     frames = sorted(folder.glob("animation_*.vtu"))

@@ -25,6 +25,8 @@ from kedfem.results import (
     replacing,
     write_csv,
 )
+from kedfem.results.writer import drive_channel
+from kedfem.scene import scene_from
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -98,7 +100,7 @@ def test_units_stand_inside_the_file(tmp_path: Path) -> None:
         stress = file[STRESS.name].attrs
         assert (stress["unit"], stress["frame"], stress["description"]) == ("Pa", "link", STRESS.description)
         assert tuple(stress["columns"]) == STRESS.columns
-        assert (file["time"].attrs["unit"], file["angle"].attrs["unit"]) == ("s", "rad")
+        assert (file["time"].attrs["unit"], file["drive_angle"].attrs["unit"]) == ("s", "rad")
 
 
 def test_notes_can_be_added_at_the_end(tmp_path: Path) -> None:
@@ -173,7 +175,9 @@ def test_a_block_that_was_cut_short_leaves_no_rows(tmp_path: Path) -> None:
     with pytest.raises((TypeError, ValueError)):
         cut_short()
     with h5py.File(path, "r") as file:
-        assert {len(file[name]) for name in (STRESS.name, FORCE.name, TORQUE.name, "time", "angle")} == {4}
+        assert {
+            len(file[name]) for name in (STRESS.name, FORCE.name, TORQUE.name, "time", "drive_angle")
+        } == {4}
 
 
 def test_a_run_that_fails_before_its_first_rows_leaves_the_old_results(tmp_path: Path) -> None:
@@ -347,7 +351,7 @@ def newer(path: Path) -> None:
 def gap(path: Path) -> None:
     write(path, 1)
     with h5py.File(path, "r+") as file:
-        del file["angle"]
+        del file["drive_angle"]
 
 
 @pytest.mark.parametrize(
@@ -420,7 +424,7 @@ def test_a_table_reads_back_equal(tmp_path: Path) -> None:
     write_csv(read, tmp_path / "results.csv")
     with (tmp_path / "results.csv").open(newline="", encoding="utf-8") as file:
         header, *lines = csv.reader(file)
-    assert header[:3] == ["time [s]", "angle [rad]", "probes/rocker_mid/stress xx [Pa]"]
+    assert header[:3] == ["time [s]", "drive angle [rad]", "probes/rocker_mid/stress xx [Pa]"]
     assert header[-2:] == ["joints/B/force z [N]", "drive/torque torque [N m]"]
     blocks = [read.time[:, None], read.angle[:, None], *(values for _, values in read.channels.values())]
     np.testing.assert_array_equal(np.array(lines, float), np.hstack(blocks))
@@ -432,3 +436,25 @@ def test_a_table_of_part_of_a_run_says_so(tmp_path: Path) -> None:
     write_csv(part, tmp_path / "results.csv")
     text = (tmp_path / "results.csv").read_text(encoding="utf-8")
     assert text.startswith("# not a whole run: interrupted after 7 steps\ntime [s],")
+
+
+def test_a_drive_that_slides_is_told_in_metres(tmp_path: Path) -> None:
+    """In the file, in what is read, in the table's header; several drives are named."""
+    shape = {"kind": "bar", "between": [[0, 0], [0.2, 0]], "width": 0.02, "thickness": 0.02}
+    raw = {
+        "links": {"ram": {"material": "steel", "shape": shape, "mesh": {"elements": [4, 1, 1]}}},
+        "joints": {"S": {"kind": "prismatic", "links": ["ground", "ram"], "at": [0, 0], "axis": "x"}},
+        "drive": {"joint": "S", "motion": {"kind": "cycloidal", "travel": 0.1, "rise": 0.05}},
+        "analysis": {"end_time": 0.05, "step": 0.005},
+    }
+    drive = drive_channel(scene_from(raw))
+    with ResultsWriter(tmp_path / "results.h5", [], "{}", None, {}, drive) as file:
+        file.append(np.array([0.0, 0.05]), np.array([0.0, 0.1]), {})
+    with h5py.File(tmp_path / "results.h5") as file:
+        assert file["drive_travel"].attrs["unit"] == "m"
+        assert "angle" not in " ".join(file)
+    found = read_results(tmp_path / "results.h5")
+    assert (found.drive.name, found.drive.unit) == ("drive_travel", "m")
+    assert_array_equal(found.angle, [0.0, 0.1])
+    write_csv(found, tmp_path / "results.csv")
+    assert (tmp_path / "results.csv").read_text().splitlines()[0] == "time [s],drive travel [m]"

@@ -48,7 +48,7 @@ def link_fields(
         displacement = recovery.at_points(in_space(shown, nodal_state(link, state.u)))
         stress = nodal_stress(recovery, nodal_state(link, state.g))
         if link.rigid:
-            stress = np.zeros_like(stress)
+            stress = np.full_like(stress, np.nan)
         drawn = recovery.at_points(shown.X)
         points = motion.p[k, body] + drawn @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
@@ -59,7 +59,7 @@ def link_fields(
     for carried, recovery in zip(model.carried, recoveries[len(model.links) :], strict=True):
         X = recovery.at_points((carried.link.full or carried.link).X)
         points = motion.p[k, carried.body] + X @ motion.R[k, carried.body].T
-        none = np.zeros((len(X), 6))
+        none = np.full((len(X), 6), np.nan)
         name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
         fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0]))
     return _joined(fields)

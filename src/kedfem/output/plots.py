@@ -72,7 +72,7 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
 def drawn_over(results: Results) -> Abscissa:
     """The drive angle or time; time alone where channels tell of a drive that slides, or of several."""
     of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
-    if any(len(parts) > 1 or parts[0] in {"force", "rigid_force"} for parts in of_drives):
+    if results.drive.unit == "m" or any(len(parts) > 1 for parts in of_drives):
         return Abscissa(results.time, over_time=True)
     return abscissa(results.time, results.angle)
 

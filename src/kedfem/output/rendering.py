@@ -80,7 +80,40 @@ def render(vtu: str, png: str, title: str) -> None:
     draw_links(plotter, grid)
     draw_words(plotter, title)
     aim(plotter, grid, shown)
+    mark(plotter, grid)
     plotter.screenshot(png)
+
+
+def mark(plotter: Any, grid: Any) -> None:
+    """A ring and a name at the highest stress, in front of all links so that nothing hides it."""
+    stress = grid.point_data["MPa"]
+    if not np.nanmax(stress, initial=0.0) > 0:
+        return
+    import pyvista
+    from vtkmodules.vtkRenderingCore import vtkCoordinate
+
+    place = vtkCoordinate()
+    place.SetCoordinateSystemToWorld()
+    place.SetValue(*grid.points[int(np.nanargmax(stress))])
+    plotter.render()
+    x, y = place.GetComputedDisplayValue(plotter.renderer)
+    angle = np.linspace(0, 2 * np.pi, 49)
+    for radius, width, colour in ((13, 6, "white"), (13, 3, "black")):
+        ring = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle), 0 * angle])
+        plotter.add_actor(_flat(pyvista.MultipleLines(ring), width, colour), reset_camera=False)
+
+
+def _flat(lines: Any, width: float, colour: str) -> Any:
+    """Lines in pixels of the picture."""
+    from vtkmodules.vtkCommonColor import vtkNamedColors
+    from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
+
+    mapper, actor = vtkPolyDataMapper2D(), vtkActor2D()
+    mapper.SetInputData(lines)
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetLineWidth(width)
+    actor.GetProperty().SetColor(vtkNamedColors().GetColor3d(colour))
+    return actor
 
 
 def view(grid: Any) -> View:
@@ -136,6 +169,7 @@ def draw_links(plotter: Any, grid: Any) -> None:
         "clim": (0.0, float(np.max(stress, where=np.isfinite(stress), initial=0.0)) or 1.0),
         "smooth_shading": True,
         "show_scalar_bar": False,
+        "nan_color": "lightgrey",
         "ambient": 0.55,
         "diffuse": 0.5,
     }

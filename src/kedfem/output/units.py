@@ -4,7 +4,7 @@ import math
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
-PLAIN = frozenset({"", "-", "1", "rad", "deg", "kg", "%"})
+PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})
 """Units that take no prefix."""
 
 

@@ -1,5 +1,6 @@
 """Reading a results file."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,8 +8,8 @@ import numpy as np
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.records import Channel, Peak, Results
-from kedfem.results.writer import ANGLE, FORMAT, PEAKS, TIME
+from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results
+from kedfem.results.writer import FORMAT, PEAKS
 
 WANTED = "a results file of kedfem"
 
@@ -70,9 +71,11 @@ def _results(file: Any) -> Results:
     n = min(len(rows) for rows in series)
     named = {rows.name.removeprefix("/"): rows for rows in series}
     toml = file["scene"].get("toml")
+    position = TRAVEL if TRAVEL.name in named else ANGLE
+    drive = named.pop(position.name)
     return Results(
         time=_frozen(named.pop(TIME.name)[:n]),
-        angle=_frozen(named.pop(ANGLE.name)[:n]),
+        angle=_frozen(drive[:n]),
         channels={name: (_channel(name, rows), _frozen(rows[:n])) for name, rows in named.items()},
         status=file.attrs["status"],
         scene_json=file["scene/json"].asstr()[()],
@@ -80,6 +83,7 @@ def _results(file: Any) -> Results:
         notes={key: _plain(value) for key, value in file["notes"].attrs.items()},
         reason=file.attrs["reason"],
         version=file.attrs["kedfem_version"],
+        drive=replace(position, description=drive.attrs["description"]),
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
     )
 

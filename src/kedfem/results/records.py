@@ -35,6 +35,11 @@ class Channel:
     description: str
 
 
+TIME = Channel("time", (), "s", "", "time")
+ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the drawn position")
+TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the drawn position")
+
+
 @dataclass(frozen=True, slots=True)
 class Peak:
     """The highest von Mises stress of a link over all steps.
@@ -75,8 +80,8 @@ class Results:
     ----------
     time : (n,) [s]
         Moments of the rows, read-only.
-    angle : (n,) [rad]
-        Drive angle from the drawn position, read-only.
+    angle : (n,) [rad], or [m] where the drive slides
+        Drive angle or travel from the drawn position, as `drive` says, read-only.
     channels
         Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
     status
@@ -91,6 +96,8 @@ class Results:
         The kedfem that wrote the file.
     peaks
         Link → its highest stress over all steps; of a whole elastic run, of links that have stress.
+    drive
+        Name and unit of `angle`; of several drives it is the first one's.
     """
 
     time: Float[np.ndarray, " n"]
@@ -103,3 +110,4 @@ class Results:
     reason: str = ""
     version: str = ""
     peaks: Mapping[str, Peak] = field(default_factory=dict)
+    drive: Channel = ANGLE

@@ -28,7 +28,7 @@ def write_csv(results: Results, path: Path) -> None:
     OutputError
         The file cannot be written.
     """
-    header = ["time [s]", "angle [rad]"]
+    header = ["time [s]", f"{results.drive.name.replace('_', ' ')} [{results.drive.unit}]"]
     blocks = [results.time[:, None], results.angle[:, None]]
     for channel, values in results.channels.values():
         header += [f"{channel.name} {column} [{channel.unit}]" for column in channel.columns]

@@ -1,6 +1,7 @@
 """Writing a results file while the analysis runs."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
@@ -11,7 +12,8 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
-from kedfem.results.records import Channel, Peak
+from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
+from kedfem.scene import Scene
 
 FORMAT = 1
 """Version of the file's layout."""
@@ -23,8 +25,19 @@ SPARE_SPACE = 1_000_000
 """Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
 
 PEAKS = "peaks"
-TIME = Channel("time", (), "s", "", "time")
-ANGLE = Channel("angle", (), "rad", "", "drive angle from the drawn position")
+
+
+def drive_channel(scene: Scene) -> Channel:
+    """What the position of a scene's drive is called; of several drives that of the first."""
+    names = list(scene.driven_joints)
+    if not names:
+        return ANGLE
+    channel = TRAVEL if scene.joints[names[0]].kind == "prismatic" else ANGLE
+    if len(names) == 1:
+        return channel
+    return replace(
+        channel, description=f"{channel.description}, of {names[0]}, the first of {len(names)} drives"
+    )
 
 
 def installed_version() -> str:
@@ -51,6 +64,8 @@ class ResultsWriter:
         The scene, stored in the file.
     notes
         Facts about the run, stored as attributes.
+    drive
+        Name and unit of the drive's position.
 
     Raises
     ------
@@ -78,7 +93,9 @@ class ResultsWriter:
         scene_json: str,
         scene_toml: str | None,
         notes: Mapping[str, str | float],
+        drive: Channel = ANGLE,
     ) -> None:
+        self.drive = drive
         self.path = Path(path)
         self.channels = tuple(channels)
         self.rows = 0
@@ -111,7 +128,7 @@ class ResultsWriter:
         Parameters
         ----------
         time : (b,) [s]
-        angle : (b,) [rad]
+        angle : (b,) [rad], or [m] where the drive slides
         values
             Channel name → (b, columns), for every channel, in its unit.
 
@@ -125,7 +142,7 @@ class ResultsWriter:
         self._check(len(time), values)
         try:
             require_space(self.path.parent, self._block_space(len(time)))
-            for name, block in (*values.items(), (ANGLE.name, angle), (TIME.name, time)):
+            for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
                 rows = self._file[name]
                 rows.resize(self.rows + len(time), axis=0)
                 rows[self.rows :] = block
@@ -186,7 +203,7 @@ class ResultsWriter:
         for key, text in self._scene.items():
             scene[key] = text
         self._file.create_group("notes").attrs.update(self._notes)
-        for index, channel in enumerate((TIME, ANGLE, *self.channels)):
+        for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if channel.columns else ()
             rows = self._file.create_dataset(
                 channel.name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width)
@@ -219,7 +236,7 @@ class ResultsWriter:
         """Close the file, all channels cut to the rows that were written whole."""
         if not self._file:  # stopped while it was being put in place
             self._open(self.path, "r+")
-        for channel in (TIME, ANGLE, *self.channels):
+        for channel in (TIME, self.drive, *self.channels):
             self._file[channel.name].resize(self.rows, axis=0)
         self._file.attrs.update(reason=why, status=status)
         if self._published:
