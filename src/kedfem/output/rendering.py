@@ -84,6 +84,20 @@ def render(vtu: str, png: str, title: str) -> None:
     plotter.screenshot(png)
 
 
+def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
+    """Whether something is in front of the highest stress."""
+    stress = grid.point_data["von_mises"]
+    if not np.isfinite(stress).any():
+        return False
+    solids = grid.extract_cells(~np.isin(grid.celltypes, list(LINES)))
+    if not solids.n_cells:
+        return False
+    place = grid.points[int(np.nanargmax(stress))]
+    surface = solids.extract_surface(nonlinear_subdivision=1, algorithm=None).triangulate()
+    ends = place + LIFT * grid.length * direction, place + 2 * grid.length * direction
+    return len(surface.ray_trace(*ends)[0]) > 0
+
+
 def mark(plotter: Any, grid: Any) -> None:
     """A ring and a name at the highest stress, in front of all links so that nothing hides it."""
     stress = grid.point_data["MPa"]
@@ -117,8 +131,11 @@ def _flat(lines: Any, width: float, colour: str) -> Any:
 
 
 def view(grid: Any) -> View:
-    """The view of a linkage, all of it in the picture."""
+    """The view of a linkage, all of it in the picture; from behind where only so the highest stress is seen."""
     direction, upwards = sight(np.ptp(grid.points, axis=0))
+    behind = direction * np.where(np.abs(direction) == np.abs(direction).max(), -1.0, 1.0)
+    if hidden(grid, direction) and not hidden(grid, behind):
+        direction = behind
     across = np.cross(upwards, direction)
     across /= np.linalg.norm(across)
     up = np.cross(direction, across)
