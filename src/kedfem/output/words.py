@@ -12,11 +12,17 @@ UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"
 
 
 def with_prefix(value: float, unit: str) -> str:
-    """A number with an SI prefix: 1.23e7, Pa → 12.3 MPa.
+    """A number with an SI prefix: 1.23e7, Pa → 12.3 MPa. Angles are in degrees; kilograms and radians take no prefix.
 
-    >>> with_prefix(1.234e7, "Pa")
-    '12.34 MPa'
+    >>> with_prefix(1.234e7, "Pa"), with_prefix(60.0, "rad"), with_prefix(1600.0, "kg"), with_prefix(float("nan"), "m")
+    ('12.34 MPa', '3438°', '1600 kg', '–')
     """
+    if not np.isfinite(value):
+        return "–"
+    if unit == "rad":
+        return f"{np.degrees(value):.4g}°"
+    if unit.startswith(("kg", "rad")):
+        return f"{value:.4g} {unit}"
     size = abs(value)
     factor, prefix = next(((f, p) for f, p in UNITS if size >= f), (1.0, ""))
     return f"{value / factor:.4g} {prefix}{unit}"
