@@ -77,7 +77,9 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
         # of the functions of a beam in space some are slopes, whose values turn with their own directions
         assert_allclose(state(again, k, "g") @ R, state(blocks, k, "g"), atol=digits * size)
     here, there = whole(*one), whole(*other)
-    loads = [name for name in here if name.split("/")[0] in {"joints", "drive", "gears"}]
+    # what statics tells of rigid links depends on which axes of the world their redundant directions lie along
+    elastic = [name for name in here if "/rigid_" not in name]
+    loads = [name for name in elastic if name.split("/")[0] in {"joints", "drive", "gears"}]
     assert len(loads) >= 2 * len(ready.scene.joints) - 1  # a slider's guide: statics may not tell its force
     for what in ("force", "moment", "torque"):
         these = [name for name in loads if name.endswith(what)]
