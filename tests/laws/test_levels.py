@@ -151,18 +151,16 @@ def test_literal_steps_combine_to_the_same(kind: str) -> None:
 
 
 def test_time_points_are_those_of_one_level_whatever_is_kept_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Portions of 7 steps, one core or two: the same states, bit by bit; no block is longer than that."""
+    """Portions of 7 steps: the same states; no block is longer than that."""
     whole = blocks("following", 60, 3)
     assert_allclose(np.concatenate([x.motion.t for x in whole]), np.linspace(0, END, 61), rtol=0, atol=1e-15)
     monkeypatch.setattr(in_time, "block_length", lambda model: 28)
-    for count in (1, 2):
-        monkeypatch.setattr(in_time, "cores", lambda count=count: count)
-        parts = blocks("following", 60, 3)
-        assert max(len(x) for x in parts) == 7
-        assert [x.step for x in parts][:3] == [0, 1, 8]
-        for name in LINEAR:
-            for x, y in zip(over_time(parts, name), over_time(whole, name), strict=True):
-                assert_allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max(initial=1e-300))
+    parts = blocks("following", 60, 3)
+    assert max(len(x) for x in parts) == 7
+    assert [x.step for x in parts][:3] == [0, 1, 8]
+    for name in LINEAR:
+        for x, y in zip(over_time(parts, name), over_time(whole, name), strict=True):
+            assert_allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max(initial=1e-300))
 
 
 @pytest.mark.parametrize("kind", ["nominal", "following"])

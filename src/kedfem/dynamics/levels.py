@@ -17,8 +17,6 @@ so that accelerations and joint forces of the combined state are in balance as t
 
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -129,46 +127,19 @@ def leveled(
     combination = _Combination(model, level_weights(len(solvers), scene.analysis.rho_inf))
     length = max(1, block_length(model) // 2 ** (len(solvers) - 1))
     steps = time_grid(scene).steps
-    with _pool(min(cores(), len(solvers))) as pool:
-        done = 0
-        while done <= steps:
-            count = 1 if done == 0 else min(length, steps + 1 - done)
-            wanted = [count if done == 0 else count * 2**k for k in range(len(streams))]
-            taken = _taken(pool, streams, wanted)
-            if done == 0:
-                strides, here = [1] * len(taken), 1
-            else:
-                strides = [2**k for k in range(len(taken))]
-                here = min(0 if x is None else len(x) // s for x, s in zip(taken, strides, strict=True))
-            if here:
-                blocks = [x.part(0, here * s) for x, s in zip(taken, strides, strict=True) if x is not None]
-                yield from combination.blocks(done, blocks, strides, between)
-            for stream in streams:
-                if stream.failed is not None and here < count:
-                    raise stream.failed
-            done += count
-
-
-def _taken(pool: Executor | None, streams: Sequence["_Stream"], wanted: Sequence[int]) -> list[Block | None]:
-    """The next time points of all levels; finest first, as they take longest."""
-    if pool is None:
-        return [stream.taken(count) for stream, count in zip(streams, wanted, strict=True)]
-    every = [
-        pool.submit(stream.taken, count) for stream, count in zip(streams[::-1], wanted[::-1], strict=True)
-    ]
-    return [each.result() for each in every[::-1]]
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _pool(count: int) -> Any:
-    """Threads, where there is more than one core: the levels' loops are compiled ones."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    return nullcontext() if count < 2 else ThreadPoolExecutor(count)
+    done = 0
+    while done <= steps:
+        count = 1 if done == 0 else min(length, steps + 1 - done)
+        strides = [2**k if done else 1 for k in range(len(streams))]
+        taken = [stream.taken(count * stride) for stream, stride in zip(streams, strides, strict=True)]
+        here = min(0 if x is None else len(x) // stride for x, stride in zip(taken, strides, strict=True))
+        if here:
+            blocks = [x.part(0, here * s) for x, s in zip(taken, strides, strict=True) if x is not None]
+            yield from combination.blocks(done, blocks, strides, between)
+        for stream in streams:
+            if stream.failed is not None and here < count:
+                raise stream.failed
+        done += count
 
 
 @dataclass
