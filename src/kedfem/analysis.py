@@ -295,11 +295,14 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
         if not wanted:
             remove_animation(folder, STEM)
         try:
-            for block in leveled(scene, ready.linkage, ready.path, model, solvers):
+            for block in leveled(scene, ready.linkage, ready.path, model, solvers, fine=True):
+                if block.fine or not block.levels:
+                    envelope.add(block)
+                if block.fine:
+                    continue
                 values = rows(watched.recorded, block)
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
-                envelope.add(block)
                 watched.locking.add(block)
                 seen.add(block)
                 errors.add(block, values)

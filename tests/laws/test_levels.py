@@ -68,15 +68,13 @@ def marched(kind: str, steps: int, levels: int) -> tuple[Channels, StepWatch]:
     return {name: np.concatenate([x[name] for x in found]) for name in found[0]}, watch
 
 
-def blocks(
-    kind: str, steps: int, levels: int, between: bool = False, solver: str = "condensed"
-) -> list[Block]:
+def blocks(kind: str, steps: int, levels: int, fine: bool = False, solver: str = "condensed") -> list[Block]:
     """All blocks of a linkage."""
     ready = ready_linkage(kind)
     keys = {"step": END / steps, "levels": levels, "solver": solver}
     scene = ready.scene.model_copy(update={"analysis": ready.scene.analysis.model_copy(update=keys)})
     solvers = level_steps(scene, ready.model)
-    return list(leveled(scene, ready.linkage, ready.path, ready.model, solvers, between))
+    return list(leveled(scene, ready.linkage, ready.path, ready.model, solvers, fine))
 
 
 def over_time(found: list[Block], name: str) -> list[np.ndarray]:
@@ -166,13 +164,20 @@ def test_time_points_are_those_of_one_level_whatever_is_kept_at_once(monkeypatch
 @pytest.mark.parametrize("kind", ["nominal", "following"])
 def test_between_time_points_the_finest_level_is_corrected(kind: str) -> None:
     """Between common times of 60 steps in two levels: far nearer to the truth than the finest level's own states."""
-    found = [x for x in blocks(kind, 120, 2, between=True) if x.between]
+    found = [x for x in blocks(kind, 120, 2, fine=True) if x.fine]
     t = np.concatenate([x.motion.t for x in found])
-    assert_allclose(t, END * (np.arange(120) + 0.5) / 120, rtol=1e-12)
+    assert_allclose(t, END * np.arange(241) / 240, rtol=1e-12)
+    assert [x.step for x in found][:2] == [0, 1]
+    common = over_time([x for x in blocks(kind, 120, 2, fine=True) if not x.fine], "g")
+    for x, y in zip(over_time(found, "g"), common, strict=True):
+        assert_allclose(x[::2], y, rtol=0, atol=1e-13 * np.abs(y).max())
     true, own = (over_time(blocks(kind, *march), "u") for march in ((480, 2), (240, 1)))
     for x, exact, alone in zip(over_time(found, "u"), true, own, strict=True):
         size = np.abs(exact).max()
-        error, before = np.abs(x - exact[2::4]).max() / size, np.abs(alone[1::2] - exact[2::4]).max() / size
+        error, before = (
+            np.abs(x[1::2] - exact[2::4]).max() / size,
+            np.abs(alone[1::2] - exact[2::4]).max() / size,
+        )
         assert error < 0.2 * before
         assert error < 1e-3
 

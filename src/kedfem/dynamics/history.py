@@ -115,15 +115,14 @@ class Block:
     motion : rigid motion at them
     links : per link
     levels : the same time points as each level of `dynamics.levels` has them, coarsest first; none of a single march
-    between : whether these are not time points of the analysis, but such as only the finest level has, since the one
-        before `step`
+    fine : whether these are not the time points of the analysis, but all those of the finest level, numbered in its steps
     """
 
     step: int
     motion: RigidMotion
     links: Sequence[LinkHistory]
     levels: tuple["Block", ...] = ()
-    between: bool = False
+    fine: bool = False
 
     def __len__(self) -> int:
         return len(self.motion.t)
@@ -134,7 +133,7 @@ class Block:
             return self
         links = [each.part(first, end) for each in self.links]
         levels = tuple(each.part(first, end) for each in self.levels)
-        return Block(self.step + first, self.motion.part(first, end), links, levels, self.between)
+        return Block(self.step + first, self.motion.part(first, end), links, levels, self.fine)
 
     def every(self, stride: int) -> "Block":
         """Some of its time points, the first and each so many further on; without products."""

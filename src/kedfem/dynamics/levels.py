@@ -99,15 +99,16 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
 
 
 def leveled(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solvers: Sequence[Steps], between: bool = False
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solvers: Sequence[Steps], fine: bool = False
 ) -> Iterator[Block]:
     """All time points of the analysis, combined of all levels, block after block; see `transient`.
 
     Parameters
     ----------
     solvers : of `level_steps`; with one of them this is `transient`
-    between : whether to hand on too, before each block, what the finest level has between its time points,
-        corrected by the interpolated correction of the common ones; flagged as `between`
+    fine : whether to hand on too, before each block, all time points of the finest level since the block before,
+        numbered in its steps and flagged as `fine`: combined states at common times, and between them its own, corrected
+        by the interpolated corrections there. For what follows peaks; rows belong to the analysis's own time points
 
     Raises
     ------
@@ -135,7 +136,7 @@ def leveled(
         here = min(0 if x is None else len(x) // stride for x, stride in zip(taken, strides, strict=True))
         if here:
             blocks = [x.part(0, here * s) for x, s in zip(taken, strides, strict=True) if x is not None]
-            yield from combination.blocks(done, blocks, strides, between)
+            yield from combination.blocks(done, blocks, strides, fine)
         for stream in streams:
             if stream.failed is not None and here < count:
                 raise stream.failed
@@ -222,16 +223,16 @@ Fields = dict[str, Any]
 
 @dataclass
 class _Combination:
-    """States of all levels, at the same times, as one; and the finest level's, corrected, between them."""
+    """States of all levels, at the same times, as one; and the finest level's, corrected."""
 
     model: Model
     weights: Float[np.ndarray, " l"]
     _corrections: list[Fields] = field(default_factory=list)
 
     def blocks(
-        self, first: int, taken: Sequence[Block], strides: Sequence[int], between: bool
+        self, first: int, taken: Sequence[Block], strides: Sequence[int], fine: bool
     ) -> Iterator[Block]:
-        """Of a span of time: what lies between its time points, if that is wanted; then its time points."""
+        """Of a span of time: all time points of the finest level, if these are wanted; then those of all levels."""
         levels = tuple(
             replace(block.chosen(slice(stride - 1, None, stride)), step=first)
             for block, stride in zip(taken, strides, strict=True)
@@ -245,27 +246,25 @@ class _Combination:
             }
             for k in every
         ]
-        if between:
+        if fine:
             now = [{n: x[n] - y[n] for n in LINEAR} for x, y in zip(combined, seen[-1], strict=True)]
-            if strides[-1] > 1:
-                yield self._between(first, taken[-1], strides[-1], now)
+            yield self._fine(taken[-1], strides[-1], now)
             self._corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
         yield Block(first, motion, [self._history(k, x, motion) for k, x in enumerate(combined)], levels)
 
-    def _between(self, first: int, finest: Block, stride: int, now: Sequence[Fields]) -> Block:
-        """What the finest level has between common times; its correction is linear in time there."""
-        number = np.arange(len(finest))
-        which = number[(number + 1) % stride != 0]
-        point, share = np.divmod(which + 1, stride)
-        part, links = finest.chosen(which), []
-        for k, (before, after) in enumerate(zip(self._corrections, now, strict=True)):
-            own = _fields(self.model, k, part)
+    def _fine(self, finest: Block, stride: int, now: Sequence[Fields]) -> Block:
+        """The finest level's time points; corrections are linear in time between common ones."""
+        before = self._corrections or [{name: x[:1] for name, x in each.items()} for each in now]
+        point, share = np.divmod(1 + np.arange(len(finest)), stride)
+        after, links = np.minimum(point + 1, len(finest) // stride), []
+        for k, (then, later) in enumerate(zip(before, now, strict=True)):
+            own = _fields(self.model, k, finest)
             for name in LINEAR:
-                x = np.concatenate([before[name], after[name]])
+                x = np.concatenate([then[name], later[name]])
                 s = (share / stride).reshape(-1, *[1] * (x.ndim - 1))
-                own[name] = own[name] + (1 - s) * x[point] + s * x[point + 1]
-            links.append(self._history(k, own, part.motion))
-        return Block(first, part.motion, links, between=True)
+                own[name] = own[name] + (1 - s) * x[point] + s * x[after]
+            links.append(self._history(k, own, finest.motion))
+        return Block(finest.step, finest.motion, links, fine=True)
 
     def _history(self, k: int, x: Fields, motion: RigidMotion) -> LinkHistory:
         """A link's combined state: its frame where its positions now are, energy of its deformation now."""

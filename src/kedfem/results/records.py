@@ -54,7 +54,7 @@ class Peak:
     node
         Number of the point in the link, in the order of ``envelope.vtu``.
     step, time, angle
-        Number of the step, [s], and the drive's angle [rad] or travel [m].
+        Number of the step, of the finest of several levels in time, [s], and the drive's angle [rad] or travel [m].
     near
         What is near, in words, where stress is not what it seems: a sharp corner, a point force, a joint; else empty.
     away
