@@ -36,8 +36,10 @@ def _imported(kernel: Path, root: Path) -> set[Path]:
 if not os.environ.get("NUMBA_CACHE_DIR"):
     vars(numba.config)["CACHE_DIR"] = str(kernel_folder(ROOT))
 
-compiled: Any = numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}
-)
-compiled_in_order: Any = numba.njit(cache=True, nogil=True, error_model="numpy")
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
+compiled: Any = numba.njit(**_FAST)
+inner: Any = numba.njit(**_FAST, no_cpython_wrapper=True)
+"""Called by compiled loops only: compiled in less time."""
+compiled_in_order: Any = numba.njit(**_OPTIONS)
 """Sums as written, where their order matters."""

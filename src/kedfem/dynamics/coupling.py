@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.dynamics.places import part_seat, slider_axis
 from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import Own, Ways, gear_joint, row_joint
+from kedfem.dynamics.row_ports import Own, Ways, element_joint, gear_joint, row_joint
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, port_weights
@@ -115,12 +115,15 @@ class Joined:
     rows: tuple[RowJoint, ...]
 
 
-def joined(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways) -> Joined:
+def joined(
+    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways, elements: bool = False
+) -> Joined:
     """All joints of a scene, and cuts between segments, as attachments of its elastic links.
 
     Parameters
     ----------
     links : elastic links, or their segments, by a key of each
+    elements : whether springs and motors get interface points, as joints without rows
 
     Raises
     ------
@@ -134,7 +137,13 @@ def joined(scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways
     rows: list[tuple[RowJoint, list[Own | None]]] = []
     columns: list[list[int]] = []  # of each side's own unknowns
     held_by_rows = [row_joint(scene, name, links, ways) for name in scene.joints if needs_rows(scene, name)]
-    for row, own in [*held_by_rows, *(gear_joint(scene, name, links, ways) for name in scene.gears)]:
+    geared = [gear_joint(scene, name, links, ways) for name in scene.gears]
+    acting = [
+        element_joint(scene, f"{kind}.{name}", element, links, ways)
+        for kind, every in (("springs", scene.springs), ("motors", scene.motors))
+        for name, element in (every.items() if elements else ())
+    ]
+    for row, own in [*held_by_rows, *geared, *acting]:
         if all(each is None for each in own):
             continue
         for each in own:

@@ -113,14 +113,16 @@ class Model:
 
 
 def elastic_model(
-    scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None, along: Path | None = None
-) -> Model:
+    scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None, along: Path | None = None,
+    elements: bool = False,
+) -> Model:  # fmt: skip
     """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
 
     Parameters
     ----------
     bare : `bare_links` of the scene, if they are there already
     along : the linkage's path over the drive's range, needed with slots
+    elements : whether springs and motors get interface points
 
     Raises
     ------
@@ -163,7 +165,7 @@ def elastic_model(
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
-    held = joined(scene, links, cuts, ways)
+    held = joined(scene, links, cuts, ways, elements)
     loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads

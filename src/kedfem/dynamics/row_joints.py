@@ -6,7 +6,7 @@ joint holds. A seat is seen as a rigid piece: the mean displacement u₀ of its 
 the port points, so that the point of the seat's frame at X moves by u₀ + θ × (X − X₀).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -33,6 +33,7 @@ class Side:
     stations : of the link along which a slot's pin slides; its ports are these
     onto : (p, d, k) displacements at the ports, world components, from the interface unknowns z
     shared : whether the ports are the link's; not of a rigid slider, which rides on another link
+    points : (p, 3) the ports as drawn [m]
     """
 
     body: int
@@ -41,6 +42,7 @@ class Side:
     onto: Float[np.ndarray, "p d k"]
     stations: Stations | None = None
     shared: bool = True
+    points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: np.zeros((1, 3)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.places import part_seat, slider_axis
+from kedfem.dynamics.places import on_part, part_seat, slider_axis
 from kedfem.dynamics.row_joints import (
     RowJoint,
     Side,
@@ -18,11 +18,13 @@ from kedfem.dynamics.row_joints import (
     springs,
     station_ports,
 )
+from kedfem.errors import SceneError
 from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows
 from kedfem.links.seats import port_weights
 from kedfem.links.stations import stations
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import Scene
+from kedfem.scene import LineSpring, Motor, Scene, Spring
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,46 @@ def row_joint(
     ), list(own)  # fmt: skip
 
 
+def element_joint(
+    scene: Scene, name: str, element: Spring | Motor, links: dict[str, Link], ways: Ways
+) -> tuple[RowJoint, list[Own | None]]:
+    """The two sides of a spring or motor, as a joint without rows: on those of its joint, or at two points."""
+    if not isinstance(element, LineSpring) or element.between is None:
+        row, own = row_joint(scene, str(element.joint), links, ways, (np.zeros((0, 3)), np.zeros((0, 3))))
+        return replace(row, name=name), own
+    found = [
+        _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, ways)
+        for k, end in enumerate(element.between)
+    ]
+    (one, first), (other, second) = found
+    bodies = tuple(ways.bodies[end.link] for end in element.between)
+    none = np.zeros((0, 3))
+    row = RowJoint(
+        name, np.asarray(element.between[0].at), (bodies[0], bodies[1]), (one, other), none, none, None,
+        np.zeros(0), np.zeros(0), np.eye(3)[2],
+    )  # fmt: skip
+    return row, [first, second]
+
+
+def _point_side(
+    where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], ways: Ways
+) -> tuple[Side | None, Own | None]:
+    """A point of a link; nothing on the ground and on what the drive carries."""
+    only_u = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
+    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
+        side = Side(ways.bodies[on], at, only_u, np.zeros((1, 3, 0)), shared=False, points=at[None])
+        return side, Own("", on, at[None], np.zeros((1, 0)), axis[:, None])
+    if on not in {link.name for link in links.values()}:
+        return None, None
+    key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
+    link = links[key]
+    if link.kind == "beam" and np.linalg.norm(rows.X - at) > 1e-6 * link.size:
+        raise SceneError(f"{where}: must lie on the axis of beam '{on}', got {at.tolist()}")
+    d = link.d
+    side = Side(ways.bodies[on], rows.X, only_u[:, :, :d], np.zeros((1, d, 0)), points=rows.X[None])
+    return side, Own(key, "", rows.X[None], rows.value[None], np.eye(d))
+
+
 def _side(
     scene: Scene, name: str, on: str, links: dict[str, Link], ways: Ways, slot: bool
 ) -> tuple[Side | None, Own | None]:
@@ -122,11 +164,11 @@ def _side(
         joint = scene.joints[name]
         line = stations(link, where, np.asarray(joint.at), joint_axis(joint), ways.slots[name])
         points, known = station_ports(line, link)
-        side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line)
+        side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line, points=points)
         weights = line.weights
     else:
         key, seat = part_seat(scene, name, links, on)
         points, known = seat_ports(seat, links[key], where)
-        side = Side(body, seat.origin, known, np.zeros((len(points), links[key].d, 0)))
+        side = Side(body, seat.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
         weights = port_weights(seat, points)
     return side, Own(key, "", points, weights, np.eye(known.shape[2] * len(points)))

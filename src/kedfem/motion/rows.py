@@ -17,6 +17,18 @@ from jaxtyping import Float, Int
 
 GAP, TURN, ANGLE = 0, 1, 2
 Vector = Float[np.ndarray, "3"]
+CONSTRAINED = {
+    "spherical": ("xyz", ""),
+    "universal": ("xyz", ""),  # and the turn about the normal of its cross
+    "revolute": ("xyz", "xy"),
+    "weld": ("xyz", "xyz"),
+    "prismatic": ("xy", "xyz"),
+    "cylindrical": ("xy", "xy"),
+    "screw": ("xy", "xy"),  # and the turn that goes with its travel
+    "planar": ("z", "xy"),
+    "slot": ("xy", ""),
+}
+"""Axes along which each kind constrains gaps, and about which turns; z is the joint's axis. The rest it releases."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,78 @@
+"""Products and turns of a body's coordinates and of its interface points, compiled by numba."""
+
+from kedfem.compiled import inner
+
+
+@inner
+def turned(R, d, x, out):  # type: ignore[no-untyped-def]
+    """out becomes R x for d components of coordinates."""
+    n = len(x) // d
+    for b in range(d):
+        for j in range(n):
+            out[b * n + j] = R[b, 0] * x[j] + R[b, 1] * x[n + j]
+        if d == 3:
+            for j in range(n):
+                out[b * n + j] += R[b, 2] * x[2 * n + j]
+
+
+@inner
+def turned_back(R, d, x, out):  # type: ignore[no-untyped-def]
+    """out becomes Rᵀ x for d components of coordinates."""
+    n = len(x) // d
+    for b in range(d):
+        for j in range(n):
+            out[b * n + j] = R[0, b] * x[j] + R[1, b] * x[n + j]
+        if d == 3:
+            for j in range(n):
+                out[b * n + j] += R[2, b] * x[2 * n + j]
+
+
+@inner
+def ports_turned(bodies, i, R, x, out):  # type: ignore[no-untyped-def]
+    """out becomes R x for held components of interface points; the same columns of both."""
+    first, last = bodies.port_at[i], bodies.port_at[i + 1]
+    for q in range(first, last):
+        out[q - first] = 0.0
+    for q in range(first, last):
+        for m in range(bodies.group[q], last):
+            if bodies.group[m] != bodies.group[q]:
+                break
+            out[q - first] += R[bodies.component[q], bodies.component[m]] * x[m - first]
+
+
+@inner
+def interface_columns(bodies, i, R, RB):  # type: ignore[no-untyped-def]
+    """RB (q × c, flat) becomes Rᵀ B of a body."""
+    first, last = bodies.port_at[i], bodies.port_at[i + 1]
+    c, at = bodies.column_at[i + 1] - bodies.column_at[i], bodies.B_at[i]
+    for q in range(first, last):
+        for m in range(c):
+            RB[(q - first) * c + m] = 0.0
+        for o in range(bodies.group[q], last):
+            if bodies.group[o] != bodies.group[q]:
+                break
+            x = R[bodies.component[o], bodies.component[q]]
+            if x != 0.0:
+                for m in range(c):
+                    RB[(q - first) * c + m] += x * bodies.B[at + (o - first) * c + m]
+
+
+@inner
+def product(A, at, rows, columns, x, out):  # type: ignore[no-untyped-def]
+    """out becomes A x, A (rows × columns) flat from `at` on."""
+    for r in range(rows):
+        total = 0.0
+        first = at + r * columns
+        for m in range(columns):
+            total += A[first + m] * x[m]
+        out[r] = total
+
+
+@inner
+def add_transposed(A, at, rows, columns, x, out):  # type: ignore[no-untyped-def]
+    """out + Aᵀ x."""
+    for r in range(rows):
+        if x[r] != 0.0:
+            first = at + r * columns
+            for m in range(columns):
+                out[m] += x[r] * A[first + m]

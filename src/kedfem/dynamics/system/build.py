@@ -1,0 +1,238 @@
+"""From a scene and its elastic model to a system: what each joint constrains and releases, force elements on coordinates.
+
+One table says what a kind of joint constrains (`motion.rows.CONSTRAINED`); bushings, gears, drives, springs and motors
+are laws on the same coordinates.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.row_joints import RowJoint, Side, bore_axis, in_plane, joint_frame, ordered
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    COORDINATE,
+    DISTANCE,
+    FACE,
+    GAP,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RATE,
+    RIGID,
+    SOLID,
+    TIME,
+    TURN,
+    Constraint,
+    Curve,
+    Driven,
+    End,
+    Held,
+    Law,
+    Spring,
+    System,
+    Term,
+)
+from kedfem.errors import SceneError
+from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.path import Path
+from kedfem.motion.rows import CONSTRAINED, perpendiculars
+from kedfem.scene import LineSpring, Motor, Scene
+
+OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
+NOTHING = 1e-12  # entries of a selection that are rounding
+Vector = Float[np.ndarray, "3"]
+
+
+def system_of(
+    scene: Scene, linkage: Linkage, along: Path | None = None, model: Model | None = None
+) -> System:
+    """The system of a scene.
+
+    Parameters
+    ----------
+    model : with interface points for force elements (`elastic_model(…, elements=True)`); made if not given
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a joint or force element finds no place on its links.
+    """
+    model = model or elastic_model(scene, linkage, along=along, elements=True)
+    found = _Builder(scene, linkage, model)
+    for joint in model.rows:
+        found.joint(joint)
+    names = tuple(link.name for link in model.links)
+    k = int(model.joints[0].B.shape[1])
+    return System(names, tuple(found.ends), tuple(found.constraints), k, model)
+
+
+@dataclass
+class _Builder:
+    """Ends and constraints while they are collected."""
+
+    scene: Scene
+    linkage: Linkage
+    model: Model
+    ends: list[End] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
+
+    def joint(self, joint: RowJoint) -> None:
+        """What a joint constrains, a pair of gears couples, a spring or motor acts on."""
+        scene, (kind, _, name) = self.scene, joint.name.rpartition(".")
+        if kind == "gears":
+            factor, first = joint.plus[0]
+            of = scene.gears[name].joints
+            terms = (*self.coordinate(of[1], joint, 1.0), *self.coordinate(of[0], first, factor))
+            self.add(joint.name, terms, Held(), joint, first)
+        elif kind in {"springs", "motors"}:
+            self.element(joint, getattr(scene, kind)[name])
+        elif scene.joints[joint.name].kind == "slot":
+            raise SceneError(f"joints.{joint.name}.kind: must be another than slot here, got it")
+        else:
+            for term, law in self.constrained(joint):
+                self.add(joint.name, (term,), law, joint)
+
+    def element(self, joint: RowJoint, element: object) -> None:
+        """The law of a spring or motor on its coordinate, which its links' own motion tells."""
+        law: Law
+        if isinstance(element, Motor):
+            law = Curve(OVER[element.curve.over], element.curve.at, element.curve.value)
+        else:
+            law = Spring(element.stiffness, element.damping, element.free)  # type: ignore[attr-defined]
+        if isinstance(element, LineSpring) and element.between is not None:
+            i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(element.between))
+            a, a_j = (self.ends[n].origin for n in (i, j))
+            terms: tuple[Term, ...] = (Term(DISTANCE, i, j, a, a_j, np.zeros(3)),)
+        else:
+            turns = isinstance(element, Motor) and element.torque is not None
+            turns = turns or not isinstance(element, Motor | LineSpring)
+            terms = self.coordinate(str(element.joint), joint, 1.0, turns)  # type: ignore[attr-defined]
+        self.constraints.append(Constraint(joint.name, terms, law, linear=False))
+
+    def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: RowJoint) -> None:
+        """A constraint, linear where the frames of all its links are nominal."""
+        numbers = {n for joint in joints for n in joint.bodies}
+        own = any(
+            link.fit is not None
+            for link, n in zip(self.model.links, self.model.bodies, strict=True)
+            if n in numbers
+        )
+        self.constraints.append(Constraint(name, terms, law, linear=not own))
+
+    def coordinate(
+        self, name: str, joint: RowJoint, factor: float, turns: bool | None = None
+    ) -> tuple[Term, ...]:
+        """Turn or travel of a joint; if not said which, the turn of all but slides."""
+        axis, at = joint_axis(self.scene.joints[name]), np.asarray(self.scene.joints[name].at)
+        i, j = self.end(joint, 0, at), self.end(joint, 1, at)
+        if self.scene.joints[name].kind != "prismatic" if turns is None else turns:
+            across = perpendiculars(axis)[0]
+            return (Term(ANGLE, i, j, across, across, axis, factor),)
+        return (Term(GAP, i, j, at, at, axis, factor),)
+
+    def constrained(self, joint: RowJoint) -> Iterator[tuple[Term, Law]]:
+        """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
+        made, frame = self.scene.joints[joint.name], joint_frame(self.scene.joints[joint.name])
+        at = np.asarray(made.at)
+        i, j = self.end(joint, 0, at), self.end(joint, 1, at)
+        gaps, turns = CONSTRAINED[made.kind]
+        for axis in gaps:
+            n = "xyz".index(axis)
+            if self.tells(joint, frame[n], np.zeros(3)):
+                yield Term(GAP, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
+        if made.kind == "universal":
+            one, other = (np.asarray(bore_axis(made, link)) for link in ordered(made))
+            yield Term(TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)
+        for axis in turns:
+            n = "xyz".index(axis)
+            a, b = (frame[0], frame[1]) if n == 2 else (frame[2], frame[1 - n])
+            if self.tells(joint, np.zeros(3), frame[n]):
+                yield Term(TURN, i, j, a, a, b), self.bushing(joint.name, n, turning=True)
+        yield from self.threaded(joint, i, j, at)
+        yield from self.driven(joint)
+
+    def tells(self, joint: RowJoint, gap: Vector, turn: Vector) -> bool:
+        """Whether a direction says something of a joint's links: of planar ones only what is in their plane."""
+        here = [x for x, n in zip(self.model.links, self.model.bodies, strict=True) if n in joint.bodies]
+        return not all(link.planar for link in here) or bool(in_plane(gap[None], turn[None])[0])
+
+    def bushing(self, name: str, axis: int, turning: bool) -> Law:
+        """The law of a constraint along or about an axis of its joint."""
+        of = self.scene.joints[name].bushing
+        stiffness = None if of is None else (of.turning_stiffness if turning else of.stiffness)
+        if of is None or stiffness is None:
+            return Held()
+        return Spring(stiffness[axis], (of.turning_damping if turning else of.damping)[axis])
+
+    def threaded(self, joint: RowJoint, i: int, j: int, at: Vector) -> Iterator[tuple[Term, Law]]:
+        """The thread of a screw, a constraint of two terms."""
+        made = self.scene.joints[joint.name]
+        if made.kind != "screw":
+            return
+        axis = joint_axis(made)
+        across = perpendiculars(axis)[0]
+        turn = Term(ANGLE, i, j, across, across, axis, -(made.lead or 0.0) / (2 * np.pi))
+        self.add(joint.name, (Term(GAP, i, j, at, at, axis), turn), Held(), joint)
+        yield from ()
+
+    def driven(self, joint: RowJoint) -> Iterator[tuple[Term, Law]]:
+        """The coordinate that a drive prescribes, or turns over a shaft that gives."""
+        drives = self.scene.driven_joints
+        if joint.name not in drives:
+            return
+        drive, number = drives[joint.name], list(drives).index(joint.name)
+        (term,) = self.coordinate(joint.name, joint, 1.0)
+        if drive.shaft_stiffness is None:
+            yield term, Driven(number)
+        else:
+            yield term, Spring(drive.shaft_stiffness, drive.shaft_damping, drive=number)
+
+    def end(self, joint: RowJoint, side: int, at: Vector) -> int:
+        """The number of an end of a joint: what it has on one of its links."""
+        found = joint.sides[side]
+        end = _rigid_end(joint.bodies[side], at, self.unknowns) if found is None else _end(found)
+        for n, other in enumerate(self.ends):
+            if other.body == end.body and np.array_equal(other.origin, end.origin) and (
+                other.onto.shape == end.onto.shape and np.array_equal(other.onto, end.onto)
+            ):  # fmt: skip
+                return n
+        self.ends.append(end)
+        return len(self.ends) - 1
+
+    @property
+    def unknowns(self) -> int:
+        """Number of interface unknowns."""
+        return int(self.model.joints[0].B.shape[1])
+
+
+def _rigid_end(body: int, at: Vector, k: int) -> End:
+    """An end on the ground or on a prescribed body."""
+    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
+
+
+def _end(side: Side) -> End:
+    """An end on a body, or on a slider that rides on one."""
+    onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
+    p, d, _ = onto.shape
+    directions, lengths, known = np.eye(3), np.ones(3), p - 1
+    arms = side.points[1:] - side.points[0]
+    if known:
+        lengths[:known] = np.linalg.norm(arms, axis=1)
+        directions[:known] = arms / lengths[:known, None]
+        if d == 2:
+            directions[1] = np.cross([0, 0, 1], directions[0]) if known == 1 else directions[1]
+            directions[2] = [0, 0, 1]
+        elif known == 2:
+            directions[2] = np.cross(directions[0], directions[1])
+    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, onto)
+
+
+def _form(side: Side, d: int, known: int) -> int:
+    """What an end knows of its orientation."""
+    if known:
+        return PLANAR if d == 2 else {2: FACE, 3: SOLID}[known]
+    return PLANAR_BEAM if side.shared and d == 3 and side.seat[0, 5].any() else POINT

@@ -1,0 +1,136 @@
+"""Coordinates of constraints, their gradients on the interface unknowns, and their laws; compiled by numba.
+
+A coordinate is a sum of terms, each a function of the positions x and orientations Q of two ends; see `record.Term`.
+"""
+
+import numpy as np
+
+from kedfem.compiled import compiled, inner
+from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
+
+GAP, TURN, ANGLE, DISTANCE = range(4)
+HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
+TIME, RATE, COORDINATE = range(3)
+
+
+@inner
+def coordinate(ends, of, r, place, turned, row, y, w):  # type: ignore[no-untyped-def]
+    """Value of coordinate r, its gradient added to a row on z.
+
+    Parameters
+    ----------
+    turned : (terms,) angles as they were, replaced by those they are
+    y, w : (16,), (12, 3) room
+    """
+    total = 0.0
+    x, Q, _, _ = place
+    for t in range(of.term_at[r], of.term_at[r + 1]):
+        i, j, kind, factor = of.i[t], of.j[t], of.kind[t], of.factor[t]
+        if kind in (GAP, DISTANCE):
+            value = between(kind, ends, of, t, x, Q, w)
+        elif kind == TURN:
+            times(Q[i], of.a[t], w[4])
+            times(Q[j], of.b[t], w[5])
+            value = dot(w[4], w[5])
+            cross(w[4], w[5], w[7])
+            for m in range(3):
+                w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
+        else:
+            value = angle(of, t, Q, turned[t], w)
+            turned[t] = value
+        total += factor * value
+        borne(ends, i, w[6], w[7], factor, place, row, y, w)
+        borne(ends, j, w[8], w[9], factor, place, row, y, w)
+    return total
+
+
+@inner
+def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
+    """Gap along a direction fixed in j, or distance; w[6:10] becomes force and moment of unit size on i and on j."""
+    i, j = of.i[t], of.j[t]
+    for m in range(3):
+        w[4, m], w[5, m] = of.a[t, m] - ends.origin[i, m], of.a_j[t, m] - ends.origin[j, m]
+    times(Q[i], w[4], w[10])
+    times(Q[j], w[5], w[11])
+    for m in range(3):
+        w[4, m] = x[i, m] + w[10, m] - x[j, m] - w[11, m]
+    if kind == GAP:
+        times(Q[j], of.b[t], w[6])
+        value = dot(w[4], w[6])
+        for m in range(3):
+            w[11, m] += w[4, m]
+    else:
+        value = np.sqrt(dot(w[4], w[4]))
+        for m in range(3):
+            w[6, m] = w[4, m] / value if value > 0.0 else 0.0
+    cross(w[10], w[6], w[7])
+    cross(w[6], w[11], w[9])
+    for m in range(3):
+        w[8, m] = -w[6, m]
+    return value
+
+
+@inner
+def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
+    """Turn of i against j about an axis in j, to within half a turn of an earlier one; gradient as in `between`."""
+    i, j = of.i[t], of.j[t]
+    times(Q[i], of.a[t], w[4])
+    times(Q[j], of.a_j[t], w[5])
+    times(Q[j], of.b[t], w[10])
+    cross(w[10], w[5], w[11])
+    along, across = dot(w[4], w[5]), dot(w[4], w[11])
+    value = np.arctan2(across, along)
+    value += 2 * np.pi * np.round((near - value) / (2 * np.pi))
+    size = along * along + across * across
+    for m in range(3):
+        w[10, m] = (along * w[11, m] - across * w[5, m]) / size
+    cross(w[4], w[10], w[7])
+    for m in range(3):
+        w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
+    return value
+
+
+@compiled
+def law(of, r, t, e, rate, out):  # type: ignore[no-untyped-def]
+    """Force against the coordinate e with its rate, and how it grows with both: out (3,); a constraint has its misfit.
+
+    Returns whether it is a constraint.
+    """
+    kind, numbers = of.law[r], of.numbers[r]
+    out[1], out[2] = 0.0, 0.0
+    if kind in (HELD, DRIVEN):
+        out[0] = e
+        return True
+    if kind == SPRING:
+        out[0], out[1], out[2] = numbers[0] * (e - numbers[2]) + numbers[1] * rate, numbers[0], numbers[1]
+    elif kind == CURVE:
+        over = of.over[r]
+        at = t if over == TIME else (rate if over == RATE else e)
+        value, slope = interpolated(of, r, at)
+        out[0] = -value
+        if over != TIME:
+            out[2 if over == RATE else 1] = -slope
+    else:
+        lower, upper, k, c = numbers
+        beyond = e - upper if e > upper else (e - lower if e < lower else 0.0)
+        out[0] = k * beyond + c * rate
+        if beyond == 0.0 or out[0] * beyond <= 0.0:
+            out[0] = 0.0
+        else:
+            out[1], out[2] = k, c
+    return False
+
+
+@inner
+def interpolated(of, r, x):  # type: ignore[no-untyped-def]
+    """Value and slope of a curve that is linear between its points and held outside."""
+    first, last = of.curve_at[r], of.curve_at[r + 1] - 1
+    if x <= of.abscissa[first]:
+        return of.ordinate[first], 0.0
+    if x >= of.abscissa[last]:
+        return of.ordinate[last], 0.0
+    k = first
+    while x > of.abscissa[k + 1]:
+        k += 1
+    slope = (of.ordinate[k + 1] - of.ordinate[k]) / (of.abscissa[k + 1] - of.abscissa[k])
+    return of.ordinate[k] + slope * (x - of.abscissa[k]), slope

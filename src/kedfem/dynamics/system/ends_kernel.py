@@ -1,0 +1,193 @@
+"""Ends of constraints, compiled by numba: place and orientation from the interface unknowns, and forces back onto them.
+
+The orientation of a coupling surface is the rotation Q of A = Σ D_k ⊗ e_k = Q U, D_k the directions as they are now, e_k
+as drawn. Of a surface of which two directions are known the third is its normal. With G = tr(U) 1 − U a moment τ on Q is
+
+    τ · ω = Σ q_k · δD_k,   q_k = Q (t × e_k),   t = G⁻¹ Qᵀ τ
+
+    place : x (E, 3), Q (E, 3, 3), D (E, 3, 3), U (E, 3, 3) of all ends
+"""
+
+import numpy as np
+
+from kedfem.compiled import compiled, inner
+from kedfem.dynamics.frames_kernel import rodrigues, turn_of
+
+RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID = range(6)
+TURNS = 30
+
+
+@inner
+def cross(a, b, out):  # type: ignore[no-untyped-def]
+    """out becomes a × b."""
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inner
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inner
+def times(R, x, out):  # type: ignore[no-untyped-def]
+    """out becomes R x."""
+    for m in range(3):
+        out[m] = R[m, 0] * x[0] + R[m, 1] * x[1] + R[m, 2] * x[2]
+
+
+@inner
+def times_transposed(R, x, out):  # type: ignore[no-untyped-def]
+    """out becomes Rᵀ x."""
+    for m in range(3):
+        out[m] = R[0, m] * x[0] + R[1, m] * x[1] + R[2, m] * x[2]
+
+
+@compiled
+def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
+    """Where all ends are at the interface displacement z.
+
+    Parameters
+    ----------
+    R, p : (M, 3, 3), (M, 3) of all bodies of the linkage
+    y, w : (16,), (4, 3) room
+    """
+    x, Q, D, U = place
+    for e in range(len(ends.form)):
+        body, form, d = ends.body[e], ends.form[e], ends.components[e]
+        times(R[body], ends.origin[e], w[0])
+        for m in range(3):
+            x[e, m] = p[body, m] + w[0, m]
+        Q[e] = R[body]
+        if form == RIGID:
+            continue
+        moved(ends, e, z, y)
+        for m in range(2 if form == PLANAR_BEAM else d):
+            x[e, m] += y[m]
+        if form == PLANAR_BEAM:
+            w[0, 0], w[0, 1], w[0, 2] = 0.0, 0.0, y[2]
+            rodrigues(w[0], Q[e], U[e])
+        elif form != POINT:
+            directed(ends, e, R[body], y, D[e], w[0])
+            oriented(ends.directions[e], D[e], Q[e], U[e], w)
+
+
+@inner
+def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
+    """y becomes the displacements of an end's interface points, one after the other."""
+    first, last = ends.column_at[e], ends.column_at[e + 1]
+    at, c = ends.onto_at[e], ends.column_at[e + 1] - ends.column_at[e]
+    for r in range((ends.onto_at[e + 1] - at) // max(c, 1)):
+        y[r] = 0.0
+        for m in range(first, last):
+            y[r] += ends.onto[at + r * c + m - first] * z[ends.columns[m]]
+
+
+@inner
+def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
+    """D becomes the directions of a surface: the known ones from its points, the others completed."""
+    form, d, known = ends.form[e], ends.components[e], ends.known[e]
+    for k in range(known):
+        times(R, ends.directions[e, k], D[k])
+        for m in range(d):
+            D[k, m] += (y[(k + 1) * d + m] - y[m]) / ends.lengths[e, k]
+    if form == PLANAR:
+        if known == 1:
+            D[1, 0], D[1, 1], D[1, 2] = -D[0, 1], D[0, 0], 0.0
+        D[2, 0], D[2, 1], D[2, 2] = 0.0, 0.0, 1.0
+    if form == FACE:
+        cross(D[0], D[1], w)
+        size = np.sqrt(dot(w, w))
+        for m in range(3):
+            D[2, m] = w[m] / size
+
+
+@inner
+def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
+    """Q becomes the rotation of A = Σ D_k ⊗ e_k by Newton from an earlier one, U = Qᵀ A."""
+    for _ in range(TURNS):
+        for b in range(3):
+            for m in range(3):
+                U[b, m] = 0.0
+        for k in range(3):
+            times_transposed(Q, D[k], w[0])
+            for b in range(3):
+                for m in range(3):
+                    U[b, m] += w[0, b] * e[k, m]
+        w[1, 0], w[1, 1], w[1, 2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
+        size = max(abs(w[1, 0]), abs(w[1, 1]), abs(w[1, 2]))
+        if size < 1e-15:
+            break
+        turn_of(U, w[1])
+        size = max(abs(w[1, 0]), abs(w[1, 1]), abs(w[1, 2]))
+        if size > 0.5:
+            for m in range(3):
+                w[1, m] *= 0.5 / size
+        rodrigues(w[1], Q, U)
+        if size <= 1e-8:
+            break
+    for b in range(3):
+        for m in range(3):
+            U[b, m] = 0.0
+    for k in range(3):
+        times_transposed(Q, D[k], w[0])
+        for b in range(3):
+            for m in range(3):
+                U[b, m] += w[0, b] * e[k, m]
+
+
+@inner
+def borne(ends, e, force, moment, factor, place, row, y, w):  # type: ignore[no-untyped-def]
+    """Add to a row on z a force and a moment on an end, both times a factor."""
+    _, Q, D, U = place
+    form, d = ends.form[e], ends.components[e]
+    if form == RIGID:
+        return
+    first, c = ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]
+    at = ends.onto_at[e]
+    rows = (ends.onto_at[e + 1] - at) // max(c, 1)
+    for r in range(rows):
+        y[r] = 0.0
+    for m in range(2 if form == PLANAR_BEAM else d):
+        y[m] = force[m]
+    if form == PLANAR_BEAM:
+        y[2] = moment[2]
+    elif form != POINT:
+        turning(ends, e, moment, Q[e], D[e], U[e], y, w)
+    for r in range(rows):
+        if y[r] != 0.0:
+            for m in range(c):
+                row[ends.columns[first + m]] += factor * y[r] * ends.onto[at + r * c + m]
+
+
+@inner
+def turning(ends, e, moment, Q, D, U, y, w):  # type: ignore[no-untyped-def]
+    """Add to forces y at an end's points those that a moment on its orientation is."""
+    form, d, known = ends.form[e], ends.components[e], ends.known[e]
+    times_transposed(Q, moment, w[0])
+    turn_of(U, w[0])
+    for k in range(3):
+        cross(w[0], ends.directions[e, k], w[3])
+        times(Q, w[3], w[k + 1] if k < 2 else w[0])
+    q1, q2, q3 = w[1], w[2], w[0]
+    if form == PLANAR and known == 1:
+        q1[0] += q2[1]
+        q1[1] -= q2[0]
+    if form == FACE:
+        n = D[2]
+        cross(D[0], D[1], w[3])
+        size = np.sqrt(dot(w[3], w[3]))
+        cross(D[1], n, w[3])
+        share = dot(q3, w[3]) / size
+        for m in range(3):
+            q1[m] -= share * n[m]
+        cross(n, D[0], w[3])
+        share = dot(q3, w[3]) / size
+        for m in range(3):
+            q2[m] -= share * n[m]
+    for k in range(known):
+        q = q1 if k == 0 else (q2 if k == 1 else q3)
+        for m in range(d):
+            x = q[m] / ends.lengths[e, k]
+            y[(k + 1) * d + m] += x
+            y[m] -= x

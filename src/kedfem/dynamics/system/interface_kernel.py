@@ -1,0 +1,243 @@
+"""The common system of all bodies' interface points, with constraints and force laws in it; compiled by numba.
+
+    (Σ Bᵀ R S Rᵀ B) Δz = Σ Bᵀ R (Yᵀ Rᵀ r − S w₀) + known + Cᵀ m,   C Δz + m / κ = target
+
+κ is infinite of a constraint; of a force law it is its tangent, so that it is exact however stiff. A part σ < κ of each
+is put into the matrix, as in `dynamics.interface`. Constraints that repeat others get no force.
+"""
+
+import numpy as np
+
+from kedfem.compiled import compiled, inner
+from kedfem.dynamics.mixing_kernel import factored
+from kedfem.dynamics.system.algebra_kernel import interface_columns
+from kedfem.dynamics.system.constraints_kernel import coordinate, law
+from kedfem.dynamics.system.ends_kernel import placed
+
+REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknowns satisfy by themselves
+DEPENDENT = 1e-11  # what is left of a constraint's own compliance where others constrain the same
+
+
+@inner
+def gathered(bodies, trial):  # type: ignore[no-untyped-def]
+    """Rᵀ B and S Rᵀ B of all bodies in their frames, and the matrix of z."""
+    trial.H[:] = 0.0
+    for i in range(len(bodies.motion)):
+        q, c = bodies.port_at[i + 1] - bodies.port_at[i], bodies.column_at[i + 1] - bodies.column_at[i]
+        at, columns = bodies.B_at[i], bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
+        RB, SRB = trial.RB[at : at + q * c], trial.SRB[at : at + q * c]
+        interface_columns(bodies, i, trial.Rp[i], RB)
+        SRB[:] = 0.0
+        for r in range(q):
+            for p in range(q):
+                s = bodies.S[bodies.S_at[i] + r * q + p]
+                for m in range(c):
+                    SRB[r * c + m] += s * RB[p * c + m]
+        for r in range(q):
+            for m in range(c):
+                x, row = RB[r * c + m], columns[m]
+                if x != 0.0:
+                    for o in range(c):
+                        trial.H[row, columns[o]] += x * SRB[r * c + o]
+
+
+@inner
+def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
+    """trial.w becomes w₀ = Rᵀ B z − W Rᵀ u of a body; of one with the nominal frame without the second part.
+
+    Parameters
+    ----------
+    u : (N,) in the body's frame
+    base : whether it has the second part
+    """
+    first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
+    q, N = last - first, bodies.at[i + 1] - bodies.at[i]
+    for r in range(q):
+        x = 0.0
+        for m in range(c):
+            x += trial.RB[bodies.B_at[i] + r * c + m] * trial.z[bodies.columns[bodies.column_at[i] + m]]
+        if base:
+            for y in range(N):
+                x -= bodies.W[bodies.Y_at[i] + r * N + y] * u[y]
+        trial.w[first + r] = x
+
+
+@inner
+def pushed(bodies, i, trial, room):  # type: ignore[no-untyped-def]
+    """Add to the right-hand side what a body exerts on z: Bᵀ R (Yᵀ Rᵀ r − S w₀)."""
+    first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
+    q, at = last - first, bodies.B_at[i]
+    for m in range(c):
+        x = 0.0
+        for r in range(q):
+            x += trial.RB[at + r * c + m] * trial.reaction[first + r]
+            x -= trial.SRB[at + r * c + m] * trial.w[first + r]
+        trial.right[bodies.columns[bodies.column_at[i] + m]] += x
+
+
+@compiled
+def evaluated(c, ends, of, time, R, p, drives, state, trial, work):  # type: ignore[no-untyped-def]
+    """Gradients of all constraints and laws at z, and what these ask of Δz; forces without a tangent are known ones."""
+    r, share = len(of.law), 1 - c.alpha_f
+    if r == 0:
+        return
+    if not of.linear.all():
+        placed(ends, R, p, trial.z, trial.moving, work.end, work.vectors)
+    for a in range(r):
+        trial.C[a] = 0.0
+        if of.linear[a]:
+            coordinate(ends, of, a, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors)
+            e = 0.0
+            for m in range(len(trial.z)):
+                e += trial.C[a, m] * trial.z[m]
+        else:
+            e = coordinate(ends, of, a, trial.moving, trial.turned, trial.C[a], work.end, work.vectors)
+            if of.drive[a] >= 0:
+                e -= drives[of.drive[a]]
+        trial.e[a] = e
+        rate = c.rate[0] * (e - state.e[0, a]) - c.rate[1] * state.e[1, a] - c.rate[2] * state.e[2, a]
+        held = law(of, a, time, e, rate, work.law)
+        kappa = share * (work.law[1] + c.rate[0] * work.law[2])
+        trial.m[a] = 0.0
+        if held:
+            trial.compliance[a], trial.target[a] = 0.0, -e
+            if not acts(trial.C[a]):
+                trial.compliance[a] = -1.0
+        elif kappa > 0.0:
+            trial.compliance[a], trial.target[a] = 1 / kappa, -share * work.law[0] / kappa
+        else:
+            trial.compliance[a], trial.m[a] = -1.0, -share * work.law[0]
+            for m in range(len(trial.z)):
+                trial.right[m] += trial.m[a] * trial.C[a, m]
+
+
+@inner
+def acts(row):  # type: ignore[no-untyped-def]
+    """Whether a constraint says something that the interface unknowns do not satisfy by themselves."""
+    most = 0.0
+    for x in row:
+        most = max(most, abs(x))
+    return most > REPEATED
+
+
+@inner
+def forward(L, first, x):  # type: ignore[no-untyped-def]
+    """x becomes L⁻¹ x."""
+    for i in range(len(x)):
+        for j in range(first[i], i):
+            x[i] -= L[i, j] * x[j]
+        x[i] /= L[i, i]
+
+
+@inner
+def backward(L, first, x):  # type: ignore[no-untyped-def]
+    """x becomes L⁻ᵀ x."""
+    for i in range(len(x) - 1, -1, -1):
+        x[i] /= L[i, i]
+        for j in range(first[i], i):
+            x[j] -= L[i, j] * x[i]
+
+
+@inner
+def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
+    """trial.H_rows becomes the factor of H with a part of each constraint and law; compliances are of what is left."""
+    k, r = len(trial.z), len(trial.m)
+    trial.H_rows[:] = trial.H
+    trace = 0.0
+    for m in range(k):
+        trace += trial.H[m, m]
+    for a in range(r):
+        trial.beside[a] = 0.0
+        if trial.compliance[a] < 0.0:
+            continue
+        size = 0.0
+        for m in range(k):
+            size += trial.C[a, m] ** 2
+        usual = trace / k / size if size > 0.0 else 0.0
+        sigma = usual / (1.0 + 2.0 * usual * trial.compliance[a])
+        left = 1.0 - sigma * trial.compliance[a]
+        trial.beside[a] = sigma
+        trial.compliance[a], trial.target[a] = trial.compliance[a] / left, trial.target[a] / left
+        for m in range(k):
+            if trial.C[a, m] != 0.0:
+                x = sigma * trial.C[a, m]
+                for o in range(m + 1):
+                    trial.H_rows[m, o] += x * trial.C[a, o]
+    factored(trial.H_rows, bodies.first)
+
+
+@inner
+def pivoted(trial):  # type: ignore[no-untyped-def]
+    """trial.G becomes the factor of C H⁻¹ Cᵀ + compliance; constraints that depend on others have pivot zero."""
+    G, pivots = trial.G, trial.pivots
+    r, k = trial.CH.shape
+    for a in range(r):
+        pivots[a] = 0.0
+        if trial.compliance[a] < 0.0:
+            continue
+        for b in range(a + 1):
+            x = 0.0
+            for m in range(k):
+                x += trial.CH[a, m] * trial.CH[b, m]
+            G[a, b] = x
+        G[a, a] += trial.compliance[a]
+        own = G[a, a]
+        for b in range(a):
+            if pivots[b] == 0.0:
+                G[a, b] = 0.0
+                continue
+            for m in range(b):
+                G[a, b] -= G[a, m] * G[b, m]
+            G[a, b] /= G[b, b]
+        for b in range(a):
+            G[a, a] -= G[a, b] ** 2
+        if G[a, a] > DEPENDENT * own:
+            G[a, a], pivots[a] = np.sqrt(G[a, a]), 1.0
+
+
+@inner
+def interface_solved(bodies, trial):  # type: ignore[no-untyped-def]
+    """trial.dz and trial.m from the right-hand side."""
+    first, r = bodies.first, len(trial.m)
+    trial.dz[:] = trial.right
+    stiffened(bodies, trial)
+    L = trial.H_rows
+    forward(L, first, trial.dz)
+    for a in range(r):
+        trial.CH[a] = trial.C[a]
+        if trial.compliance[a] >= 0.0:
+            forward(L, first, trial.CH[a])
+    backward(L, first, trial.dz)
+    if r == 0:
+        return
+    pivoted(trial)
+    G, left, pivots = trial.G, trial.left, trial.pivots
+    for _ in range(2):  # the second closes joints to rounding
+        for a in range(r):
+            left[a] = 0.0
+            if pivots[a] != 0.0:
+                left[a] = trial.target[a] - trial.compliance[a] * trial.m[a]
+                for m in range(len(trial.z)):
+                    left[a] -= trial.C[a, m] * trial.dz[m]
+                for b in range(a):
+                    left[a] -= G[a, b] * left[b]
+                left[a] /= G[a, a]
+        for a in range(r - 1, -1, -1):
+            if pivots[a] != 0.0:
+                for b in range(a + 1, r):
+                    if pivots[b] != 0.0:
+                        left[a] -= G[b, a] * left[b]
+                left[a] /= G[a, a]
+                trial.m[a] += left[a]
+        trial.part[:] = 0.0
+        for a in range(r):
+            if left[a] != 0.0:
+                for m in range(len(trial.z)):
+                    trial.part[m] += left[a] * trial.CH[a, m]
+        backward(L, first, trial.part)
+        for m in range(len(trial.z)):
+            trial.dz[m] += trial.part[m]
+    for a in range(r):
+        if pivots[a] != 0.0:
+            for m in range(len(trial.z)):
+                trial.m[a] -= trial.beside[a] * trial.C[a, m] * trial.dz[m]

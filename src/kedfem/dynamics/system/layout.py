@@ -1,0 +1,245 @@
+"""A system's flat arrays: bodies factored for a fixed step, ends, constraints."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.substructure import effective_coefficients
+from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
+from kedfem.dynamics.system.record import (
+    COORDINATE,
+    COROTATIONAL,
+    CURVE,
+    DRIVEN,
+    HELD,
+    NOMINAL,
+    SPRING,
+    STOP,
+    TANGENTIAL,
+    Constraint,
+    Curve,
+    Driven,
+    End,
+    Held,
+    Law,
+    Spring,
+    Stop,
+)
+from kedfem.links.record import BeamPoint, Link
+
+KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
+TOLERANCE = (
+    1e-9  # change of a pass, of what a step moves: far below what following frames are compared to, 1e-7
+)
+SMALLEST = 1e-13  # of a system's size: what a step of one that is at rest may be out by
+
+
+def coefficients(
+    scheme: Scheme, damping: Rayleigh, links: Sequence[Link], single: bool, tolerance: float = TOLERANCE
+) -> Coefficients:
+    """Of generalised-α for bodies of a size."""
+    c_M, c_K = effective_coefficients(scheme, damping)
+    mass = sum(float(link.one @ link.m1[:, 0]) for link in links)
+    size = max(link.size for link in links)
+    return Coefficients(
+        c_M, c_K, scheme.alpha_m, scheme.alpha_f, scheme.acceleration, scheme.rate, scheme.h,
+        scheme.h * scheme.gamma, scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, tolerance,
+        SMALLEST * size * np.sqrt(mass), float(np.sqrt(mass)), single,
+    )  # fmt: skip
+
+
+def near_diagonal(
+    groups: Sequence[Int[np.ndarray, " c"]], k: int
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """New number of each interface unknown, so that those of a group stand near each other, and the matrix' profile."""
+    touched = sp.lil_array((max(len(groups), 1), max(k, 1)))
+    for row, group in enumerate(groups):
+        touched[row, group] = 1.0
+    order = (
+        reverse_cuthill_mckee(sp.csr_array(touched.T @ touched), symmetric_mode=True)[:k]
+        if k
+        else np.zeros(0, int)
+    )
+    number = np.empty(k, int)
+    number[order] = np.arange(k)
+    first = np.arange(k)
+    for group in groups:
+        if len(group):
+            first[number[group]] = np.minimum(first[number[group]], number[group].min())
+    return number, first
+
+
+def points_of(link: Link) -> tuple[BeamPoint, ...]:
+    """The points of a planar beam at which its strains are known."""
+    return tuple(frame.point for frame in link.frames if frame.point)
+
+
+def frame_of(link: Link) -> int:
+    """Which frame a body's internal force is seen from."""
+    if link.fit is None:
+        return NOMINAL
+    return TANGENTIAL if points_of(link) else COROTATIONAL
+
+
+def body_arrays(
+    links: Sequence[Link], joints: Sequence[Attachment], numbers: Sequence[int], parts: Sequence[DensePart],
+    number: Int[np.ndarray, " k"], first: Int[np.ndarray, " k"],
+) -> Bodies:  # fmt: skip
+    """All bodies as flat arrays, their parts factored.
+
+    Parameters
+    ----------
+    numbers : of the bodies in the linkage
+    number, first : of `near_diagonal`
+    """
+    columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
+    frames = [frame_of(link) for link in links]
+    sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
+    beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
+    rows, tangent, rigidity = _beam_tables([links[k] for k in beams], [parts[k] for k in beams])
+    passed, place = np.full(len(links), -1), 0
+    for k, frame in enumerate(frames):
+        if frame != NOMINAL:
+            passed[k], place = place, place + sizes[k]
+    fits = [_fitted(link, part) for link, part in zip(links, parts, strict=True)]
+    stiff = [
+        component_first(part.T, link.K0) if frame == COROTATIONAL else np.zeros((n, n))
+        for link, part, frame, n in zip(links, parts, frames, sizes, strict=True)
+    ]
+    return Bodies(
+        at=_ends(sizes), functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
+        motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
+        dense=np.ones(len(links), bool), passed=passed, port_at=_ends(ports),
+        component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
+        G_at=_ends([n * n for n in sizes]), Y_at=_ends([q * n for q, n in zip(ports, sizes, strict=True)]),
+        S_at=_ends([q * q for q in ports]), B_at=_ends([q * len(c) for q, c in zip(ports, columns, strict=True)]),
+        G=_flat([x.G for x in parts]), Y=_flat([x.Y.T for x in parts]), W=_flat([x.W for x in parts]),
+        S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
+        column_at=_ends([len(c) for c in columns]), columns=_flat([number[c] for c in columns], int), first=first,
+        X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),
+        K=_flat(stiff), beam=np.array([beams.index(k) if k in beams else -1 for k in range(len(links))]),
+        rows_at=_ends([x.size for x in rows]), rows=_flat(rows), tangent=tangent, rigidity=rigidity,
+    )  # fmt: skip
+
+
+def _fitted(link: Link, part: DensePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rows = link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
+    one = coordinates(link, part, np.repeat(link.one[:, None], link.d, axis=1))
+    fit = np.zeros((link.d, link.n)) if link.fit is None else work_on(part, link.fit[:, : link.d])
+    return coordinates(link, part, rows), one, fit
+
+
+def _beam_tables(
+    links: Sequence[Link], parts: Sequence[DensePart]
+) -> tuple[list[np.ndarray], Float[np.ndarray, "b 2 E"], Float[np.ndarray, "b 3 E"]]:
+    """Rows (3, E, n), tangents and rigidities of planar beams with strains at points, see `beams_kernel`."""
+    E = max([1, *(len(points_of(link)) for link in links)])
+    tangent, rigidity, every = np.zeros((len(links), 2, E)), np.zeros((len(links), 3, E)), []
+    tangent[:, 0] = 1.0
+    for k, (link, part) in enumerate(zip(links, parts, strict=True)):
+        rows = np.zeros((3, E, link.n))
+        for e, point in enumerate(points_of(link)):
+            strains = point.strains.reshape(3, -1, 3)
+            rows[0, e] = part.T[0].T @ strains[0, :, :2] @ point.tangent
+            rows[1, e], rows[2, e] = part.T[2].T @ -strains[1, :, 2], part.T[2].T @ strains[2, :, 2]
+            tangent[k, :, e], rigidity[k, :, e] = point.tangent, point.rigidity
+        every.append(rows)
+    return every, tangent, rigidity
+
+
+def _groups(joints: Sequence[Attachment]) -> Int[np.ndarray, " q"]:
+    """Where the components of each one's interface point begin."""
+    out, at = [], 0
+    for joint in joints:
+        port = joint.keep // joint.components
+        out.append(at + np.searchsorted(port, port))
+        at += len(port)
+    return _flat(out, int)
+
+
+def _ends(sizes: Sequence[int]) -> Int[np.ndarray, " _"]:
+    return np.concatenate([[0], np.cumsum(np.array(sizes, int))])
+
+
+def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+    return np.concatenate([np.zeros(0, kind), *(np.asarray(x, kind).ravel() for x in arrays)])
+
+
+def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
+    """All ends as flat arrays on the renumbered interface unknowns."""
+    columns = [np.flatnonzero(end.onto.any(axis=(0, 1))) for end in ends]
+    onto = [end.onto[:, :, c] for end, c in zip(ends, columns, strict=True)]
+    return Ends(
+        body=np.array([end.body for end in ends], int), form=np.array([end.form for end in ends], int),
+        origin=_rows([end.origin for end in ends]),
+        directions=np.array([end.directions for end in ends]).reshape(-1, 3, 3),
+        lengths=_rows([end.lengths for end in ends]), known=np.array([end.known for end in ends], int),
+        components=np.array([end.onto.shape[1] for end in ends], int), column_at=_ends([len(c) for c in columns]),
+        columns=_flat([number[c] for c in columns], int), onto_at=_ends([x.size for x in onto]), onto=_flat(onto),
+    )  # fmt: skip
+
+
+def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
+    """All constraints and laws as flat arrays."""
+    terms = [term for each in constraints for term in each.terms]
+    laws = [_law(each.law) for each in constraints]
+    curves = [each.law if isinstance(each.law, Curve) else Curve(COORDINATE, (), ()) for each in constraints]
+    return Constraints(
+        term_at=_ends([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
+        i=np.array([x.i for x in terms], int), j=np.array([x.j for x in terms], int),
+        a=_rows([x.a for x in terms]), a_j=_rows([x.a_j for x in terms]), b=_rows([x.b for x in terms]),
+        factor=np.array([x.factor for x in terms], float), linear=np.array([x.linear for x in constraints], bool),
+        law=np.array([kind for kind, _, _ in laws], int),
+        numbers=np.array([x for _, x, _ in laws], float).reshape(-1, 4),
+        drive=np.array([x for _, _, x in laws], int), over=np.array([x.over for x in curves], int),
+        curve_at=_ends([len(x.at) for x in curves]), abscissa=_flat([np.array(x.at) for x in curves]),
+        ordinate=_flat([np.array(x.value) for x in curves]),
+    )  # fmt: skip
+
+
+def _law(law: Law) -> tuple[int, tuple[float, float, float, float], int]:
+    """Kind, numbers and drive of a law."""
+    match law:
+        case Held():
+            return HELD, (0.0, 0.0, 0.0, 0.0), -1
+        case Driven():
+            return DRIVEN, (0.0, 0.0, 0.0, 0.0), law.drive
+        case Spring():
+            return SPRING, (law.stiffness, law.damping, law.free, 0.0), law.drive
+        case Stop():
+            return STOP, (law.lower, law.upper, law.stiffness, law.damping), -1
+        case Curve():
+            return CURVE, (0.0, 0.0, 0.0, 0.0), -1
+
+
+def _rows(vectors: Sequence[np.ndarray]) -> Float[np.ndarray, "r 3"]:
+    return np.array(vectors, float).reshape(-1, 3)
+
+
+def factored(
+    links: Sequence[Link], joints: Sequence[Attachment], c: Coefficients | None = None
+) -> list[DensePart]:
+    """All bodies with A = c_M M + c_K K0, or M alone."""
+    c_M, c_K = (1.0, 0.0) if c is None else (c.c_M, c.c_K)
+    return [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
+
+
+def as_arrays(system: Any, parts: Sequence[DensePart]) -> tuple[Bodies, Ends, Constraints]:
+    """A system's flat arrays, its bodies factored."""
+    model, k = system.model, system.unknowns
+    groups = [np.flatnonzero(joint.B.any(axis=0)) for joint in model.joints]
+    for each in system.constraints:
+        used = {n for term in each.terms for n in (term.i, term.j)}
+        columns = [np.flatnonzero(system.ends[n].onto.any(axis=(0, 1))) for n in used]
+        groups.append(np.unique(np.concatenate(columns)))
+    number, first = near_diagonal(groups, k)
+    bodies = body_arrays(model.links, model.joints, model.bodies, parts, number, first)
+    return bodies, end_arrays(system.ends, number), constraint_arrays(system.constraints)

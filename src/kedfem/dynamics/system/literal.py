@@ -1,0 +1,256 @@
+"""The oracle: a system as one writes it down, its tangents assembled anew at each iteration, until rounding is left.
+
+Unknown are the displacements u of all bodies (full rows, world components), the interface unknowns z, the forces λ at
+interface points and the multipliers m of constraints:
+
+    M [(1 − α_m) u1'' + α_m u0''] + (1 − α_f) (f1 − F1) + α_f (f0 − F0) = Wᵀ λ,   W u = B z,
+    Bᵀ λ = Cᵀ m + α_f C₀ᵀ μ₀,   e(z) = 0 of constraints,   m = −(1 − α_f) φ(e, e') of force laws
+
+Nothing of `step_kernel` or what it calls is used here: internal forces are those of `dynamics.frames`,
+coordinates those of `motion.values`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.ports import port_columns
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.substructure import mass_matrix
+from kedfem.dynamics.system.literal_places import force, placed, valued
+from kedfem.dynamics.system.record import (
+    Driven,
+    Held,
+    System,
+)
+from kedfem.errors import SolveError
+from kedfem.motion.rigid import RigidMotion
+
+ITERATIONS = 40
+DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
+SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
+SINGULAR = 1e-13  # singular values that redundant constraints leave
+Matrix = Float[np.ndarray, "n n"]
+Column = Float[np.ndarray, " n"]
+Seen = tuple[float, np.ndarray]
+"""Angle of a frame, and g, g', g'' (3, n, d) seen from it."""
+
+
+@dataclass(slots=True)
+class Now:
+    """One time: rows of all bodies flat, and what belongs to them; as `record.State`, but in nodal rows."""
+
+    u: Column
+    v: Column
+    a: Column
+    f: Column
+    F: Column
+    g: list[list[Seen]]
+    z: Column
+    e: Float[np.ndarray, "3 r"]
+    turned: Column
+    bearing: Column
+    damped: list[np.ndarray]
+    multiplier: Column = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass
+class Literal:
+    """Steps of a system by assembled tangents; `scheme` as any step's."""
+
+    system: System
+    scheme: Scheme
+
+    def __post_init__(self) -> None:
+        model = self.system.model
+        sizes = [link.unknowns for link in model.links]
+        ends = np.cumsum([0, *sizes])
+        self.of = [slice(a, b) for a, b in pairwise(ends)]
+        self.N, self.k = int(ends[-1]), self.system.unknowns
+        self.M = np.zeros((self.N, self.N))
+        for link, at in zip(model.links, self.of, strict=True):
+            self.M[at, at] = mass_matrix(link).toarray()
+        q = [len(joint.keep) for joint in model.joints]
+        self.W, self.B = np.zeros((sum(q), self.N)), np.zeros((sum(q), self.k))
+        row = 0
+        for link, joint, at in zip(model.links, model.joints, self.of, strict=True):
+            here = slice(row, row + len(joint.keep))
+            self.W[here, at], self.B[here] = port_columns(joint, link.n).T, joint.B
+            row = here.stop
+
+    def rates(
+        self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Newmark's formulas."""
+        n, r = self.scheme.acceleration, self.scheme.rate
+        return r[0] * (x - x0) - r[1] * v0 - r[2] * a0, n[0] * (x - x0) - n[1] * v0 - n[2] * a0
+
+    def step(self, old: Now, at: RigidMotion) -> Now:
+        """The state one step later.
+
+        Raises
+        ------
+        SolveError
+            If the iterations do not converge.
+        """
+        scheme, r = self.scheme, len(self.system.constraints)
+        hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
+        now = self._guess(old, at)
+        q, size = len(self.W), np.inf
+        lam, m = np.zeros(q), np.zeros(r)
+        tangent: Matrix | None = None
+        for _ in range(ITERATIONS):
+            self._evaluated(now, old, at)
+            e, C = self._coordinates(now.z, now.turned, at)
+            now.e[0] = e
+            now.e[1], now.e[2] = self.rates(e, *old.e)
+            for n, each in enumerate(self.system.constraints):
+                if n not in hard:
+                    m[n] = -(1 - scheme.alpha_f) * force(each, float(at.t[0]), now.e[0, n], now.e[1, n])[0]
+            left = [
+                self._unbalanced(now, old) - self.W.T @ lam,
+                self.W @ now.u - self.B @ now.z,
+                self.B.T @ lam - C.T @ m - scheme.alpha_f * old.bearing,
+                now.e[0, hard],
+            ]
+            if tangent is None:
+                tangent = self._tangent(now, old, at, C, m, hard)
+            change = _solution(tangent, -np.concatenate(left))
+            now.u = now.u + change[: self.N]
+            now.z = now.z + change[self.N : self.N + self.k]
+            lam += change[self.N + self.k : self.N + self.k + q]
+            m[hard] += change[self.N + self.k + q :]
+            before, size = size, float(np.abs(change[: self.N]).max())
+            tangent = None if size > SLOW * before else tangent
+            if size <= 1e-14 * max(1.0, np.abs(now.u).max()) or (size < 1e-11 and size > 0.5 * before):
+                return self._ended(now, old, at, m)
+        raise SolveError(f"oracle: iterations must converge, got a last change of {size:.3g}")
+
+    def _guess(self, old: Now, at: RigidMotion) -> Now:
+        h = self.scheme.h
+        u = old.u + h * old.v + h * h / 2 * old.a
+        F = self.applied(at)
+        zero = np.zeros_like(old.u)
+        z = np.linalg.lstsq(self.B, self.W @ u, rcond=None)[0] if self.k else old.z
+        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [])
+
+    def applied(self, at: RigidMotion) -> Column:
+        """P − M R0'' of all bodies, world components."""
+        model = self.system.model
+        every = zip(model.links, model.loads, model.bodies, strict=True)
+        return np.concatenate([applied(link, loads, at, body)[0].ravel() for link, loads, body in every])
+
+    def _evaluated(self, now: Now, old: Now, at: RigidMotion) -> None:
+        """Rates, and internal forces of all bodies."""
+        now.v, now.a = self.rates(now.u, old.u, old.v, old.a)
+        found = [self._force_of(k, now.u[own], old, at) for k, own in enumerate(self.of)]
+        now.f = np.concatenate([f for f, _, _ in found])
+        now.g, now.damped = [g for _, g, _ in found], [C for _, _, C in found]
+
+    def _force_of(
+        self, k: int, u: Column, old: Now, at: RigidMotion
+    ) -> tuple[Column, list[Seen], np.ndarray]:
+        """Internal force of body k, world components; deformations with their rates; damped quantities with theirs."""
+        link, damping = self.system.model.links[k], self.system.model.damping
+        R = at.R[0, self.system.model.bodies[k], : link.d, : link.d]
+        x = u.reshape(link.n, link.d) @ R
+        Mx = (mass_matrix(link) @ x.ravel()).reshape(x.shape)
+        if link.fit is None:
+            Kx = (link.K0 @ x.ravel()).reshape(x.shape)
+            C = damping.alpha * Mx + damping.beta * Kx
+            C = np.stack([C, *self.rates(C, *old.damped[k])])
+            return ((Kx + C[1]) @ R.T).ravel(), [], C
+        y = x + link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
+        C = damping.alpha * Mx
+        C = np.stack([C, *self.rates(C, *old.damped[k])])
+        f = C[1].copy()
+        seen: list[Seen] = []
+        for frame, (angle, g0) in zip(frames_of(link), old.g[k], strict=True):
+            Q, turn = rotation(link, frame.fit, y, angle)
+            g = deformation(link, y, Q, turn)
+            rates = self.rates(g, *g0)
+            f += frame_force(link, frame, Followed(Q, turn, g, *rates), y, damping.beta)[0]
+            seen.append((turn, np.stack([g, *rates])))
+        return (f @ R.T).ravel(), seen, C
+
+    def _unbalanced(self, now: Now, old: Now) -> Column:
+        s = self.scheme
+        inertia = self.M @ ((1 - s.alpha_m) * now.a + s.alpha_m * old.a)
+        return np.asarray(inertia + (1 - s.alpha_f) * (now.f - now.F) + s.alpha_f * (old.f - old.F))
+
+    def _tangent(
+        self, now: Now, old: Now, at: RigidMotion, C: np.ndarray, m: np.ndarray, hard: Sequence[int]
+    ) -> Matrix:
+        """Of all equations by all unknowns."""
+        s, N, k, q = self.scheme, self.N, self.k, len(self.W)
+        J = np.zeros((N + k + q + len(hard),) * 2)
+        J[:N, :N] = (1 - s.alpha_m) * s.a0 * self.M
+        for n, own in enumerate(self.of):
+            columns = []
+            for x in np.eye(own.stop - own.start) * DIFFERENCE:
+                f = [self._force_of(n, now.u[own] + sign * x, old, at)[0] for sign in (1, -1)]
+                columns.append((f[0] - f[1]) / (2 * DIFFERENCE))
+            J[own, own] += (1 - s.alpha_f) * np.array(columns).T
+        J[:N, N + k : N + k + q] = -self.W.T
+        J[N : N + q, :N], J[N : N + q, N : N + k] = self.W, -self.B
+        balance = slice(N + q, N + q + k)
+        J[balance, N + k : N + k + q] = self.B.T
+        for column, x in enumerate(np.eye(k) * DIFFERENCE):
+            pushed = []
+            for sign in (1, -1):
+                e, moved = self._coordinates(now.z + sign * x, now.turned.copy(), at)
+                pull, rate = m.copy(), self.rates(e, *old.e)[0]
+                for n, each in enumerate(self.system.constraints):
+                    if n not in hard:
+                        pull[n] = -(1 - s.alpha_f) * force(each, float(at.t[0]), e[n], rate[n])[0]
+                pushed.append(moved.T @ pull)
+            J[balance, N + column] = -(pushed[0] - pushed[1]) / (2 * DIFFERENCE)
+        J[balance, N + k + q :] = -C[hard].T
+        J[N + q + k :, N : N + k] = C[hard]
+        return J
+
+    def _coordinates(
+        self, z: Column, turned: Column, at: RigidMotion
+    ) -> tuple[Column, Float[np.ndarray, "r k"]]:
+        """All coordinates less their drives' travels, and their gradients."""
+        R, p = at.R[0], at.p[0]
+        e, C, place = (
+            np.zeros(len(self.system.constraints)),
+            np.zeros((len(self.system.constraints), self.k)),
+            0,
+        )
+        for n, each in enumerate(self.system.constraints):
+            for term in each.terms:
+                where = np.zeros(self.k) if each.linear else z
+                poses = [placed(self.system.ends[x], R, p, where) for x in (term.i, term.j)]
+                value, row, turned[place] = valued(self.system, term, poses, turned[place])
+                e[n] += term.factor * value
+                C[n] += term.factor * row
+                place += 1
+            drive = getattr(each.law, "drive", -1)
+            e[n] -= at.drives[0, drive] if drive >= 0 else 0.0
+            if each.linear:
+                e[n] = C[n] @ z
+        return e, C
+
+    def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column) -> Now:
+        self._evaluated(now, old, at)
+        e, C = self._coordinates(now.z, now.turned, at)
+        now.e = np.stack([e, *self.rates(e, *old.e)])
+        now.multiplier = m / (1 - self.scheme.alpha_f)
+        now.bearing = C.T @ now.multiplier
+        return now
+
+
+def _solution(J: Matrix, right: Column) -> Column:
+    """Of scaled equations, of least size where constraints repeat each other."""
+    rows = 1 / np.maximum(np.abs(J).max(axis=1), 1e-300)
+    scaled = J * rows[:, None]
+    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
+    found = np.linalg.lstsq(scaled * columns, right * rows, rcond=SINGULAR)[0]
+    return np.asarray(found * columns)

@@ -1,0 +1,122 @@
+"""The public march of a system: from any state, over any stretch of its nominal motion, to the state at its end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.dense import DensePart, rows_of, work_over_time
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.system.arrays import (
+    Bodies,
+    Coefficients,
+    Constraints,
+    Driving,
+    Ends,
+    History,
+    State,
+    copied,
+)
+from kedfem.dynamics.system.blank import empty_history, empty_trial, room
+from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
+from kedfem.dynamics.system.record import Driven, Held, Spring, System
+from kedfem.errors import SolveError
+from kedfem.motion.rigid import RigidMotion
+
+HALVINGS = 6  # a step is taken in up to 2⁶ parts
+Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
+"""Nominal motion at given times."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """A system made ready for steps of one length: all bodies factored once, everything as flat arrays."""
+
+    system: System
+    scheme: Scheme
+    c: Coefficients
+    parts: list[DensePart]
+    bodies: Bodies
+    ends: Ends
+    constraints: Constraints
+
+
+def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
+    """Factor all bodies of a system for a scheme."""
+    model = system.model
+    linear = all(each.linear and isinstance(each.law, Held | Driven | Spring) for each in system.constraints)
+    single = linear and all(link.fit is None for link in model.links)
+    c = coefficients(scheme, model.damping, model.links, single, tolerance)
+    parts = factored(model.links, model.joints, c)
+    return Ready(system, scheme, c, parts, *as_arrays(system, parts))
+
+
+def driving(of: Ready, motion: RigidMotion) -> Driving:
+    """The nominal motion and loads on all coordinates over the times of a motion."""
+    model = of.system.model
+    F = [
+        work_over_time(part, applied(link, loads, motion, body)).reshape(len(motion.t), -1)
+        for part, link, loads, body in zip(of.parts, model.links, model.loads, model.bodies, strict=True)
+    ]
+    drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
+    return Driving(motion.t, motion.R, motion.p, np.ascontiguousarray(drives), np.concatenate(F, axis=1))
+
+
+def march(
+    of: Ready, state: State, motion: RigidMotion, between: Motion | None = None, halvings: int = HALVINGS
+) -> tuple[State, History]:
+    """All steps to the times of a motion, one after the other; the state that is given stays as it is.
+
+    Parameters
+    ----------
+    motion : at the ends of the steps
+    between : nominal motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts
+
+    Raises
+    ------
+    SolveError
+        If the iterations of a step do not converge: with its time and the body that moves most.
+    """
+    from kedfem.dynamics.system.step_kernel import marched
+
+    arrays = of.bodies, of.ends, of.constraints
+    state, along, T, done = copied(state), driving(of, motion), len(motion.t), 0
+    history = empty_history(T, of.bodies, of.constraints)
+    trial, work = empty_trial(*arrays, state), room(of.bodies)
+    while done < T:
+        left = Driving(*(x[done:] for x in along)), History(*(x[done:] for x in history))
+        taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1])
+        done += int(taken)
+        if done < T:
+            last = float(motion.t[done])
+            if between is None or not halvings:
+                raise SolveError(_unsettled(of, last, int(worst)))
+            state, parts = _in_parts(of, state, last, between, halvings)
+            for row, found in zip(history, parts, strict=True):
+                row[done] = found[-1]
+            done += 1
+    return state, history
+
+
+def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
+    """One step in two, each of these in two again where it must be."""
+    finer = ready(of.system, replace(of.scheme, h=of.scheme.h / 2), of.c.tolerance)
+    return march(finer, state, between(last - finer.c.h * np.array([1.0, 0.0])), between, halvings - 1)
+
+
+def _unsettled(of: Ready, t: float, worst: int) -> str:
+    """What to do about a step whose iterations do not converge."""
+    name = f"link '{of.system.names[worst]}'" if worst >= 0 else "a joint or force element"
+    return (
+        f"analysis: the iterations of a step must converge, got none that do at t = {t:.6g} s; {name} moves most from "
+        "one to the next: take a smaller step, or more numerical damping (rho_inf)"
+    )
+
+
+def displacements(of: Ready, k: int, x: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T n d"]:
+    """Rows of body k's state, or of its rates, over time from the coordinates of all bodies."""
+    link, bodies = of.system.model.links[k], of.bodies
+    own = x[:, bodies.at[k] : bodies.at[k + 1]].reshape(len(x), link.d, link.n)
+    return rows_of(link, of.parts[k], own)

@@ -1,0 +1,134 @@
+"""The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
+TIME, RATE, COORDINATE = range(3)
+GAP, TURN, ANGLE, DISTANCE = range(4)
+RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID = range(6)
+NOMINAL, COROTATIONAL, TANGENTIAL = range(3)
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A constraint: the coordinate is zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """A constraint: the coordinate is that of a drive, by its number."""
+
+    drive: int
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """A spring and damper: force k (e − free) + c e' against the coordinate e [N/m or N m; N s/m or N m s].
+
+    drive : number of a drive whose travel is taken from the coordinate, as of a shaft that gives; −1: none
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    free: float = 0.0
+    drive: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A force along the coordinate: linear between values, held outside.
+
+    over : TIME, RATE or COORDINATE
+    """
+
+    over: int
+    at: tuple[float, ...]
+    value: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A one-sided limit at each end of a range: stiffness and damping beyond it, a push and never a pull."""
+
+    lower: float
+    upper: float
+    stiffness: float
+    damping: float = 0.0
+
+
+Law = Held | Driven | Spring | Curve | Stop
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """What a constraint or force law has on one body: a point, and the orientation of the surface there.
+
+    body : number in the linkage
+    form : RIGID: moves with the nominal motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
+        PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are known
+    origin : (3,) its point as drawn [m]
+    directions : (3, 3) rows e_k as drawn, of which the first `known` are followed by interface points
+    lengths : (3,) how far off the origin these points are [m]
+    onto : (p, d, k) displacements of the interface points, world components, from the interface unknowns z
+    """
+
+    body: int
+    form: int
+    origin: Vector
+    directions: Float[np.ndarray, "3 3"]
+    lengths: Vector
+    known: int
+    onto: Float[np.ndarray, "p d k"]
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A scalar function of two ends, by their numbers: directions and points as drawn.
+
+    kind : GAP: b · (x_i − x_j), b fixed in j; TURN: a · b, a fixed in i; ANGLE: turn of i against j about b from a_j in j
+        to a in i; DISTANCE: |x_i − x_j|
+    a, a_j : points of i and j [m], or directions [-]
+    """
+
+    kind: int
+    i: int
+    j: int
+    a: Vector
+    a_j: Vector
+    b: Vector
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Constraint:
+    """A coordinate, the sum of its terms, and the law that it obeys.
+
+    name : of the joint or force element
+    linear : whether the nominal motion tells its directions, so that it is linear in z; else the bodies themselves do
+    """
+
+    name: str
+    terms: tuple[Term, ...]
+    law: Law
+    linear: bool
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Bodies, ends and constraints of a mechanism, each a record of its own.
+
+    links, joints : of the elastic model, in the order of the bodies
+    names : of the bodies, for messages
+    """
+
+    names: tuple[str, ...]
+    ends: tuple[End, ...]
+    constraints: tuple[Constraint, ...]
+    unknowns: int
+    model: Any

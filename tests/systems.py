@@ -1,0 +1,97 @@
+"""Scenes as systems, marched from rest; the same by the oracle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.dynamics.frames import frames_of
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.start import initial_rates
+from kedfem.dynamics.system.arrays import History, State
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.literal import Literal, Now
+from kedfem.dynamics.system.march import Ready, displacements, march, ready
+from kedfem.dynamics.system.start import rest
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import path_parameter, scene_from, time_grid
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A system at rest at t = 0, and its nominal motion."""
+
+    prepared: Prepared
+    ready: Ready
+    state: State
+    motion: Callable[[np.ndarray], RigidMotion]
+
+    def steps(self, count: int, first: int = 1) -> RigidMotion:
+        """The nominal motion at the ends of successive steps."""
+        return self.motion(self.ready.c.h * np.arange(first, first + count))
+
+
+def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True) -> Begun:
+    """A scene as a system.
+
+    Parameters
+    ----------
+    frames : given after the scene has been checked: what today's solvers refuse
+    driven : whether its drives stay
+    """
+    raw = {**raw, "analysis": {**raw["analysis"], "initial": "rest"}}
+    scene = scene_from(raw)
+    if frames is not None:
+        scene.analysis.fill(frames=frames)
+    if not driven:
+        scene.fill(drive=None, drives={})
+    made = meshed(scene)
+    system = system_of(scene, made.linkage, made.path)
+    of = ready(system, generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf))
+
+    def motion(t: np.ndarray) -> RigidMotion:
+        return rigid_motion(made.linkage, made.path, t, path_parameter(scene, t))
+
+    rates = initial_rates(scene, made.linkage, system.model)
+    return Begun(made, of, rest(of, motion, rates), motion)
+
+
+def rows(of: Ready, x: np.ndarray) -> np.ndarray:
+    """All bodies' rows, flat, over time (T, N)."""
+    every = [displacements(of, k, x).reshape(len(x), -1) for k in range(len(of.system.names))]
+    return np.concatenate(every, axis=1)
+
+
+def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start."""
+    solver, start = Literal(of.ready.system, of.ready.scheme), of.state
+    links = of.ready.system.model.links
+    u, v, a = (rows(of.ready, x[None])[0] for x in (start.u, start.v, start.a))
+    at = of.motion(np.zeros(1))
+    none = [np.zeros((3, link.n, link.d)) for link in links]
+    seen = [[(0.0, x.copy()) for _ in frames_of(link)] for link, x in zip(links, none, strict=True)]
+    z = np.linalg.lstsq(solver.B, solver.W @ u, rcond=None)[0]
+    C = solver._coordinates(z, start.turned.copy(), at)[1]
+    now = Now(
+        u, v, a, np.zeros_like(u), solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
+        C.T @ start.multiplier, none,
+    )  # fmt: skip
+    along, out = of.steps(count), []
+    for k in range(count):
+        now = solver.step(now, along.part(k, k + 1))
+        out.append((now.u, now.multiplier))
+    return np.stack([u for u, _ in out]), np.stack([m for _, m in out])
+
+
+def against_oracle(of: Begun, count: int = 3) -> float:
+    """Largest difference of displacements, of their peak."""
+    _, history = march(of.ready, of.state, of.steps(count))
+    wanted = by_oracle(of, count)[0]
+    return float(np.abs(rows(of.ready, history.u) - wanted).max() / np.abs(wanted).max())
+
+
+def marched(of: Begun, count: int) -> tuple[State, History]:
+    """The first steps."""
+    return march(of.ready, of.state, of.steps(count))
