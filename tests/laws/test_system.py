@@ -1,13 +1,15 @@
 """One system, one step: equal to the oracle, to today's solvers where these are right, and right where they are not."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Held, Spring
+from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.record import Held, Spring, Stop
+from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.transient import steps_of, transient
 from tests.moving import bar, rising
 from tests.spatial_joints import BEAMS
@@ -79,6 +81,18 @@ def test_planar_beams_move_as_by_todays_solvers(frames: str, within: float) -> N
     wanted = old_displacements(of)
     _, history = marched(of, len(wanted))
     assert np.abs(rows(of.ready, history.u) - wanted).max() < within * np.abs(wanted).max()
+
+
+def test_springs_and_motors_move_as_by_todays_solver() -> None:
+    """Undamped, as that solver has another rate of a spring's length; a torque that does not depend on speed."""
+    more = elements()
+    more["springs"]["line"]["damping"] = more["springs"]["turn"]["damping"] = 0.0
+    more["motors"]["m"]["torque"] = 5.0
+    of = begun(four_bar(**more))
+    wanted = old_displacements(of)
+    state, history = marched(of, len(wanted))
+    assert np.abs(rows(of.ready, history.u) - wanted).max() < 1e-10 * np.abs(wanted).max()
+    assert state.passes[2] > 1
 
 
 CELLS = [("nominal", True, 1e-8), ("following", True, 1e-7), ("following", False, 1e-7)]
@@ -183,3 +197,39 @@ def test_a_motor_pushes_along_a_slide_that_turns() -> None:
 def free_slide(raw: Raw) -> Begun:
     """A scene that today is refused because its slide moves and is free: its second drive is taken away after checks."""
     return begun(raw, "following")
+
+
+def stopped(lower: float) -> Begun:
+    """An arm that falls onto a stop at an angle of its hinge."""
+    links = {"arm": bar("beam", (0, 0), (0.3, 0), 2)}
+    raw: Raw = {
+        "links": links, "joints": {"A": {**HINGE, "links": ["ground", "arm"], "at": [0, 0]}}, "gravity": [0, -9.81, 0],
+        "springs": {"s": {"kind": "torsion", "joint": "A", "stiffness": 1.0}},
+        "analysis": {"end_time": 0.1, "step": 5e-4, "rho_inf": 0.8},
+    }  # fmt: skip
+    of = begun(raw)
+    (spring,) = of.ready.system.constraints
+    stop = replace(spring, law=Stop(lower, 1.0, 2e3, 5.0))
+    made = ready(replace(of.ready.system, constraints=(stop,)), of.ready.scheme)
+    return Begun(of.prepared, made, rest(made, of.motion), of.motion)
+
+
+def test_a_stop_pushes_and_never_pulls() -> None:
+    """Free before it, 3/4 g/L t² of a rod; at it √(2 k E) of a rigid one."""
+    of = stopped(-0.02)
+    _, history = marched(of, 200)
+    angle, push = history.e[:, 0], history.multiplier[:, 0]
+    t = of.ready.c.h * np.arange(1, 201)
+    before = 0.75 * 9.81 / 0.3 * t**2 < 0.018
+    assert_allclose(angle[before][-1], -0.75 * 9.81 / 0.3 * t[before][-1] ** 2, rtol=0.02)
+    assert push.min() >= 0
+    assert_array_equal(push[angle > -0.0199], 0.0)
+    fall = 7850 * 0.03 * 0.02 * 0.3 * 9.81 * 0.15 * 0.02  # J
+    assert_allclose(push.max(), np.sqrt(2 * 2e3 * fall), rtol=0.15)  # it bends, and the stop damps
+
+
+def test_a_stop_moves_as_by_the_oracle() -> None:
+    """Met in the second step."""
+    of = stopped(-5e-6)
+    assert marched(of, 4)[1].multiplier.max() > 0
+    assert against_oracle(of, 4) < 1e-7

@@ -142,7 +142,10 @@ def _point_side(
     if link.kind == "beam" and np.linalg.norm(rows.X - at) > 1e-6 * link.size:
         raise SceneError(f"{where}: must lie on the axis of beam '{on}', got {at.tolist()}")
     d = link.d
-    side = Side(ways.bodies[on], rows.X, only_u[:, :, :d], np.zeros((1, d, 0)), points=rows.X[None])
+    known = only_u[:, :, :d].copy()
+    if link.kind == "beam":
+        known[0, [2, 5], 2] = 0.0, 1.0  # (u, v, ψ)
+    side = Side(ways.bodies[on], rows.X, known, np.zeros((1, d, 0)), points=rows.X[None])
     return side, Own(key, "", rows.X[None], rows.value[None], np.eye(d))
 
 
