@@ -35,8 +35,8 @@ ITERATIONS = 40
 DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 SINGULAR = 1e-13  # singular values that redundant constraints leave
-Matrix = Float[np.ndarray, "n n"]
-Column = Float[np.ndarray, " n"]
+Matrix = Float[np.ndarray, "_ _"]
+Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
 """Angle of a frame, and g, g', g'' (3, n, d) seen from it."""
 

@@ -27,7 +27,7 @@ from kedfem.dynamics.system.record import (
 from kedfem.motion.rows import Row, stacked
 from kedfem.motion.values import features, jacobian
 
-Column = Float[np.ndarray, " n"]
+Column = Float[np.ndarray, " _"]
 
 
 def force(each: Constraint, t: float, e: float, rate: float) -> tuple[float]:
