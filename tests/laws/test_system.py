@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.record import Held, Spring, Stop
+from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Held, Spring, Stop
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.transient import steps_of, transient
 from tests.moving import bar, rising
