@@ -176,6 +176,16 @@ def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
     assert (results.status, len(results.time)) == ("complete", 361)
 
 
+def test_quick_takes_plain_defaults_and_says_how_exact_they_are(run_kedfem: Command, arm: Path) -> None:
+    arm.write_text(arm.read_text(encoding="utf-8").replace('accuracy = "quick"\n', ""), encoding="utf-8")
+    said = run_kedfem("run", arm, "--quick")
+    assert said.code == 0
+    assert "Chosen for" not in said.out
+    for words in ("Estimated error, of each channel's largest value", "mesh", "step", "frames", "together"):
+        assert words in said.out
+    assert "Chosen for 1 %" in run_kedfem("run", arm).out
+
+
 def test_the_largest_value_of_the_table_is_that_of_the_file(run_kedfem: Command, arm: Path) -> None:
     said = run_kedfem("run", arm)
     _, tip = read_results(Path("arm-results/results.h5")).channels["probes/middle_and_tip/displacement"]

@@ -29,6 +29,7 @@ ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
 FIRST, MOST = 4, 400  # steps that are tried: first a few, then as many as take about ENOUGH, at most these
 ENOUGH = 0.3  # seconds
+TIMES = 6.0  # of the first few steps, at least: the start takes its time too
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +107,7 @@ def tried_cost(
     few = min(FIRST, total)
     seconds(few)  # compiled code is loaded
     once = seconds(few)
-    more = int(min(max(ENOUGH / max(once, 1e-6), 1.0) * few, MOST, total))
+    more = int(min(max(ENOUGH / max(once, 1e-6), TIMES) * few, MOST, total))  # beside what a start takes
     step = once / few if more <= few else max(seconds(more) - once, 0.0) / (more - few)
     return replace(cost, factor=factor, steps=once + step * (total - few), tried=max(more, few))
 
