@@ -11,6 +11,7 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.bench.scenes import mechanisms
 from kedfem.scene import scene_from
+from tests.runs import ran
 
 from .test_dynamics import four_bar
 
@@ -61,8 +62,8 @@ def test_a_rigid_link_is_one_of_a_very_stiff_material(kind: str, link: str) -> N
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
 def test_a_linkage_of_rigid_links_needs_the_torque_of_virtual_work(kind: str) -> None:
-    found = run(scene(kind, rigid=("crank", "coupler", "rocker")))
-    torque, rigid = (found.channels[f"drive/{name}"][1][10:] for name in ("torque", "rigid_torque"))
+    found = ran(scene(kind, rigid=("crank", "coupler", "rocker")))
+    torque, rigid = (found.channel(f"drive/{name}")[10:] for name in ("torque", "rigid_torque"))
     assert_allclose(torque, rigid, rtol=0, atol=1e-5 * np.abs(rigid).max())  # once the start has died away
 
 
