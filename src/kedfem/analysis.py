@@ -380,7 +380,7 @@ def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath
     if animation and animation.exaggeration != 1.0:
         title += f", deformation × {animation.exaggeration:g}"
     try:
-        write_picture(folder / WORST, folder / PICTURE, title)
+        write_picture(folder / WORST, folder / PICTURE, title, scene.gravity)
     except OutputError as err:
         return (str(err),)
     return ()

@@ -4,6 +4,7 @@ import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -13,7 +14,7 @@ from kedfem.errors import OutputError
 from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
 from kedfem.output.abscissa import abscissa
 from kedfem.output.plots import drawn_over, envelope
-from kedfem.output.rendering import shape_functions, sight
+from kedfem.output.rendering import shape_functions, sight, view
 from kedfem.output.units import prefixed
 from kedfem.results import Channel, Results
 
@@ -412,3 +413,23 @@ def test_a_machine_where_vtk_crashes(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ):
         write_picture(vtu, tmp_path / "picture.png", "")
     assert not (tmp_path / "picture.png").exists()
+
+
+def test_what_the_table_calls_nothing_is_not_drawn(tmp_path: Path) -> None:
+    """1.5 nN m beside 64 N m; alone it is all that there is, and is drawn."""
+    large, small = (Channel(f"joints/{x}/moment", ("z",), "N m", "world", "moment") for x in "AB")
+    time = np.linspace(0.0, 1.0, 5)
+    kept = {"joints/B/moment": (small, np.full((5, 1), 1.5e-9))}
+    both = {"joints/A/moment": (large, np.full((5, 1), 64.0)), **kept}
+    for channels, names in ((both, ["joints-A-moment.png"]), (kept, ["joints-B-moment.png"])):
+        results = Results(time, time, channels, "complete", "{}")
+        assert [path.name for path in write_plots(results, tmp_path)] == names
+
+
+def test_gravity_points_down_the_page_unless_it_is_looked_along() -> None:
+    grid = SimpleNamespace(
+        points=np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0.05]]), length=1.4, celltypes=np.array([3]),
+        point_data={"von_mises": np.zeros(3)}, extract_cells=lambda kept: SimpleNamespace(n_cells=0),
+    )  # fmt: skip
+    for gravity, up in (((0, 0, 0), (0, 1, 0)), ((-9.8, 0, 0), (1, 0, 0)), ((0, 0, -9.8), (0, 1, 0))):
+        assert view(grid, np.array(gravity, float)).up @ up > 0.9

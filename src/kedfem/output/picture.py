@@ -13,7 +13,9 @@ TIMEOUT = 300
 ADVICE = "picture: must be drawn by VTK, for which Linux without a display needs libEGL (package libegl1)"
 
 
-def write_picture(vtu: Path, png: Path, title: str) -> None:
+def write_picture(
+    vtu: Path, png: Path, title: str, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> None:
     """Draw the links of a VTU file, deformed as they are there, coloured by von Mises stress.
 
     VTK draws in a process of its own: without any way to open a window it ends by a segmentation fault, and
@@ -27,6 +29,8 @@ def write_picture(vtu: Path, png: Path, title: str) -> None:
         The picture.
     title
         Written above; long ones are wrapped.
+    gravity : (3,) [m/s²]
+        Points down in the picture, unless it is looked along.
 
     Raises
     ------
@@ -38,7 +42,7 @@ def write_picture(vtu: Path, png: Path, title: str) -> None:
         raise OutputError(f"{vtu}: must be a frame of the animation, got no such file")
     with replacing(Path(png)) as part:
         drawing = Path(__file__).with_name("rendering.py")
-        command = [sys.executable, "-P", str(drawing), str(vtu), str(part), title]
+        command = [sys.executable, "-P", str(drawing), str(vtu), str(part), title, *map(str, gravity)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
         except subprocess.TimeoutExpired as error:

@@ -34,6 +34,7 @@ MARK = "kedfem plot"
 def write_plots(results: Results, folder: Path) -> list[Path]:
     """Plot every channel: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and ``joint_forces.png`` for all joints.
 
+    What the table of a run calls ≈ 0 is left out.
     What there is of rigid links too is drawn with it, dashed. Angles are in degrees.
 
     Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
@@ -61,7 +62,12 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         return []
     along = drawn_over(results)
     written = []
+    highest: dict[str, float] = {}
+    for channel, values in results.channels.values():
+        highest[channel.unit] = max(highest.get(channel.unit, 0.0), _largest(values))
     for picture in pictures(results):
+        if picture.channel and _negligible(picture.panels, highest.get(picture.channel.unit, 0.0)):
+            continue
         path = Path(folder) / f"{picture.name}.png"
         with _saved(path, _title(picture.title, picture.channel, results)) as figure:
             _draw_panels(figure, along, picture.panels)
@@ -69,10 +75,21 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
     return written
 
 
+def _largest(values: Float[np.ndarray, "..."]) -> float:
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+
+
+def _negligible(panels: list[Panel], highest: float) -> bool:
+    """Whether there is rounding only, which the table of a run tells as ≈ 0; nothing at all is drawn, once."""
+    largest = [_largest(y) for _, _, curves in panels for y in curves.values()]
+    return highest > 0 and max(largest, default=0.0) <= NEGLIGIBLE * highest
+
+
 def drawn_over(results: Results) -> Abscissa:
     """The drive angle or time; time alone where channels tell of a drive that slides, or of several."""
     of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
-    if results.drive.unit == "m" or any(len(parts) > 1 for parts in of_drives):
+    slides = results.drive.unit == "m"
+    if slides or any(len(parts) > 1 or parts[0] in {"force", "rigid_force"} for parts in of_drives):
         return Abscissa(results.time, over_time=True)
     return abscissa(results.time, results.angle)
 

@@ -61,19 +61,19 @@ class View:
     size: Float[np.ndarray, " 2"]
 
 
-def render(vtu: str, png: str, title: str) -> None:
+def render(vtu: str, png: str, title: str, *gravity: str) -> None:
     """Draw a frame.
 
     Parameters
     ----------
-    vtu, png, title
+    vtu, png, title, gravity
         As in :func:`kedfem.output.write_picture`.
     """
     import pyvista
 
     grid: Any = pyvista.read(vtu)
     grid.point_data["MPa"] = grid.point_data["von_mises"] / 1e6
-    shown = view(grid)
+    shown = view(grid, np.array([float(x) for x in gravity or (0, 0, 0)]))
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
@@ -130,12 +130,14 @@ def _flat(lines: Any, width: float, colour: str) -> Any:
     return actor
 
 
-def view(grid: Any) -> View:
+def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
     """The view of a linkage, all of it in the picture; from behind where only so the highest stress is seen."""
     direction, upwards = sight(np.ptp(grid.points, axis=0))
     behind = direction * np.where(np.abs(direction) == np.abs(direction).max(), -1.0, 1.0)
     if hidden(grid, direction) and not hidden(grid, behind):
         direction = behind
+    if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
+        upwards = -gravity
     across = np.cross(upwards, direction)
     across /= np.linalg.norm(across)
     up = np.cross(direction, across)

@@ -91,7 +91,7 @@ def _channel(scene: Scene, model: Model, linked: Linkage, name: str, probe: Prob
 
 
 def _place(link: str, X: Drawn) -> str:
-    return f"of link {link} at ({', '.join(f'{x:.6g}' for x in X)}) m as drawn"
+    return f"of link {link} at ({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in X)}) m as drawn"
 
 
 def _words(linked: Linkage, probe: Probe) -> str:
@@ -208,7 +208,7 @@ def _deflection(
         R = _along(frame(block)[2], drawn, second.position(block) - start)
         return _seen(point.position(block) - start, R, point.X - first.X, axes)
 
-    ends = " to ".join(f"({', '.join(f'{x:.6g}' for x in P.X)})" for P in (first, second))
+    ends = " to ".join(f"({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in P.X)})" for P in (first, second))
     return from_chord, f"deflection from the chord {ends},"
 
 
