@@ -1,7 +1,6 @@
 """Some forty parts as designers draw them, blends everywhere; ``python -m geometry.catalogue`` meshes them all.
 
-Each is a function that draws one solid with gmsh's OpenCASCADE, in millimetres; the table goes to docs/catalogue.md, the
-picture to docs/pictures/catalogue.png.
+Each is a function that draws one solid with gmsh's OpenCASCADE, in millimetres; the table goes to docs/catalogue.md.
 """
 
 import sys
@@ -35,7 +34,6 @@ from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.bounds import determinant_bounds
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.ways import made_mesh
-from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -709,10 +707,8 @@ def row(name: str, folder: Path) -> tuple[str, SolidMesh | None]:
 HEAD = """# Parts as designers draw them, meshed at default sizes
 
 Written by `python -m geometry.catalogue`: each part is drawn by geometry/catalogue.py, written to STEP (two to BREP, in inches
-and in metres) and meshed as it comes. Seconds are of processor time, and contain writing nothing. det J is the least proven in
+and in metres) and meshed as it comes. Seconds are of processor time. det J is the least proven in
 any element, over its mean there. {summary}
-
-![Some of them](pictures/catalogue.png)
 
 | part | outcome | unknowns | seconds | worst scaled Jacobian | least det J | volume against CAD [%] |
 |---|---|---:|---:|---:|---:|---:|
@@ -738,12 +734,6 @@ def main() -> None:
     (DOCS / "catalogue.md").write_text(
         HEAD.format(summary=summary) + "\n".join(lines) + "\n", encoding="utf-8"
     )
-    shown = [
-        (f"{name}\n{3 * len(mesh.points):,} unknowns", mesh)
-        for name, mesh in meshes[:: len(meshes) // 12][:12]
-        if mesh
-    ]
-    write_mesh_picture(shown, DOCS / "pictures" / "catalogue.png", "Parts of the catalogue at default sizes")
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ from kedfem.store import contents, itself, kept
 ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other way is tried
 FAIR = 0.2  # of hexahedra that are taken before tetrahedra
 FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some micrometres are in it
+MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
 NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
 TRIES = 6  # meshes made in search of a number of unknowns
 LONGEST = 180  # seconds of processor time after which a part is given up
@@ -240,11 +241,13 @@ def best_mesh(
             reasons.append(str(error).removeprefix(f"{solid.name}: "))
             continue
         least = mesh_quality(form(mesh)).least
+        many = sizing.size is None and sizing.across <= 2 and 3 * len(form(mesh).points) > MOST
         told = [mesh.way, *reasons[:1]]  # the first says what is in the way, of layers
-        if mesh.tetrahedra or least >= ENOUGH:
+        if mesh.tetrahedra or (least >= ENOUGH and not many):
             return replace(mesh, way="; ".join(told))
-        found.append((least, replace(mesh, way="; ".join(told))))
-        reasons.append(f"{mesh.way}: worst scaled Jacobian {least:.2g}")
+        found.append((least - many, replace(mesh, way="; ".join(told))))  # many: behind all others
+        unfit = f"{3 * len(form(mesh).points):,} unknowns" if many else f"worst scaled Jacobian {least:.2g}"
+        reasons.append(f"{mesh.way}: {unfit}")
     if not found:
         raise MeshError(
             f"{where}: must be a solid that can be meshed, got none: {'; '.join(reasons)}; "
