@@ -15,7 +15,6 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.row_joints import needs_rows
 from kedfem.motion.linkage import joint_axis
-from kedfem.results.recording import recording
 from kedfem.scene import GROUND
 from tests.joint_checks import (
     LENGTH,
@@ -54,18 +53,6 @@ def rounding(kind: str) -> float:
     return ROUNDING["rigid" if "rigid" in kind else "beams"]
 
 
-def whole(ready: Prepared, blocks: list[Block]) -> dict[str, np.ndarray]:
-    """All channels; of rigid forces that statics tells in two directions of the world only the third is none."""
-    found = channels(ready, blocks)
-    for each in recording(ready.scene, ready.model, along=ready.path):
-        name, columns = each.channel.name, each.channel.columns
-        if "/rigid_" in name and set(columns) < {"x", "y", "z"}:
-            given = found[name]
-            found[name] = np.zeros((len(given), 3))
-            found[name][:, ["xyz".index(c) for c in columns]] = given
-    return found
-
-
 def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: float) -> None:
     """Link-frame deflections of all links, forces, moments and torques of all joints, drives and gears, turned back."""
     (ready, blocks), (_, again) = one, other
@@ -76,7 +63,7 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
     for k in links:
         # of the functions of a beam in space some are slopes, whose values turn with their own directions
         assert_allclose(state(again, k, "g") @ R, state(blocks, k, "g"), atol=digits * size)
-    here, there = whole(*one), whole(*other)
+    here, there = channels(*one), channels(*other)
     # what statics tells of rigid links depends on which axes of the world their redundant directions lie along
     elastic = [name for name in here if "/rigid_" not in name]
     loads = [name for name in elastic if name.split("/")[0] in {"joints", "drive", "gears"}]
