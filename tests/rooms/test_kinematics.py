@@ -17,10 +17,11 @@ from kedfem.cli import USER_ERROR
 from kedfem.dynamics.inertias import inertias_of_links
 from kedfem.kinematics import coarse, kinematics, rigid_links, worst_angle
 from kedfem.links.build import bare_links
+from kedfem.mesh.cad.sides import boundary_sides
 from kedfem.motion.coordinates import coordinates, counted_on
 from kedfem.motion.linkage import linkage
 from kedfem.motion.transmission import transmissions
-from kedfem.output.rigid_frames import outer_sides, rigid_fields, sights
+from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.results import read_results
 from kedfem.results.kinematic import kinematics_of, plane_normal
 from kedfem.scene import Scene, drive_angle, scene_from
@@ -245,9 +246,9 @@ def test_planar_motion_in_any_plane_is_recorded_as_angles() -> None:
     assert_allclose((v, a), 0.0, atol=1e-9)
 
 
-def test_outer_sides_of_two_hexahedra_leave_out_the_one_between() -> None:
+def test_boundary_sides_of_two_hexahedra_leave_out_the_one_between() -> None:
     cells = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]])
-    sides = {tuple(sorted(side)) for side in outer_sides(cells)}
+    sides = {tuple(sorted(side)) for side in boundary_sides(cells)}
     assert len(sides) == 10
     assert (4, 5, 6, 7) not in sides
 
