@@ -33,13 +33,14 @@ class Begun:
         return self.motion(self.ready.c.h * np.arange(first, first + count))
 
 
-def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True) -> Begun:
+def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True, **unchecked: Any) -> Begun:
     """A scene as a system.
 
     Parameters
     ----------
     frames : given after the scene has been checked: what today's solvers refuse
     driven : whether its drives stay
+    unchecked : sections put in after the check
     """
     raw = {**raw, "analysis": {**raw["analysis"], "initial": "rest"}}
     scene = scene_from(raw)
@@ -47,6 +48,7 @@ def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True) -
         scene.analysis.fill(frames=frames)
     if not driven:
         scene.fill(drive=None, drives={})
+    scene.fill(**unchecked)
     made = meshed(scene)
     system = system_of(scene, made.linkage, made.path)
     of = ready(system, generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf))

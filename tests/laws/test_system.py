@@ -11,6 +11,7 @@ from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Held, Spring, Stop
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.transient import steps_of, transient
+from kedfem.scene import Gear, Motor
 from tests.moving import bar, rising
 from tests.spatial_joints import BEAMS
 from tests.systems import Begun, against_oracle, begun, marched, rows
@@ -137,11 +138,12 @@ def geared_arms(frames: str | None, driven: bool) -> Begun:
         "A": {**HINGE, "links": ["ground", "one"], "at": [0, 0]},
         "B": {**HINGE, "links": ["ground", "two"], "at": [0.5, 0]},
     }
-    raw: Raw = {"links": links, "joints": joints, "gears": {"g": {"joints": ["A", "B"], "ratio": -1.0}}}
+    raw: Raw = {"links": links, "joints": joints}
+    gears = {"g": Gear(joints=("A", "B"), ratio=-1.0)}
     raw |= {"analysis": {"end_time": 0.1, "step": 1e-3, "rho_inf": 0.8}}
     if driven:
-        return begun({**raw, "drive": {"joint": "A", "motion": rising(1.0)}}, frames)
-    return begun({**raw, "motors": {"m": {"joint": "A", "torque": 1.0}}})
+        return begun({**raw, "drive": {"joint": "A", "motion": rising(1.0)}}, frames, gears=gears)
+    return begun({**raw, "motors": {"m": {"joint": "A", "torque": 1.0}}}, gears=gears)
 
 
 def test_gears_couple_links_that_nothing_drives() -> None:
@@ -180,11 +182,11 @@ def test_a_motor_pushes_along_a_slide_that_turns() -> None:
         "S": {"kind": "prismatic", "links": ["block", "arm"], "at": [0.2, 0], "axis": "x"},
     }
     raw: Raw = {
-        "links": links, "joints": joints, "motors": {"m": {"joint": "S", "force": force}},
+        "links": links, "joints": joints,
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
         "drives": {}, "analysis": {"end_time": end, "step": 2e-4, "rho_inf": 0.8},
     }  # fmt: skip
-    of = free_slide(raw)
+    of = begun(raw, "following", motors={"m": Motor(joint="S", force=force)})  # today refused
     count = round(end / 2e-4)
     _, history = marched(of, count)
     mass = 7850 * 0.03 * 0.02 * 0.04
@@ -192,11 +194,6 @@ def test_a_motor_pushes_along_a_slide_that_turns() -> None:
     moved = (0.22 + ratio) * (np.cosh(speed * end) - 1)
     motor = next(k for k, x in enumerate(of.ready.system.constraints) if x.name == "motors.m")
     assert_allclose(history.e[-1, motor], moved, rtol=5e-3)  # the arm bends: 6e-4 of its length
-
-
-def free_slide(raw: Raw) -> Begun:
-    """A scene that today is refused because its slide moves and is free: its second drive is taken away after checks."""
-    return begun(raw, "following")
 
 
 def stopped(lower: float) -> Begun:
