@@ -104,12 +104,12 @@ def test_no_animation_changes_the_highest_stress(tmp_path: Path) -> None:
     envelope = meshio.read(tmp_path / "2" / "envelope.vtu")
     found = envelope.point_data["highest von Mises stress [Pa]"]
     elastic = ~np.isnan(found)
-    assert_allclose(found[elastic], highest[elastic], atol=10 * EXACT * highest.max())
+    assert_allclose(found[elastic], highest[elastic], atol=10 * EXACT * np.nanmax(highest))
     assert none.peak is not None
-    assert_allclose(none.peak.stress, highest.max(), rtol=10 * EXACT)
+    assert_allclose(none.peak.stress, np.nanmax(highest), rtol=10 * EXACT)
     assert set(none.peaks) == {"coupler", "rocker"}  # the crank is rigid
     worst = meshio.read(few.worst)
-    assert_allclose(worst.point_data["von_mises"].max(), none.peak.stress, rtol=10 * EXACT)
+    assert_allclose(np.nanmax(worst.point_data["von_mises"]), none.peak.stress, rtol=10 * EXACT)
     assert read_results(tmp_path / "2" / "results.h5").peaks == none.peaks
 
 

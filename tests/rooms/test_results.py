@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from kedfem.errors import OutputError
 from kedfem.results import (
