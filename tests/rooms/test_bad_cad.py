@@ -75,7 +75,7 @@ class TestBadFile:
         written(tmp_path, "sheet", lambda occ: occ.addRectangle(0, 0, 0, 10, 10), (ending,))
         assert refused(tmp_path / f"sheet.{ending}") == (
             "links.rod.shape.file: must hold a solid, got faces that do not close (1 of them, 4 free edges, one at "
-            "(0.005, 0, 0) [m]) in FILE; close them, or export the part as a solid"
+            "(5, 0, 0) mm) in FILE; close them, or export the part as a solid"
         )
 
     def test_with_curves_alone(self, tmp_path):
@@ -102,7 +102,7 @@ class TestBadSolid:
         assert message.startswith(
             "links.rod.shape.file: must be a closed solid that does not cut itself, got face "
         )
-        assert message.endswith("[m]; mend the part in CAD")
+        assert message.endswith(" mm; mend the part in CAD")
 
     def test_without_volume(self, tmp_path):
         written(tmp_path, "bow", prism((0, 0), (40, 0), (0, 30), (40, 30)), ("step",))

@@ -381,7 +381,11 @@ def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
         text.replace("animation = { frames_per_turn = 36 }", "animation = false"), encoding="utf-8"
     )
     assert run_kedfem("run", arm).code == 0
-    assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == ["results.h5"]
+    assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == [
+        "envelope.vtu",
+        "results.h5",
+        "worst.vtu",
+    ]
 
 
 def wait_for(condition: Callable[[], bool], running: "subprocess.Popen[str]") -> None:

@@ -343,7 +343,7 @@ def test_a_torque_that_keeps_its_direction_in_space_needs_a_drive() -> None:
     )
     del raw["drive"]
     with pytest.raises(
-        SceneError, match=r"loads.t.frame: must be 'link' for a torque in a scene without a drive"
+        SceneError, match=r"loads.t.frame: must be 'link' for a torque in space in a scene without a drive"
     ):
         prepared(scene_from(raw))
 

@@ -437,12 +437,15 @@ class TestRefusals:
             return occ.fillet([shape[0][1]], [1, 6], [2 * MM])
 
         with pytest.raises(
-            OtherWayError, match=r"part: no layers along one direction, as face \d+, a cylinder of radius 2 mm"
+            OtherWayError,
+            match=r"part: no layers along one direction, as face \d+, a cylinder of radius 2 mm",
         ):
             meshed(rounded)
 
     def test_a_ball_has_no_layers(self):
-        with pytest.raises(OtherWayError, match="part: no layers along one direction, as it has no plane face"):
+        with pytest.raises(
+            OtherWayError, match="part: no layers along one direction, as it has no plane face"
+        ):
             meshed(lambda occ: [(3, occ.addSphere(0, 0, 0, 0.01))])
 
 

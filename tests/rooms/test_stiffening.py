@@ -268,10 +268,6 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
 @pytest.mark.parametrize("beam", ["planar", "spatial"])
 def test_an_arm_that_turns_faster_than_it_vibrates_stands_by_its_tension(beam: str) -> None:
     """μ = 6, above 3.516: without stiffening a small force across it makes it run away."""
-    size = {}
-    for stiffening_ in (False, True):
-        scene = turning_scene(6.0, beam, [0, 1e-3, 0], stiffening_)
-        y = tip(meshed(scene))
-        size[stiffening_] = np.abs(y).max()
-    assert size[True] < 0.1
-    assert size[False] > 1e3
+    assert np.abs(tip(meshed(turning_scene(6.0, beam, [0, 1e-3, 0], True)))).max() < 0.1
+    with pytest.raises(SolveError, match="must stay finite"):
+        tip(meshed(turning_scene(6.0, beam, [0, 1e-3, 0], False)))

@@ -10,7 +10,7 @@ Bolourchi needs 32 elements (p = 0.2).
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
@@ -31,7 +31,7 @@ class _Element:
 
     k: int
     name: str
-    nodes: Float[np.ndarray, " m"]
+    nodes: Int[np.ndarray, " m"]
     along: Float[np.ndarray, " m"]
     across: Float[np.ndarray, "3 3"]
     length: float

@@ -94,9 +94,9 @@ def patterns(
 def _led(scene: Scene, where: str, load: Load, pattern: Pattern) -> Pattern:
     """A load of a link whose frame is its own: no nominal orientation tells its direction."""
     if pattern.share is not None:
-        frames = "co-rotational frames" if scene.driven else "a scene without a drive"
+        frames = "with co-rotational frames" if scene.driven else "in a scene without a drive"
         raise SceneError(
-            f"{where}.frame: must be 'link' for a torque in space with {frames}, which know no fixed axis in a link that "
+            f"{where}.frame: must be 'link' for a torque in space {frames}, where no axis is fixed in a link that "
             "bends, got 'world'"
         )
     turns = (
