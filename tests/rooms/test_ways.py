@@ -59,7 +59,7 @@ def test_parts_mesh_unattended_with_their_bores_found(part: str) -> None:
     mesh = made(f"{part}.step")
     assert mesh.tetrahedra or mesh_quality(mesh).least >= 0.3
     assert valid_everywhere(mesh.points, mesh.cells).all()
-    assert 3 * len(mesh.points) < 45_000
+    assert 3 * len(mesh.points) < (45_000 if mesh.tetrahedra else 70_000)
     seats = [face for face in mesh.faces if face_kind(mesh, face) in {"bore", "ball seat", "ball"}]
     assert_allclose(sorted(1e3 * face.radius for face in seats), SEATS[part], rtol=1e-6)
 

@@ -109,6 +109,6 @@ def _asking(raw: dict[str, Any], accuracy: float, analysis: dict[str, Any], on: 
             for name, (link, at, quantity) in probes.items()
         }
     }
-    raw["analysis"] = {**analysis, "accuracy": accuracy}
+    raw["analysis"] = {**analysis, "accuracy": accuracy, "frames": "nominal"}  # as the reference has them
     raw.setdefault("damping", {"ratio": 0.02, "frequencies": [20, 200]})
     return scene_from(raw)

@@ -43,7 +43,7 @@ class Analysis(Record):
     """turns of the drive; for drives that turn at a constant speed, or speed up to one"""
     end_time: PositiveTime | None = None
     """end of the analysis, instead of `turns`"""
-    steps_per_turn: Annotated[StrictInt, Field(ge=4)] | None = None
+    steps_per_turn: Annotated[StrictInt, Field(ge=4, le=10**9)] | None = None
     """time steps in a turn (at the final speed); 720 if neither this nor `step` is given"""
     step: PositiveTime | None = None
     """time step, instead of `steps_per_turn`; shortened so that a whole number reaches the end"""

@@ -83,6 +83,8 @@ def message(detail: ErrorDetails, hint: Any) -> str:
             text = one_of(options(hint), got)
         case "greater_than_equal":
             text = f"must be at least {ctx['ge']}, got {shown(got)}"
+        case "less_than_equal":
+            text = f"must be at most {ctx['le']}, got {shown(got)}"
         case "too_short" | "too_long":
             bound = f"at least {ctx['min_length']}" if "min_length" in ctx else f"at most {ctx['max_length']}"
             text = f"must hold {bound}, got {ctx['actual_length']}"
