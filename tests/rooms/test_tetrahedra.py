@@ -116,6 +116,7 @@ def test_parts_of_the_catalogue_are_meshed(name: str, tmp_path: Path) -> None:
     assert volume(mesh) == pytest.approx(exact, rel=5e-3)
 
 
+@pytest.mark.long
 def test_hexahedra_at_any_price_are_gmshs_subdivision(tmp_path: Path) -> None:
     with empty_model() as occ:
         occ.addSphere(0, 0, 0, 10)

@@ -95,19 +95,22 @@ def apart(where: str, work: Callable[..., T], *given: Any) -> T:
     from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
-    try:
-        found: T = executor.submit(limited, LONGEST, work, *given).result(timeout=PATIENCE)
-    except LateError:
-        executor.shutdown(kill_workers=True)
-        reason = f"got none within {PATIENCE} s"
-    except TerminatedWorkerError as error:
-        late = "SIGXCPU" in str(error)
-        reason = (
-            f"got none within {LONGEST} s of processor time" if late else "got one at which they broke down"
-        )
-    else:
-        return found
+    reason = ""
+    for _ in range(2):  # a process that has served other parts may break down where a new one does not
+        executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
+        try:
+            found: T = executor.submit(limited, LONGEST, work, *given).result(timeout=PATIENCE)
+        except LateError:
+            executor.shutdown(kill_workers=True)
+            reason = f"got none within {PATIENCE} s"
+            break
+        except TerminatedWorkerError as error:
+            reason = "got one at which they broke down"
+            if "SIGXCPU" in str(error):
+                reason = f"got none within {LONGEST} s of processor time"
+                break
+        else:
+            return found
     raise MeshError(
         f"{where}: must be a part that gmsh and OpenCASCADE can work on, {reason}; "
         "mend or simplify it in CAD (fillets that are thinner than an element first), or take another mesh.size"
