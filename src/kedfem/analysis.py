@@ -1,7 +1,7 @@
 """The whole job: a scene in; time series, animation, plots and a picture out."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from time import perf_counter
 from typing import TypeVar
@@ -31,7 +31,14 @@ from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
-from kedfem.output.vtu import AnimationWriter, remove_animation, write_cells, write_frame, write_points
+from kedfem.output.vtu import (
+    AnimationWriter,
+    LinkField,
+    remove_animation,
+    write_cells,
+    write_frame,
+    write_points,
+)
 from kedfem.output.words import clock, moment, stress_at
 from kedfem.results import Channel, Peak, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
 from kedfem.results.acting import measured_actions
@@ -125,8 +132,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     results = read_results(folder / "results.h5")
     known = step.errors if step.levels > 1 else None
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), known))
-    add_notes(folder / "results.h5", attributes(found))
-    results = read_results(folder / "results.h5")
+    notes = attributes(found)
+    add_notes(folder / "results.h5", notes)
+    results = replace(results, notes={**results.notes, **notes})
     peak = highest(results.peaks)
     _write_envelope(folder / ENVELOPE, envelope, doubts)
     _write_worst(folder / WORST, ready, recoveries, envelope)
@@ -196,10 +204,7 @@ def _write_worst(
 ) -> None:
     """The frame of the highest stress, whether or not it is one of the animation."""
     if envelope.worst is not None:
-        animation = ready.scene.output.animation
-        exaggeration = animation.exaggeration if animation else 1.0
-        fields = link_fields(ready.model, recoveries, envelope.worst, exaggeration)
-        write_frame(file, envelope.worst.t, fields)
+        write_frame(file, envelope.worst.t, _fields(ready, recoveries, envelope.worst))
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:
@@ -308,7 +313,8 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 errors.add(block, values)
                 for k in range(len(block)):
                     if block.step + k in wanted:
-                        _frame(ready, watched.recoveries, frames, block.at(k))
+                        now = block.at(k)
+                        frames.add(now.t, _fields(ready, watched.recoveries, now))
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
@@ -356,13 +362,10 @@ def _remove_derived(folder: FilePath) -> None:
     remove_plots(folder / PLOTS)
 
 
-def _frame(
-    ready: Prepared, recoveries: list[StressRecovery], frames: AnimationWriter, snapshot: Snapshot
-) -> None:
-    """Write one frame."""
+def _fields(ready: Prepared, recoveries: list[StressRecovery], snapshot: Snapshot) -> list[LinkField]:
+    """What a frame shows of each link, deformed as the animation exaggerates it."""
     animation = ready.scene.output.animation
-    fields = link_fields(ready.model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
-    frames.add(snapshot.t, fields)
+    return link_fields(ready.model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
 
 
 def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:
