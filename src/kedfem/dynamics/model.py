@@ -318,7 +318,7 @@ def _with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, L
         if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
     ]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
-    faces = next((j.faces[body.link] for j in here if body.link in j.faces), ())
+    faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
     if scene.links[body.link].fidelity == "rigid" and links[body.link].kind == "solid":
         return body.link, _carrying(links[body.link], rigid_seat(links[body.link], at), where, body, axis)
     try:

@@ -28,7 +28,7 @@ def seat_of(scene: Scene, name: str, link: Link) -> Seat:
     """The seat of a joint on a link."""
     joint = scene.joints[name]
     axis = bore_axis(joint, link.name)
-    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.faces.get(link.name, ()))
+    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
 
 
 def on_part(

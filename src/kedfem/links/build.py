@@ -8,6 +8,7 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, line_axes, spaced
 from kedfem.links.beam_axis import Axis, directions, smooth_axis, straight_axis
+from kedfem.links.choosing import with_chosen_faces
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.seats import joint_seat
@@ -82,9 +83,8 @@ def bare_link(scene: Scene, name: str) -> Link:
     link = scene.links[name]
     material = scene.materials[str(link.material)]
     if link.family == "solid":
-        return solid_link(
-            name, link_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
-        )
+        mesh = link_mesh(name, link, scene.folder, touched(scene, name))
+        return with_chosen_faces(scene, solid_link(name, mesh, material, link_axes(link)))
     if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
     return _beam(scene, name)
@@ -97,8 +97,9 @@ def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], 
     singles = (*scene.loads.values(), *scene.bodies.values(), *scene.output.probes.values(), *ends)
     here = [getattr(each, "at", None) for each in singles if each.link == name]
     places = [at for at in here if at is not None]
-    points = {tuple(float(x) for x in at) for at in [*(joint.at for joint in joints), *places]}
-    named = {face for joint in joints for face in joint.faces.get(name, ())}
+    nears = [face.near for joint in joints for face in joint.chosen_faces(name) if face.near is not None]
+    points = {tuple(float(x) for x in at) for at in [*(joint.at for joint in joints), *places, *nears]}
+    named = {face for joint in joints for face in joint.face_names(name)}
     return tuple(sorted(points)), tuple(sorted(named))  # type: ignore[arg-type]
 
 
@@ -159,7 +160,7 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     """What of a link the elements around its joints and bodies take up along a direction."""
     out = []
     places = [
-        (joint.at, joint.axis if joint.kind != "prismatic" else None, joint.faces.get(name, ()))
+        (joint.at, joint.axis if joint.kind != "prismatic" else None, joint.face_names(name))
         for joint in scene.joints.values()
         if name in joint.links
     ]

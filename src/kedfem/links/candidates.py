@@ -4,7 +4,7 @@ For messages, and for bores whose axis nobody gives.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -34,6 +34,7 @@ class Candidate:
     name : of a face that has one, else empty
     centre, direction, radius : as of `mesh.hexahedra.Face`; nan where they have no meaning
     length : along the axis of a cylinder, else 0 [m]
+    facets : boundary facets of the link on it
     """
 
     kind: Kind
@@ -42,6 +43,13 @@ class Candidate:
     direction: Float[np.ndarray, "3"]
     radius: float
     length: float = 0.0
+    facets: Int[np.ndarray, " f"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def form(self) -> str:
+        """``plane``, ``cylinder``, ``sphere`` or ``other``."""
+        round_ = "cylinder" if self.cylindrical else "sphere"
+        return {"plane face": "plane", "face": "other"}.get(self.kind, round_)
 
     @property
     def cylindrical(self) -> bool:
@@ -65,15 +73,30 @@ class Candidate:
 def candidates(link: Link) -> list[Candidate]:
     """All of a solid link: those with names if there are any, else round ones and plane faces."""
     link = link.full or link
-    planes = link.kind == "solid" and not link.faces
+    planes = link.kind == "solid" and not _with_names(link)
     return [*round_candidates(link), *(_planes(link) if planes else ())]
+
+
+def surfaces(link: Link) -> list[Candidate]:
+    """All surfaces of a solid link: its faces if they cover it, else closed cylinders, balls and planes as they fit."""
+    if link.kind != "solid":
+        return []
+    named = _with_names(link)
+    if sum(len(each.facets) for each in named) >= len(link.basis.mesh.boundary_facets()):
+        return [_named(link, each) for each in named]
+    return [*_fitted(link), *_planes(link)]
 
 
 def round_candidates(link: Link) -> list[Candidate]:
     """Those of a solid link with names; if there are none, closed cylinders and balls as they fit."""
     if link.kind != "solid":
         return []
-    return [_named(link, each) for each in link.faces] or list(_fitted(link))
+    return [_named(link, each) for each in _with_names(link)] or list(_fitted(link))
+
+
+def _with_names(link: Link) -> list[LinkFace]:
+    """Its faces whose names are their own, not what a joint said of them."""
+    return [each for each in link.faces if not each.face.chosen]
 
 
 def _named(link: Link, each: LinkFace) -> Candidate:
@@ -88,7 +111,7 @@ def _named(link: Link, each: LinkFace) -> Candidate:
     length = 0.0
     if face.kind == "cylinder" and len(each.facets):
         length = float(np.ptp(link.X[link.basis.mesh.facets[:, each.facets]] @ face.direction))
-    return Candidate(kind, face.name, face.centre, face.direction, face.radius, length)
+    return Candidate(kind, face.name, face.centre, face.direction, face.radius, length, each.facets)
 
 
 def _fitted(link: Link) -> Iterator[Candidate]:
@@ -105,7 +128,7 @@ def _fitted(link: Link) -> Iterator[Candidate]:
             if found is None:
                 break
             if found.length >= 0:
-                yield found
+                yield replace(found, facets=facets[left[kept]])
             left = left[~kept]
 
 
@@ -223,6 +246,5 @@ def _planes(link: Link) -> Iterator[Candidate]:
     label = components(first, second, level & ~bent[first] & ~bent[second], len(facets))
     for number in np.unique(label[~bent]):
         here = (label == number) & ~bent
-        yield Candidate(
-            "plane face", "", corners[here].mean(axis=(0, 1)), normals[here].mean(axis=0), float("nan")
-        )
+        centre, normal = corners[here].mean(axis=(0, 1)), normals[here].mean(axis=0)
+        yield Candidate("plane face", "", centre, normal, float("nan"), facets=facets[here])

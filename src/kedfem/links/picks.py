@@ -26,8 +26,9 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
     known = {each.face.name: each.facets for each in link.faces}
     for name in faces:
         if name not in known:
+            own = [each.face.name for each in link.faces if not each.face.chosen]
             there = (
-                ", ".join(map(repr, known)) or "none (a part from CAD, or a mesh file with groups, has some)"
+                ", ".join(map(repr, own)) or "none (a part from CAD, or a mesh file with groups, has some)"
             )
             raise MeshError(
                 f"{where}.faces: must name faces of link '{link.name}', got {name!r}; it has {there}"

@@ -65,6 +65,8 @@ class Face:
         Whether the material is outside of a cylinder or sphere: a bore or a seat, not a journal or a ball.
     sides : (f, 4), of tetrahedra (f, 3)
         Corner nodes of the sides of elements on the face, in any order.
+    chosen : bool
+        Whether a joint chose it by what it is: then its name is what was said of it.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Face:
     radius: float
     inward: bool
     sides: Int[np.ndarray, "f c"]
+    chosen: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ from kedfem.scene import (
     inertia_tensor,
 )
 from kedfem.scene.base import Record
+from kedfem.scene.faces import FaceName
 from kedfem.scene.points import XYZ
 
 TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding
@@ -146,7 +147,22 @@ def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
         change["axis"] = shifts[along].turned(joint.axis)
     if joint.axes is not None:
         change["axes"] = tuple(shifts[x].turned(a) for x, a in zip(joint.links, joint.axes, strict=True))
+    if joint.faces:
+        change["faces"] = {
+            name: tuple(_face(each, shifts[name]) for each in named) for name, named in joint.faces.items()
+        }
     return joint.model_copy(update=change)
+
+
+def _face(face: FaceName, shift: Shift) -> FaceName:
+    """A face of a link: what is said of its place and direction goes with it."""
+    if isinstance(face, str):
+        return face
+    turned = {key: getattr(face, key) for key in ("plane", "axis") if getattr(face, key) is not None}
+    change: dict[str, Any] = {key: shift.turned(value) for key, value in turned.items()}
+    if face.near is not None:
+        change["near"] = shift.point(face.near)
+    return face.model_copy(update=change)
 
 
 def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:

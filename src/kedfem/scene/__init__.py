@@ -3,6 +3,7 @@
 from kedfem.scene.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.damping import Damping, rayleigh
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, Gear, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.faces import ChosenFace
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import following, following_links, link_frames
 from kedfem.scene.initial import InitialMotion
@@ -45,6 +46,7 @@ __all__ = [
     "Body",
     "BodyLoad",
     "Cad",
+    "ChosenFace",
     "ConstantSpeed",
     "ConstantsSection",
     "Cycloidal",

@@ -107,6 +107,8 @@ def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
         if part == "[key]" or (len(known) > 1 and part in known):
             continue
         hint = below(hint, part, raw)
+        if isinstance(part, int) and isinstance(raw, Mapping):
+            continue  # one table given for a list of one
         where.append(part)
         try:
             raw = raw[part]

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_valida
 from kedfem.scene.apart import Apart, JointPoint, apart
 from kedfem.scene.base import FileName, Record, refuse
 from kedfem.scene.bushings import Bushing
+from kedfem.scene.faces import ChosenFace, Faces
 from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
 from kedfem.scene.points import XYZ, Axis
@@ -172,18 +173,9 @@ def ports(value: object) -> object:
     return value
 
 
-def face_names(value: object) -> object:
-    """One or several names of faces for each link."""
-
-    def names(one: object) -> tuple[str, ...]:
-        several = [one] if isinstance(one, str) else one
-        if not isinstance(several, (list, tuple)) or not several:
-            raise fault(f"must be the name of a face or a list of names, got {shown(one)}")
-        if not all(isinstance(name, str) and name for name in several):
-            raise fault(f"must be the name of a face or a list of names, got {shown(one)}")
-        return tuple(several)
-
-    return of_links(value, names)
+def by_link(value: object) -> object:
+    """A table by names of links."""
+    return of_links(value, lambda each: each)
 
 
 class Joint(Record):
@@ -210,9 +202,10 @@ class Joint(Record):
     port: Annotated[Port | dict[str, Port], BeforeValidator(ports)] = "averaged"
     """how it holds bores and faces of solids and plane links: by their mean displacement and turn, or so that they keep
     their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "stiff" }`"""
-    faces: Annotated[dict[str, tuple[str, ...]], BeforeValidator(face_names)] = Field(default_factory=dict)
-    """of a link from CAD, or from a mesh file with groups: the name of the face that holds it, or a list of names, by
-    link, `{ rod = "pin_bore" }`; if not given, what lies about `at`"""
+    faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
+    """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
+    groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
+    given, what lies about `at`"""
 
     bushing: Bushing | None = None
     """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
@@ -220,6 +213,14 @@ class Joint(Record):
     def stiff(self, link: str) -> bool:
         """Whether the seat on a link keeps its shape."""
         return (self.port.get(link) if isinstance(self.port, dict) else self.port) == "stiff"
+
+    def face_names(self, link: str) -> tuple[str, ...]:
+        """What the faces of a link that hold it are called: their names, or what was said of them."""
+        return tuple(each if isinstance(each, str) else each.label for each in self.faces.get(link, ()))
+
+    def chosen_faces(self, link: str) -> tuple[ChosenFace, ...]:
+        """The faces of a link that are chosen by what they are."""
+        return tuple(each for each in self.faces.get(link, ()) if not isinstance(each, str))
 
     @property
     def points(self) -> dict[str, XYZ]:

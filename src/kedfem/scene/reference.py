@@ -20,6 +20,7 @@ from kedfem.scene import (
     bushings,
     damping,
     drives,
+    faces,
     initial,
     links,
     loads,
@@ -86,6 +87,12 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("Items of an outline, holes", "", [outlines.Arc, outlines.Hole]),
     ("The file of a part", "It may have `[points]` of its own.", [shapes.PartGeometry]),
     ("[joints.NAME]", "", [links.Joint]),
+    (
+        "A face by what it is",
+        "One of `plane`, `cylinder`, `sphere`. What is missing or ambiguous is refused with the faces that the link\n"
+        "has, each as it would be written here, nearest first.",
+        [faces.ChosenFace],
+    ),
     (
         "bushing of a joint",
         "One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right "

@@ -1,0 +1,153 @@
+"""Faces of a link that joints choose by what they are, found among its surfaces before it is reduced or divided."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MeshError
+from kedfem.links.candidates import Candidate, surfaces
+from kedfem.links.missing import MOST, length, shown
+from kedfem.links.record import Link, LinkFace
+from kedfem.links.surface import PLANE_TOLERANCE
+from kedfem.mesh.hexahedra import Face
+from kedfem.scene import ChosenFace, Scene
+
+SAME_DIAMETER = (
+    5e-3  # of the diameter: nodes of mesh files are rounded, and so are dimensions that people write
+)
+SAME_DIRECTION = np.cos(np.radians(0.1))  # a draft of half a degree is another face
+CLEARLY = 1.25  # times as far must the next face be
+
+Vector = Float[np.ndarray, "3"]
+
+
+def with_chosen_faces(scene: Scene, link: Link) -> Link:
+    """The link with the faces that the scene's joints choose on it by what they are, under what was said of them.
+
+    Parameters
+    ----------
+    link : a solid, whole: of one in segments each has the part of a face that is on it
+
+    Raises
+    ------
+    MeshError
+        A joint chooses a face that the link has not, or between several that are as near.
+    """
+    found: dict[str, LinkFace] = {}
+    offered: list[Candidate] | None = None
+    for name, joint in scene.joints.items():
+        for choice in joint.chosen_faces(link.name):
+            offered = surfaces(link) if offered is None else offered
+            near = np.asarray(joint.on(link.name) if choice.near is None else choice.near)
+            where = f"joints.{name}.faces.{link.name}"
+            found[choice.label] = _face(link, choice, chosen_surface(link, where, choice, near, offered))
+    return replace(link, faces=(*link.faces, *found.values())) if found else link
+
+
+def chosen_surface(
+    link: Link, where: str, choice: ChosenFace, near: Vector, offered: Sequence[Candidate]
+) -> Candidate:
+    """The one surface of a link that a choice means.
+
+    Parameters
+    ----------
+    near : the point of the choice, of one without the joint's, to list surfaces by [m]
+    offered : the link's surfaces
+
+    Raises
+    ------
+    MeshError
+        There is none, or several of which none is clearly the nearest; with those there are.
+    """
+    far = {id(each): distance(link, each, near) for each in offered}
+    ordered = sorted(offered, key=lambda each: far[id(each)])
+    meant = [each for each in ordered if fits(each, choice)]
+    if len(meant) == 1:
+        return meant[0]
+    slack = PLANE_TOLERANCE * link.size
+    if len(meant) > 1 and choice.near is not None:
+        first, second = (far[id(each)] for each in meant[:2])
+        if second > CLEARLY * first + slack:
+            return meant[0]
+    alike = [each for each in ordered if each.form == choice.form]
+    told = meant or alike or [each for each in ordered if each.form != "other"]
+    those = ", ".join(
+        f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in told[:MOST]
+    )
+    more = f", and {len(told) - MOST} more" if len(told) > MOST else ""
+    if meant:
+        wanted, got = f"mean one face of link '{link.name}'", f"{len(meant)} such faces"
+        advice = "say which is meant by `near`, a point on it; several are given as a list"
+    else:
+        wanted, got = f"be a face of link '{link.name}'", f"{choice.label}, of which it has none"
+        advice = "a diameter and a direction must be as the part has them"
+    those = those or "nothing round or plane"
+    raise MeshError(f"{where}: must {wanted}, got {got}; nearest first: {those}{more}; {advice}")
+
+
+def fits(each: Candidate, choice: ChosenFace) -> bool:
+    """Whether a surface is of the form, size and direction of a choice."""
+    if each.form != choice.form:
+        return False
+    direction = choice.plane if choice.form == "plane" else choice.axis
+    if direction is not None and abs(float(each.direction @ np.asarray(direction))) < SAME_DIRECTION:
+        return False
+    diameter = {"cylinder": choice.cylinder, "sphere": choice.sphere}.get(choice.form)
+    return diameter is None or abs(2 * each.radius - diameter) <= SAME_DIAMETER * diameter
+
+
+def as_choice(link: Link, each: Candidate) -> str:
+    """What one would write to choose a surface."""
+    diameter = 2 * each.radius
+    axis = tuple(np.round(each.direction, 9))
+    match each.form:
+        case "plane":
+            choice = ChosenFace(plane=axis, near=_on(link, each))
+        case "cylinder":
+            choice = ChosenFace(cylinder=diameter, axis=axis, near=_on(link, each))
+        case "sphere":
+            choice = ChosenFace(sphere=diameter, near=_on(link, each))
+        case _:
+            return shown(each.centre)
+    return choice.label
+
+
+def distance(link: Link, each: Candidate, point: Vector) -> float:
+    """From a point to the facets of a surface, taken as flat between their corners [m]."""
+    if not len(each.facets):
+        return float("inf")
+    corners = link.X[link.basis.mesh.facets[:, each.facets]].transpose(1, 0, 2)
+    triangles = [corners[:, list(three)] for three in combinations(range(corners.shape[1]), 3)]
+    return float(_to_triangles(point, np.concatenate(triangles)).min())
+
+
+def _on(link: Link, each: Candidate) -> tuple[float, float, float]:
+    """A point of a surface, near its middle [m]."""
+    middles = link.X[link.basis.mesh.facets[:, each.facets]].mean(axis=0)
+    x, y, z = middles[np.linalg.norm(middles - each.centre, axis=1).argmin()]
+    return float(x), float(y), float(z)
+
+
+def _to_triangles(point: Vector, corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, " t"]:
+    """Distances from a point to triangles: to their planes if it is above them, else to the nearest edge [m]."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    edges = np.roll(corners, -1, axis=1) - corners
+    to = point - corners
+    above = (np.einsum("tek,tk->te", np.cross(edges, to), normal) >= 0).all(axis=1)
+    along = np.einsum("tek,tek->te", to, edges) / np.maximum((edges**2).sum(axis=2), 1e-300)
+    beside = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * edges, axis=2).min(axis=1)
+    height = np.abs(np.einsum("tk,tk->t", to[:, 0], normal))
+    return np.asarray(np.where(above, height, beside))
+
+
+def _face(link: Link, choice: ChosenFace, each: Candidate) -> LinkFace:
+    """The surface as a face of the link that is called what the choice says."""
+    kind = choice.form
+    sides = link.basis.mesh.facets[:, each.facets].T
+    inward = each.kind in {"bore", "ball seat"}
+    face = Face(choice.label, kind, each.centre, each.direction, each.radius, inward, sides, chosen=True)  # type: ignore[arg-type]
+    return LinkFace(face, each.facets)
