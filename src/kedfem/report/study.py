@@ -6,12 +6,13 @@ from rich.text import Text
 from kedfem.accuracy.study import Measured, Study
 from kedfem.output.words import percent
 
+REFERENCE = "reference"
 STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 
 
 def study_tables(study: Study, machine: str) -> list[Table]:
     """Variants by time with their errors, and what the reference's own error is made of."""
-    table = Table(title=Text(f"Speed against error: {study.title}"))
+    table = Table(title=Text(f"Speed against error: {study.title}"), pad_edge=False)
     for column in STUDY_COLUMNS:
         left = column == "fidelity"
         table.add_column(
@@ -19,7 +20,7 @@ def study_tables(study: Study, machine: str) -> list[Table]:
             justify="left" if left else "right",
             overflow="fold",
             no_wrap=not left,
-            min_width=11 if left else None,
+            min_width={"fidelity": 11, "error": len(REFERENCE)}.get(column),
         )
     ran = [row for row in study.rows if row.seconds]
     for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):
@@ -45,10 +46,15 @@ def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
         f"{v.steps}",
         f"{v.tolerance:.0e}".replace("e-0", "e-") if v.tolerance else "-",
     )
-    times = (f"{s.preparation:.2g}", f"{s.stepping:.2g}", f"{s.whole:.2g}")
+    times = (_seconds(s.preparation), _seconds(s.stepping), _seconds(s.whole))
     below = row.error <= study.floor
     found = f"≤ {percent(study.floor)}" if below else percent(row.error)
-    return (*model, str(row.unknowns), *times, "reference" if v == study.reference.variant else found)
+    return (*model, str(row.unknowns), *times, REFERENCE if v == study.reference.variant else found)
+
+
+def _seconds(s: float) -> str:
+    """In five characters, so that nine columns fit a terminal of 80."""
+    return f"{s:.0f}" if s >= 10 else f"{s:.2g}" if s >= 0.01 else "<0.01"
 
 
 def _not_run(study: Study) -> Table:
