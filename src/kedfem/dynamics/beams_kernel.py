@@ -7,7 +7,8 @@ At a point, with x' the derivative of the position by arc length as drawn, where
 exactly what `dynamics.frames` finds with a frame at each point, see `links.segments.beam_segments`. World components:
 ψ and θ count from the nominal motion, so that x' = R t + u' with t the tangent as drawn.
 
-    which : (b,) numbers of these segments
+    segment, body : (b,) number of each, and of its rotation
+    at, stride : (b,) where its coordinates begin, and the number of one component
     rows (b, 3, E, S) : x' from u, ψ and ψ' from ψ, at the E points
     tangent (b, 2, E) : t
     rigidity (b, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
@@ -33,11 +34,11 @@ def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[n
     base : (b, 4, E) becomes R t and the directions, world
     resisted : (b, 3, E) becomes β times the rate of strains that vanish at the end of the step
     """
-    which, _, tangent, _ = beams
+    _, body, _, _, _, tangent, _ = beams
     n0, n1, n2, h1, h0, beta = rates
     E = tangent.shape[2]
-    for b in range(len(which)):
-        i = which[b]
+    for b in range(len(body)):
+        i = body[b]
         c, s, z, w = R[i, 0, 0], R[i, 1, 0], R[i, 0, 1], R[i, 1, 1]
         for e in range(E):
             x, y = tangent[b, 0, e], tangent[b, 1, e]
@@ -52,7 +53,7 @@ def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[n
 
 @compiled
 def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[no-untyped-def]
-    """Internal force of all these segments at the displacement u (L, D, S), added to f; world components.
+    """Internal force of all these segments at the displacement u, added to f; flat, component first, world components.
 
     Parameters
     ----------
@@ -61,18 +62,18 @@ def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[
     seen : (b, 6, E) becomes ε, γ, κ, the tangent (2) and the turn at u
     w : (5, E)
     """
-    which, rows, _, rigidity = beams
-    E, n = rows.shape[2:]
-    for b in range(len(which)):
-        i = which[b]
+    _, _, begin, stride, rows, _, rigidity = beams
+    E = rows.shape[2]
+    for b in range(len(begin)):
+        at, n = begin[b], stride[b]
         for e in range(E):
             x, y, psi, kappa = base[b, 0, e], base[b, 1, e], 0.0, 0.0
             for j in range(n):
                 r = rows[b, 0, e, j]
-                x += r * u[i, 0, j]
-                y += r * u[i, 1, j]
-                psi += rows[b, 1, e, j] * u[i, 2, j]
-                kappa += rows[b, 2, e, j] * u[i, 2, j]
+                x += r * u[at + j]
+                y += r * u[at + n + j]
+                psi += rows[b, 1, e, j] * u[at + 2 * n + j]
+                kappa += rows[b, 2, e, j] * u[at + 2 * n + j]
             w[0, e], w[1, e], w[2, e], seen[b, 2, e] = x, y, psi, kappa
         largest = 0.0
         for e in range(E):
@@ -103,19 +104,19 @@ def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[
                 x += r * w[0, e]
                 y += r * w[1, e]
                 moment += rows[b, 2, e, j] * w[4, e] - rows[b, 1, e, j] * w[2, e]
-            f[i, 0, j] += x
-            f[i, 1, j] += y
-            f[i, 2, j] += moment
+            f[at + j] += x
+            f[at + n + j] += y
+            f[at + 2 * n + j] += moment
 
 
 @compiled
 def ended(t, rates, beams, R, seen, strain, direction, turn, strains, energies):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and row t of the history: strains (T, b, 3, E), energies (T, L)."""
-    which, _, _, rigidity = beams
+    segment, body, _, _, _, _, rigidity = beams
     n0, n1, n2, h1, h0, _ = rates
     E = turn.shape[1]
-    for b in range(len(which)):
-        i = which[b]
+    for b in range(len(segment)):
+        i = body[b]
         energy = 0.0
         for m in range(3):
             for e in range(E):
@@ -124,7 +125,7 @@ def ended(t, rates, beams, R, seen, strain, direction, turn, strains, energies):
                 strain[0, b, m, e], strain[1, b, m, e], strain[2, b, m, e] = s, s1 + h1 * now + h0 * s2, now
                 strains[t, b, m, e] = s
                 energy += rigidity[b, m, e] * s * s
-        energies[t, i] = 0.5 * energy
+        energies[t, segment[b]] = 0.5 * energy
         c, s, z, w = R[i, 0, 0], R[i, 1, 0], R[i, 0, 1], R[i, 1, 1]
         for e in range(E):
             x, y = seen[b, 3, e], seen[b, 4, e]

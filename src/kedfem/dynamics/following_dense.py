@@ -54,7 +54,12 @@ class FollowingDense:
         self._sizes = (max(link.d for link in links), max(link.n for link in links),
                        max(1, *(len(joint.weights) for joint in joints)))  # fmt: skip
         size = len(links) * self._sizes[0] * self._sizes[1]
-        self._memory = np.zeros((2, DEPTH, size)), np.zeros((DEPTH, DEPTH)), np.zeros((2, size))
+        self._memory = (
+            np.zeros((2, DEPTH, size)),
+            np.zeros((DEPTH, DEPTH)),
+            np.zeros((2, size)),
+            np.zeros((DEPTH + 1, DEPTH)),
+        )
         self._matrices, self._unknowns = self._coupled()
         self._shapes, self._frames = self._fitted()
         self._beams = self._points()
@@ -74,7 +79,7 @@ class FollowingDense:
     def begin(self, states: Sequence[LinkState]) -> State:
         """The loop's own state, from link states."""
         D, n, P = self._sizes
-        L, (b, _, E) = len(self.links), self._beams[3].shape
+        L, (b, _, E) = len(self.links), self._beams[6].shape
         u, v, a, F, f = (np.zeros((L, D, n)) for _ in range(5))
         C, force, Q, angle = np.zeros((3, L, D, n)), np.zeros((L, D * P)), np.zeros((L, 3, 3)), np.zeros(L)
         g, strain, direction, turn = (
@@ -235,7 +240,8 @@ class FollowingDense:
                 rows[k, 1, e, :n] = T[2].T @ -of_psi[1]
                 rows[k, 2, e, :n] = T[2].T @ of_psi[2]
                 tangent[k, :, e], rigidity[k, :, e] = point.tangent, point.rigidity
-        return which, rows, tangent, rigidity
+        D, S, _ = self._sizes
+        return which, which, D * S * which, np.full(b, S), rows, tangent, rigidity
 
     def _places(self, link: Link) -> Int[np.ndarray, " x"]:
         """Where the coordinates of a link stand among the padded ones."""

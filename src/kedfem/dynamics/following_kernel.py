@@ -93,7 +93,7 @@ def follow_block(  # type: ignore[no-untyped-def]
         settled, worst, reached = False, -1, 0.0
         for sweep in range(SWEEPS + 1):
             f1[:] = 0.0
-            bent(1 + beta * h1 * n0, beams, u1, base, damped, turn0, seen, f1, points)
+            bent(1 + beta * h1 * n0, beams, u1.ravel(), base, damped, turn0, seen, f1.ravel(), points)
             if others:
                 for i in range(L):
                     if not bends[i]:

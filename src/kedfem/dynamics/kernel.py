@@ -18,8 +18,7 @@ Imported when it is first needed: numba takes a while to load. Plain loops, so t
 import numpy as np
 
 from kedfem.compiled import compiled
-
-DEPENDENT = 1e-11  # as in `interface`
+from kedfem.dynamics.mixing_kernel import definite_solved, partly_factored
 
 
 @compiled
@@ -57,7 +56,7 @@ def advance_block(coefficients, matrices, columns, count, forcing, ties, every, 
         if r:
             tied(coefficients, Cs[t], (compliance, dampers, rate), room, H, z, known, e)
         else:
-            solve_definite(H, z)
+            definite_solved(H, z)
         for i in range(L):
             for q in range(Q):
                 force[q], w[q] = -reaction[i, q], 0.0
@@ -246,19 +245,8 @@ def tied(coefficients, C, springs, room, H, z, known, e):  # type: ignore[no-unt
                 x += CH[a, c] * CH[b, c]
             G[a, b] = x
         G[a, a] += rest[a]
-        own = G[a, a]
-        for b in range(a):
-            if pivots[b] == 0.0:
-                G[a, b] = 0.0
-                continue
-            for c in range(b):
-                G[a, b] -= G[a, c] * G[b, c]
-            G[a, b] /= G[b, b]
-        for b in range(a):
-            G[a, a] -= G[a, b] ** 2
-        pivots[a] = 1.0 if G[a, a] > DEPENDENT * own else 0.0
-        if pivots[a] != 0.0:
-            G[a, a] = np.sqrt(G[a, a])
+        pivots[a] = 1.0
+    partly_factored(G, pivots)
     for _ in range(2):  # the second closes joints to rounding
         for a in range(r):
             left[a] = -rest[a] * m[a]
@@ -292,14 +280,6 @@ def tied(coefficients, C, springs, room, H, z, known, e):  # type: ignore[no-unt
         second = n0 * (now - e[0, a]) - n1 * e[1, a] - n2 * e[2, a]
         e[1, a] += h1 * second + h0 * e[2, a]
         e[0, a], e[2, a] = now, second
-
-
-@compiled
-def solve_definite(H, x):  # type: ignore[no-untyped-def]
-    """x becomes H⁻¹ x, H symmetric positive definite and used up (Cholesky)."""
-    factor(H)
-    forward(H, x)
-    backward(H, x)
 
 
 @compiled

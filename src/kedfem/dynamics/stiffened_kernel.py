@@ -12,10 +12,10 @@ from kedfem.dynamics.kernel import (
     end_of_step,
     gathered,
     right_hand_side,
-    solve_definite,
     times,
     turned_ports,
 )
+from kedfem.dynamics.mixing_kernel import definite_solved
 
 
 @compiled
@@ -87,7 +87,7 @@ def sweep(matrices, columns, count, interface, effect, base, rhs, g, force):  # 
         for q in range(Q):
             for c in range(count[i]):
                 z[columns[i, c]] += RB[i, q, c] * reaction[i, q]
-    solve_definite(H.copy(), z)
+    definite_solved(H.copy(), z)
     change, size = 0.0, 0.0
     for i in range(L):
         for q in range(Q):

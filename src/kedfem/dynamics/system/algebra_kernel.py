@@ -4,6 +4,21 @@ from kedfem.compiled import inner
 
 
 @inner
+def copied(x, out):  # type: ignore[no-untyped-def]
+    """out becomes x, number by number: assigning arrays to each other would look whether they overlap."""
+    for k in range(len(out)):
+        out[k] = x[k]
+
+
+@inner
+def frame_copied(R, out):  # type: ignore[no-untyped-def]
+    """out becomes the rotation R."""
+    for b in range(3):
+        for m in range(3):
+            out[b, m] = R[b, m]
+
+
+@inner
 def turned(R, d, x, out):  # type: ignore[no-untyped-def]
     """out becomes R x for d components of coordinates."""
     n = len(x) // d

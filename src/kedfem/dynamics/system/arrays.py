@@ -36,6 +36,18 @@ class Coefficients(NamedTuple):
     single: bool
 
 
+class Beams(NamedTuple):
+    """Planar beams with strains at points, as `beams_kernel` takes them."""
+
+    segment: Any
+    body: Any
+    at: Any
+    stride: Any
+    rows: Any
+    tangent: Any
+    rigidity: Any
+
+
 class Bodies(NamedTuple):
     """All bodies as flat arrays, constant; i counts bodies.
 
@@ -46,7 +58,7 @@ class Bodies(NamedTuple):
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`
     column_at, columns : interface unknowns that each body knows; first : profile of their common matrix
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
-    beam : number among planar beams with strains at points, −1 if none; rows, tangent, rigidity : see `beams_kernel`
+    beams : those that know their strains at points
     """
 
     at: Any
@@ -76,11 +88,7 @@ class Bodies(NamedTuple):
     one: Any
     fit: Any
     K: Any
-    beam: Any
-    rows_at: Any
-    rows: Any
-    tangent: Any
-    rigidity: Any
+    beams: Beams
 
 
 class Ends(NamedTuple):
@@ -213,6 +221,7 @@ class Trial(NamedTuple):
 
     r : (N,) right-hand sides or residuals in the bodies' frames; reaction, w, force : (q,) at their interface points
     Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B; H : (k, k) their common matrix, then factored
+    mixing : room of `mixing_kernel`
     C, CH : (r, k) gradients, and these after the first half of a solution with H; G : (r, r); target, compliance, beside,
         m, left : (r,); right, dz, part : (k,); change : what a pass asks for
     fixed, moving : places of all ends in the nominal motion, and at z
@@ -253,6 +262,7 @@ class Trial(NamedTuple):
     dz: Any
     part: Any
     change: Any
+    mixing: Any
     fixed: Any
     moving: Any
 

@@ -9,14 +9,14 @@ from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends, History, St
 def empty_state(bodies: Bodies, of: Constraints) -> State:
     """A state of zeros, frames as drawn."""
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
-    b, _, E = bodies.tangent.shape
+    b, _, E = bodies.beams.tangent.shape
     moving = sum(int(n) for n, at in zip(np.diff(bodies.at), bodies.passed, strict=True) if at >= 0) + k
     direction = np.zeros((b, 2, E))
-    direction[:] = bodies.tangent
+    direction[:] = bodies.beams.tangent
     return State(
         time=np.zeros(1), u=np.zeros(N), v=np.zeros(N), a=np.zeros(N), F=np.zeros(N), f=np.zeros(N),
         damped=np.zeros(3 * N), seen=np.zeros(3 * N), Q=np.tile(np.eye(3), (L, 1, 1)), angle=np.zeros(L),
-        strain=np.zeros((b, 3, 1, 3, E)), direction=direction, turn=np.zeros((b, E)),
+        strain=np.zeros((3, b, 3, E)), direction=direction, turn=np.zeros((b, E)),
         port_force=np.zeros(int(bodies.port_at[-1])), z=np.zeros((3, k)), e=np.zeros((3, r)),
         turned=np.zeros(len(of.kind)), bearing=np.zeros(k), multiplier=np.zeros(r), pairs=np.zeros((2, DEPTH, moving)),
         products=np.zeros((DEPTH, DEPTH)), last=np.zeros((2, moving)), counts=np.zeros(4), passes=np.zeros(3),
@@ -26,7 +26,7 @@ def empty_state(bodies: Bodies, of: Constraints) -> State:
 def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Trial:
     """Room for the end of a step."""
     L, k, r, E = len(bodies.motion), len(bodies.first), len(of.law), len(ends.form)
-    b, _, points = bodies.tangent.shape
+    b, _, points = bodies.beams.tangent.shape
     q, B = int(bodies.port_at[-1]), int(bodies.B_at[-1])
     place = (np.zeros((E, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)))
     return Trial(
@@ -37,7 +37,8 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(), C=np.zeros((r, k)), CH=np.zeros((r, k)),
         G=np.zeros((r, r)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), pivots=np.zeros(r),
         m=np.zeros(r), left=np.zeros(r), right=np.zeros(k), dz=np.zeros(k), part=np.zeros(k),
-        change=np.zeros(like.last.shape[1]), fixed=place, moving=tuple(x.copy() for x in place),
+        change=np.zeros(like.last.shape[1]), mixing=np.zeros((DEPTH + 1, DEPTH)),
+        fixed=place, moving=tuple(x.copy() for x in place),
     )  # fmt: skip
 
 
@@ -45,7 +46,7 @@ def room(bodies: Bodies) -> Work:
     """Room for one body or end at a time."""
     n = max(int(np.diff(bodies.at).max()), int(np.diff(bodies.port_at).max(initial=0)))
     y, turned, strained, other = np.zeros((4, n))
-    points = np.zeros((5, bodies.tangent.shape[2]))
+    points = np.zeros((5, bodies.beams.tangent.shape[2]))
     return Work(
         y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
         np.zeros((12, 3)), np.zeros(3),
@@ -55,7 +56,7 @@ def room(bodies: Bodies) -> Work:
 def empty_history(T: int, bodies: Bodies, of: Constraints) -> History:
     """Room for T time points."""
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
-    b, _, E = bodies.tangent.shape
+    b, _, E = bodies.beams.tangent.shape
     u, v, a, F, g = np.zeros((5, T, N))
     return History(
         u, v, a, F, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),

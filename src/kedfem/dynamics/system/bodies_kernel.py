@@ -6,11 +6,10 @@ Of body i: coordinates `at[i]:at[i + 1]`, component first; mass one. Rotations a
 import numpy as np
 
 from kedfem.compiled import inner
-from kedfem.dynamics.beams_kernel import begun, bent
-from kedfem.dynamics.frames_kernel import entry, held_together, mean_rotation
-from kedfem.dynamics.system.algebra_kernel import product, turned, turned_back
-
-NOMINAL, COROTATIONAL, TANGENTIAL = range(3)
+from kedfem.dynamics.beams_kernel import bent
+from kedfem.dynamics.frames_kernel import entry, held_together
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
+from kedfem.dynamics.system.record import COROTATIONAL, NOMINAL, TANGENTIAL
 
 
 @inner
@@ -61,9 +60,8 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room):  # type: ig
     turned(R, d, g[:N], room[:N])
     moved_to(c, first, last, room, F, state, history, t)
     history.energy[t, i] = 0.5 * energy
-    history.R[t, i] = R
-    for x in range(N):
-        history.g[t, first + x] = g[x]
+    frame_copied(R, history.R[t, i])
+    copied(g[:N], history.g[t, first:last])
 
 
 @inner
@@ -78,47 +76,46 @@ def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untype
 
 
 @inner
-def beam_views(bodies, i):  # type: ignore[no-untyped-def]
-    """The tables of one planar beam, as `beams_kernel` takes them."""
-    b, n = bodies.beam[i], bodies.functions[i]
-    E = bodies.tangent.shape[2]
-    rows = bodies.rows[bodies.rows_at[b] : bodies.rows_at[b + 1]].reshape(1, 3, E, n)
-    return np.zeros(1, np.int64), rows, bodies.tangent[b : b + 1], bodies.rigidity[b : b + 1]
+def internal_forces(c, bodies, R, state, trial, work):  # type: ignore[no-untyped-def]
+    """trial.f becomes the internal force of all bodies with frames of their own at trial.u, world components."""
+    f, beams = trial.f, bodies.beams
+    for i in range(len(bodies.motion)):
+        if bodies.frame[i] != NOMINAL:
+            for x in range(bodies.at[i], bodies.at[i + 1]):
+                f[x] = 0.0
+    if len(beams.segment):
+        bent(1 + c.beta * c.late * c.acceleration[0], beams, trial.u, trial.base, trial.resisted, state.turn,
+             trial.strained, f, work.points)  # fmt: skip
+    for i in range(len(bodies.motion)):
+        if bodies.frame[i] == COROTATIONAL:
+            corotational_force(c, bodies, i, R, state, trial, work)
+        if bodies.frame[i] != NOMINAL and c.alpha != 0.0:
+            mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
 
 
 @inner
-def internal_force(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-untyped-def]
-    """trial.f becomes the internal force of a body with frames of its own at the displacement u, world components."""
+def newmark(c):  # type: ignore[no-untyped-def]
+    """Newmark's numbers as `frames_kernel` and `beams_kernel` take them."""
+    n0, n1, n2 = c.acceleration
+    return n0, n1, n2, c.late, c.early, c.beta
+
+
+@inner
+def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-untyped-def]
+    """Add the internal force of a body with one frame, and keep what that sees."""
     first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
     N, body = last - first, bodies.motion[i]
-    n0, n1, n2 = c.acceleration
-    rates = (n0, n1, n2, c.late, c.early, c.beta)
-    for x in range(first, last):
-        trial.f[x] = 0.0
-    moved, f = u[first:last].reshape(1, d, n), trial.f[first:last].reshape(1, d, n)
-    frame = R[body : body + 1]
-    if bodies.frame[i] == TANGENTIAL:
-        b = bodies.beam[i]
-        bent(1 + c.beta * c.late * n0, beam_views(bodies, i), moved, trial.base[b : b + 1], trial.resisted[b : b + 1],
-             state.turn[b : b + 1], trial.strained[b : b + 1], f, work.points)  # fmt: skip
-    else:
-        X, one = bodies.X[first:last].reshape(1, d, n), bodies.one[first:last].reshape(1, d, n)
-        fit = bodies.fit[first:last].reshape(1, d, n)
-        K = bodies.K[bodies.G_at[i] : bodies.G_at[i + 1]].reshape(1, N, N)
-        before = state.seen[3 * first : 3 * last].reshape(3, 1, N)
-        now = trial.seen[3 * first : 3 * last].reshape(3, 1, N)
-        rooms = (
-            work.y[:N].reshape(d, n),
-            work.turned[:N].reshape(d, n),
-            work.strained[:N],
-            work.A,
-            work.U,
-            work.change,
-        )
-        held_together(rates, 0, bodies.kind[i], True, (X, one), fit, K, frame, moved, before, now,
-                      trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms)  # fmt: skip
-    if c.alpha != 0.0:
-        mass_damped(c, bodies, i, R[body], u, state, trial, work)
+    moved, f = trial.u[first:last].reshape(1, d, n), trial.f[first:last].reshape(1, d, n)
+    X, one = bodies.X[first:last].reshape(1, d, n), bodies.one[first:last].reshape(1, d, n)
+    fit = bodies.fit[first:last].reshape(1, d, n)
+    K = bodies.K[bodies.G_at[i] : bodies.G_at[i + 1]].reshape(1, N, N)
+    before = state.seen[3 * first : 3 * last].reshape(3, 1, N)
+    now = trial.seen[3 * first : 3 * last].reshape(3, 1, N)
+    rooms = (
+        work.y[:N].reshape(d, n), work.turned[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
+    )  # fmt: skip
+    held_together(newmark(c), 0, bodies.kind[i], True, (X, one), fit, K, R[body : body + 1], moved, before, now,
+                  trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms)  # fmt: skip
 
 
 @inner
@@ -145,29 +142,32 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
 
 
 @inner
-def beam_begun(c, bodies, i, R, state, trial):  # type: ignore[no-untyped-def]
-    """What stays for a step of a planar beam, see `beams_kernel.begun`."""
-    b, body = bodies.beam[i], bodies.motion[i]
-    rates = (c.acceleration[0], c.acceleration[1], c.acceleration[2], c.late, c.early, c.beta)
-    begun(rates, beam_views(bodies, i), R[body : body + 1], state.strain[b], state.direction[b : b + 1],
-          trial.base[b : b + 1], trial.resisted[b : b + 1])  # fmt: skip
-
-
-@inner
-def orientation(bodies, i, R, u, trial, out, work):  # type: ignore[no-untyped-def]
+def orientation(bodies, i, R, u, trial, out):  # type: ignore[no-untyped-def]
     """out becomes the mean orientation of a body with frames of its own, link to world; trial.Q known but of beams."""
-    first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
     body = bodies.motion[i]
     if bodies.frame[i] == TANGENTIAL:
-        X, fit = bodies.X[first:last].reshape(1, d, n), bodies.fit[first:last].reshape(1, d, n)
-        own, moved = np.ones(1, np.bool_), u[first:last].reshape(1, d, n)
-        mean_rotation(own, fit, X, R[body : body + 1], moved, trial.Q[i : i + 1])
+        beam_rotation(bodies, i, R[body], u, trial.Q[i])
     for b in range(3):
         for m in range(3):
             x = 0.0
             for k in range(3):
                 x += R[body, b, k] * entry(bodies.kind[i], trial.Q[i], k, m)
             out[b, m] = x
+
+
+@inner
+def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
+    """Q becomes the mean rotation of a planar beam in the nominal frame, that of Σ y_a ⊗ fit_a."""
+    first, n, c, s = bodies.at[i], bodies.functions[i], 0.0, 0.0
+    X, fit = bodies.X, bodies.fit
+    for j in range(first, first + n):
+        x = X[j] + R[0, 0] * u[j] + R[1, 0] * u[j + n]
+        y = X[j + n] + R[0, 1] * u[j] + R[1, 1] * u[j + n]
+        c += x * fit[j] + y * fit[j + n]
+        s += y * fit[j] - x * fit[j + n]
+    size = np.sqrt(c * c + s * s)
+    c, s = c / size, s / size
+    Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c, -s, s, c
 
 
 @inner
@@ -188,43 +188,18 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     first, last = bodies.at[i], bodies.at[i + 1]
     N = last - first
     moved_to(c, first, last, u[first:last], F, state, history, t)
-    for x in range(first, last):
-        state.f[x] = trial.f[x]
+    copied(trial.f[first:last], state.f[first:last])
     if c.alpha != 0.0:
-        state.damped[3 * first : 3 * last] = trial.damped[3 * first : 3 * last]
-    if bodies.frame[i] == TANGENTIAL:
-        beam_end(c, bodies, i, R, state, trial, history, t)
-    else:
-        state.seen[3 * first : 3 * last] = trial.seen[3 * first : 3 * last]
-        history.g[t, first:last] = trial.seen[3 * first : 3 * first + N]
+        copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])
+    if bodies.frame[i] == COROTATIONAL:
+        g = trial.seen[3 * first : 3 * first + N]
+        copied(trial.seen[3 * first : 3 * last], state.seen[3 * first : 3 * last])
+        copied(g, history.g[t, first:last])
         energy = 0.0
-        product(bodies.K, bodies.G_at[i], N, N, trial.seen[3 * first : 3 * first + N], work.y)
+        product(bodies.K, bodies.G_at[i], N, N, g, work.y)
         for x in range(N):
-            energy += 0.5 * trial.seen[3 * first + x] * work.y[x]
+            energy += 0.5 * g[x] * work.y[x]
         history.energy[t, i] = energy
-    orientation(bodies, i, R, u, trial, history.R[t, i], work)
-    state.Q[i] = trial.Q[i]
+    orientation(bodies, i, R, u, trial, history.R[t, i])
+    frame_copied(trial.Q[i], state.Q[i])
     state.angle[i] = trial.angle[i]
-
-
-@inner
-def beam_end(c, bodies, i, R, state, trial, history, t):  # type: ignore[no-untyped-def]
-    """End of the step of a planar beam: strains, their rates, directions of its tangents."""
-    b, body = bodies.beam[i], bodies.motion[i]
-    n0, n1, n2 = c.acceleration
-    energy = 0.0
-    for m in range(3):
-        for e in range(bodies.tangent.shape[2]):
-            s, s0 = trial.strained[b, m, e], state.strain[b, 0, 0, m, e]
-            s1, s2 = state.strain[b, 1, 0, m, e], state.strain[b, 2, 0, m, e]
-            second = n0 * (s - s0) - n1 * s1 - n2 * s2
-            state.strain[b, 0, 0, m, e] = history.strain[t, b, m, e] = s
-            state.strain[b, 1, 0, m, e] = s1 + c.late * second + c.early * s2
-            state.strain[b, 2, 0, m, e] = second
-            energy += bodies.rigidity[b, m, e] * s * s
-    history.energy[t, i] = 0.5 * energy
-    for e in range(bodies.tangent.shape[2]):
-        x, y = trial.strained[b, 3, e], trial.strained[b, 4, e]
-        state.direction[b, 0, e] = R[body, 0, 0] * x + R[body, 1, 0] * y
-        state.direction[b, 1, e] = R[body, 0, 1] * x + R[body, 1, 1] * y
-        state.turn[b, e] = trial.strained[b, 5, e]

@@ -7,10 +7,7 @@ import numpy as np
 
 from kedfem.compiled import compiled, inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
-
-GAP, TURN, ANGLE, DISTANCE = range(4)
-HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
-TIME, RATE, COORDINATE = range(3)
+from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RATE, SPRING, TIME, TURN
 
 
 @inner

@@ -10,10 +10,11 @@ as drawn. Of a surface of which two directions are known the third is its normal
 
 import numpy as np
 
-from kedfem.compiled import compiled, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.frames_kernel import rodrigues, turn_of
+from kedfem.dynamics.system.algebra_kernel import frame_copied
+from kedfem.dynamics.system.record import FACE, PLANAR, PLANAR_BEAM, POINT, RIGID
 
-RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID = range(6)
 TURNS = 30
 
 
@@ -43,7 +44,7 @@ def times_transposed(R, x, out):  # type: ignore[no-untyped-def]
         out[m] = R[0, m] * x[0] + R[1, m] * x[1] + R[2, m] * x[2]
 
 
-@compiled
+@inner
 def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
     """Where all ends are at the interface displacement z.
 
@@ -58,7 +59,7 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
         times(R[body], ends.origin[e], w[0])
         for m in range(3):
             x[e, m] = p[body, m] + w[0, m]
-        Q[e] = R[body]
+        frame_copied(R[body], Q[e])
         if form == RIGID:
             continue
         moved(ends, e, z, y)
@@ -106,14 +107,7 @@ def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
 def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
     """Q becomes the rotation of A = Σ D_k ⊗ e_k by Newton from an earlier one, U = Qᵀ A."""
     for _ in range(TURNS):
-        for b in range(3):
-            for m in range(3):
-                U[b, m] = 0.0
-        for k in range(3):
-            times_transposed(Q, D[k], w[0])
-            for b in range(3):
-                for m in range(3):
-                    U[b, m] += w[0, b] * e[k, m]
+        stretched(e, D, Q, U, w[0])
         w[1, 0], w[1, 1], w[1, 2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
         size = max(abs(w[1, 0]), abs(w[1, 1]), abs(w[1, 2]))
         if size < 1e-15:
@@ -126,14 +120,20 @@ def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
         rodrigues(w[1], Q, U)
         if size <= 1e-8:
             break
+    stretched(e, D, Q, U, w[0])
+
+
+@inner
+def stretched(e, D, Q, U, w):  # type: ignore[no-untyped-def]
+    """U becomes Qᵀ Σ D_k ⊗ e_k."""
     for b in range(3):
         for m in range(3):
             U[b, m] = 0.0
     for k in range(3):
-        times_transposed(Q, D[k], w[0])
+        times_transposed(Q, D[k], w)
         for b in range(3):
             for m in range(3):
-                U[b, m] += w[0, b] * e[k, m]
+                U[b, m] += w[b] * e[k, m]
 
 
 @inner

@@ -6,16 +6,14 @@
 is put into the matrix, as in `dynamics.interface`. Constraints that repeat others get no force.
 """
 
-import numpy as np
-
 from kedfem.compiled import compiled, inner
-from kedfem.dynamics.mixing_kernel import factored
-from kedfem.dynamics.system.algebra_kernel import interface_columns
+from kedfem.dynamics.mixing_kernel import factored, partly_factored
+from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
+from kedfem.dynamics.system.reference import reference
 
 REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknowns satisfy by themselves
-DEPENDENT = 1e-11  # what is left of a constraint's own compliance where others constrain the same
 
 
 @inner
@@ -76,13 +74,21 @@ def pushed(bodies, i, trial, room):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def evaluated(c, ends, of, time, R, p, drives, state, trial, work):  # type: ignore[no-untyped-def]
+def evaluated_at(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
+    """`evaluated` at trial.z, all ends placed in the nominal motion first."""
+    ends, along, work = reference(ends), reference(driving), reference(work)
+    placed(ends, along.R[t], along.p[t], trial.part, trial.fixed, work.end, work.vectors)
+    evaluated(reference(c), ends, reference(of), along, t, reference(state), reference(trial), work)
+
+
+@inner
+def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
     """Gradients of all constraints and laws at z, and what these ask of Δz; forces without a tangent are known ones."""
     r, share = len(of.law), 1 - c.alpha_f
     if r == 0:
         return
     if not of.linear.all():
-        placed(ends, R, p, trial.z, trial.moving, work.end, work.vectors)
+        placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     for a in range(r):
         trial.C[a] = 0.0
         if of.linear[a]:
@@ -93,10 +99,10 @@ def evaluated(c, ends, of, time, R, p, drives, state, trial, work):  # type: ign
         else:
             e = coordinate(ends, of, a, trial.moving, trial.turned, trial.C[a], work.end, work.vectors)
             if of.drive[a] >= 0:
-                e -= drives[of.drive[a]]
+                e -= driving.drives[t, of.drive[a]]
         trial.e[a] = e
         rate = c.rate[0] * (e - state.e[0, a]) - c.rate[1] * state.e[1, a] - c.rate[2] * state.e[2, a]
-        held = law(of, a, time, e, rate, work.law)
+        held = law(of, a, driving.t[t], e, rate, work.law)
         kappa = share * (work.law[1] + c.rate[0] * work.law[2])
         trial.m[a] = 0.0
         if held:
@@ -142,7 +148,8 @@ def backward(L, first, x):  # type: ignore[no-untyped-def]
 def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
     """trial.H_rows becomes the factor of H with a part of each constraint and law; compliances are of what is left."""
     k, r = len(trial.z), len(trial.m)
-    trial.H_rows[:] = trial.H
+    for m in range(k):
+        copied(trial.H[m], trial.H_rows[m])
     trace = 0.0
     for m in range(k):
         trace += trial.H[m, m]
@@ -167,50 +174,40 @@ def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
 
 
 @inner
-def pivoted(trial):  # type: ignore[no-untyped-def]
+def compliances(trial):  # type: ignore[no-untyped-def]
     """trial.G becomes the factor of C H⁻¹ Cᵀ + compliance; constraints that depend on others have pivot zero."""
-    G, pivots = trial.G, trial.pivots
-    r, k = trial.CH.shape
+    G, CH = trial.G, trial.CH
+    r, k = CH.shape
     for a in range(r):
-        pivots[a] = 0.0
+        trial.pivots[a] = 0.0
         if trial.compliance[a] < 0.0:
             continue
+        trial.pivots[a] = 1.0
         for b in range(a + 1):
             x = 0.0
             for m in range(k):
-                x += trial.CH[a, m] * trial.CH[b, m]
+                x += CH[a, m] * CH[b, m]
             G[a, b] = x
         G[a, a] += trial.compliance[a]
-        own = G[a, a]
-        for b in range(a):
-            if pivots[b] == 0.0:
-                G[a, b] = 0.0
-                continue
-            for m in range(b):
-                G[a, b] -= G[a, m] * G[b, m]
-            G[a, b] /= G[b, b]
-        for b in range(a):
-            G[a, a] -= G[a, b] ** 2
-        if G[a, a] > DEPENDENT * own:
-            G[a, a], pivots[a] = np.sqrt(G[a, a]), 1.0
+    partly_factored(G, trial.pivots)
 
 
 @inner
 def interface_solved(bodies, trial):  # type: ignore[no-untyped-def]
     """trial.dz and trial.m from the right-hand side."""
     first, r = bodies.first, len(trial.m)
-    trial.dz[:] = trial.right
+    copied(trial.right, trial.dz)
     stiffened(bodies, trial)
     L = trial.H_rows
     forward(L, first, trial.dz)
     for a in range(r):
-        trial.CH[a] = trial.C[a]
+        copied(trial.C[a], trial.CH[a])
         if trial.compliance[a] >= 0.0:
             forward(L, first, trial.CH[a])
     backward(L, first, trial.dz)
     if r == 0:
         return
-    pivoted(trial)
+    compliances(trial)
     G, left, pivots = trial.G, trial.left, trial.pivots
     for _ in range(2):  # the second closes joints to rounding
         for a in range(r):

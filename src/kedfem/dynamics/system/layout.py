@@ -13,7 +13,7 @@ from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
-from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
+from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.record import (
     COORDINATE,
     COROTATIONAL,
@@ -104,7 +104,7 @@ def body_arrays(
     frames = [frame_of(link) for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
     beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
-    rows, tangent, rigidity = _beam_tables([links[k] for k in beams], [parts[k] for k in beams])
+    at = _ends(sizes)
     passed, place = np.full(len(links), -1), 0
     for k, frame in enumerate(frames):
         if frame != NOMINAL:
@@ -115,7 +115,7 @@ def body_arrays(
         for link, part, frame, n in zip(links, parts, frames, sizes, strict=True)
     ]
     return Bodies(
-        at=_ends(sizes), functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
+        at=at, functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
         dense=np.ones(len(links), bool), passed=passed, port_at=_ends(ports),
         component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
@@ -125,8 +125,12 @@ def body_arrays(
         S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
         column_at=_ends([len(c) for c in columns]), columns=_flat([number[c] for c in columns], int), first=first,
         X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),
-        K=_flat(stiff), beam=np.array([beams.index(k) if k in beams else -1 for k in range(len(links))]),
-        rows_at=_ends([x.size for x in rows]), rows=_flat(rows), tangent=tangent, rigidity=rigidity,
+        K=_flat(stiff),
+        beams=Beams(
+            np.array(beams, int), np.array([numbers[k] for k in beams], int), at[beams],
+            np.array([links[k].n for k in beams], int),
+            *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
+        ),
     )  # fmt: skip
 
 
@@ -139,20 +143,20 @@ def _fitted(link: Link, part: DensePart) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def _beam_tables(
     links: Sequence[Link], parts: Sequence[DensePart]
-) -> tuple[list[np.ndarray], Float[np.ndarray, "b 2 E"], Float[np.ndarray, "b 3 E"]]:
-    """Rows (3, E, n), tangents and rigidities of planar beams with strains at points, see `beams_kernel`."""
-    E = max([1, *(len(points_of(link)) for link in links)])
-    tangent, rigidity, every = np.zeros((len(links), 2, E)), np.zeros((len(links), 3, E)), []
+) -> tuple[Float[np.ndarray, "b 3 E n"], Float[np.ndarray, "b 2 E"], Float[np.ndarray, "b 3 E"]]:
+    """Rows, tangents and rigidities of planar beams with strains at points, see `beams_kernel`."""
+    E, n = max([1, *(len(points_of(link)) for link in links)]), max([1, *(link.n for link in links)])
+    rows = np.zeros((len(links), 3, E, n))
+    tangent, rigidity = np.zeros((len(links), 2, E)), np.zeros((len(links), 3, E))
     tangent[:, 0] = 1.0
     for k, (link, part) in enumerate(zip(links, parts, strict=True)):
-        rows = np.zeros((3, E, link.n))
         for e, point in enumerate(points_of(link)):
-            strains = point.strains.reshape(3, -1, 3)
-            rows[0, e] = part.T[0].T @ strains[0, :, :2] @ point.tangent
-            rows[1, e], rows[2, e] = part.T[2].T @ -strains[1, :, 2], part.T[2].T @ strains[2, :, 2]
+            strains, own = point.strains.reshape(3, -1, 3), slice(link.n)
+            rows[k, 0, e, own] = part.T[0].T @ strains[0, :, :2] @ point.tangent
+            rows[k, 1, e, own] = part.T[2].T @ -strains[1, :, 2]
+            rows[k, 2, e, own] = part.T[2].T @ strains[2, :, 2]
             tangent[k, :, e], rigidity[k, :, e] = point.tangent, point.rigidity
-        every.append(rows)
-    return every, tangent, rigidity
+    return rows, tangent, rigidity
 
 
 def _groups(joints: Sequence[Attachment]) -> Int[np.ndarray, " q"]:

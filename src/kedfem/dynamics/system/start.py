@@ -85,18 +85,14 @@ def _coordinates(
     of: Ready, along: Driving, h: float, z1: np.ndarray, state: State
 ) -> tuple[np.ndarray, np.ndarray]:
     """Coordinates at a few instants, the interface moving on at its rate, (T, r); their gradients at the first (r, k)."""
-    from kedfem.dynamics.system.ends_kernel import placed
-    from kedfem.dynamics.system.interface_kernel import evaluated
+    from kedfem.dynamics.system.interface_kernel import evaluated_at
 
     bodies, ends, constraints = of.bodies, of.ends, of.constraints
     trial, work = empty_trial(bodies, ends, constraints, state), room(bodies)
     values, C = np.zeros((len(along.t), len(constraints.law))), np.zeros((len(constraints.law), len(z1)))
     for t in range(len(along.t)):
         trial.z[:] = h * t * z1
-        placed(ends, along.R[t], along.p[t], np.zeros(len(z1)), trial.fixed, work.end, work.vectors)
-        evaluated(
-            of.c, ends, constraints, along.t[t], along.R[t], along.p[t], along.drives[t], state, trial, work
-        )
+        evaluated_at(of.c, ends, constraints, along, t, state, trial, work)
         values[t] = trial.e
         if t == 0:
             C[:] = trial.C

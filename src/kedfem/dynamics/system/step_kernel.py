@@ -9,13 +9,20 @@ Anderson acceleration chooses the step to take, and again.
 import numpy as np
 
 from kedfem.compiled import compiled, inner
+from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.mixing_kernel import mixed
-from kedfem.dynamics.system.algebra_kernel import add_transposed, ports_turned, product, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import (
+    add_transposed,
+    copied,
+    frame_copied,
+    ports_turned,
+    product,
+    turned,
+    turned_back,
+)
 from kedfem.dynamics.system.bodies_kernel import (
-    NOMINAL,
-    TANGENTIAL,
-    beam_begun,
-    internal_force,
+    internal_forces,
+    newmark,
     nominal_end,
     orientation,
     own_end,
@@ -25,6 +32,8 @@ from kedfem.dynamics.system.bodies_kernel import (
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
+from kedfem.dynamics.system.record import NOMINAL
+from kedfem.dynamics.system.reference import reference
 
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
@@ -33,6 +42,14 @@ PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and coun
 @compiled
 def marched(c, bodies, ends, of, driving, state, trial, work, history):  # type: ignore[no-untyped-def]
     """Take T steps in place; how many converged, and the body that moved most in the one that did not."""
+    c, bodies, ends, of, driving = (
+        reference(c),
+        reference(bodies),
+        reference(ends),
+        reference(of),
+        reference(driving),
+    )
+    state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
     for t in range(len(driving.t)):
         begin(c, bodies, ends, of, driving, t, state, trial, work)
         converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work)
@@ -46,7 +63,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history):  # type:
 def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
     """The predictor, right-hand sides of bodies with nominal frames, the common matrix of z."""
     R, h = driving.R[t], c.h
-    trial.turned[:] = state.turned
+    copied(state.turned, trial.turned)
     for m in range(len(trial.z)):
         later = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
         trial.z[m] = 0.0 if c.single else later
@@ -54,7 +71,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[
         first, last = bodies.at[i], bodies.at[i + 1]
         q, N = bodies.port_at[i + 1] - bodies.port_at[i], last - first
         if bodies.frame[i] == NOMINAL:
-            trial.Rp[i] = R[bodies.motion[i]]
+            frame_copied(R[bodies.motion[i]], trial.Rp[i])
             if bodies.dense[i]:
                 right_hand_side(c, bodies, i, trial.Rp[i], driving.F[t], state, trial.r, work.room)
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
@@ -62,11 +79,14 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[
             continue
         for x in range(first, last):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
-        trial.Q[i], trial.angle[i] = state.Q[i], state.angle[i]
-        if bodies.frame[i] == TANGENTIAL:
-            beam_begun(c, bodies, i, R, state, trial)
-        internal_force(c, bodies, i, R, trial.u, state, trial, work)
-        orientation(bodies, i, R, trial.u, trial, trial.Rp[i], work)
+        frame_copied(state.Q[i], trial.Q[i])
+        trial.angle[i] = state.angle[i]
+    if not c.single:
+        begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
+        internal_forces(c, bodies, R, state, trial, work)
+        for i in range(len(bodies.motion)):
+            if bodies.frame[i] != NOMINAL:
+                orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
     gathered(bodies, trial)
     if of.linear.any():
         trial.part[:] = 0.0
@@ -76,7 +96,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[
 @inner
 def passes(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
-    memory = (state.pairs, state.products, state.last)
+    memory = (state.pairs, state.products, state.last, trial.mixing)
     R, worst, count = driving.R[t], -1, 0
     for sweep in range(PASSES):
         count = sweep + 1
@@ -90,9 +110,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore
         if not np.isfinite(size) or size > 1e30:
             break
         if not c.single:
-            for i in range(len(bodies.motion)):
-                if bodies.frame[i] != NOMINAL:
-                    internal_force(c, bodies, i, R, trial.u, state, trial, work)
+            internal_forces(c, bodies, R, state, trial, work)
         if settled:
             state.passes[0] += count
             state.passes[1] += 1 if sweep >= PATIENCE else 0
@@ -119,7 +137,7 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work):  # type: 
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial, work.room)
-    evaluated(c, ends, of, driving.t[t], driving.R[t], driving.p[t], driving.drives[t], state, trial, work)
+    evaluated(c, ends, of, driving, t, state, trial, work)
     interface_solved(bodies, trial)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
@@ -194,13 +212,16 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
         elif bodies.dense[i]:
             product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
             add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
-            work.turned[:N] = trial.r[first:last]
+            copied(trial.r[first:last], work.turned[:N])
             add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
             nominal_end(c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room)
         ports_turned(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], work.room)
         for r in range(q):
             x = (work.room[r] - c.alpha_f * state.port_force[of_ports + r]) / (1 - c.alpha_f)
             state.port_force[of_ports + r] = history.port_force[t, of_ports + r] = x
+    if not c.single:
+        ended(t, newmark(c), bodies.beams, R, trial.strained, state.strain, state.direction, state.turn, history.strain,
+              history.energy)  # fmt: skip
     constraints_end(c, ends, of, driving, t, state, trial, work, history)
     n0, n1, n2 = c.acceleration
     for m in range(len(trial.z)):
@@ -236,4 +257,4 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
         for m in range(len(trial.z)):
             state.bearing[m] += state.multiplier[a] * trial.C[a, m]
         history.e[t, a], history.multiplier[t, a] = e, state.multiplier[a]
-    state.turned[:] = trial.turned
+    copied(trial.turned, state.turned)
