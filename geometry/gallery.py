@@ -6,9 +6,9 @@ from pathlib import Path
 from time import perf_counter
 
 from geometry import PARTS
+from kedfem.links.offers import face_kind
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
-from kedfem.report import face_kind
 from kedfem.scene import link_from
 
 HERE, DOCS = Path(__file__).parent, Path(__file__).parents[1] / "docs"

@@ -129,11 +129,12 @@ def mesh(
         float | None, typer.Option(help="Metres per unit of the file, if not its own unit.")
     ] = None,
     folder: Annotated[
-        Path | None, typer.Option(help="Where mesh and picture go; default: beside the part.")
+        Path | None, typer.Option(help="Where mesh and picture go; default: PART-mesh beside the part.")
     ] = None,
 ) -> None:
-    """Mesh one part from CAD with hexahedra: a mesh file, a picture, its quality."""
+    """Mesh one part from CAD: what joints can sit on, a mesh file, a picture, its quality."""
     from kedfem.errors import OutputError
+    from kedfem.links.offers import offers
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
     from kedfem.output.vtu import write_mesh
@@ -148,18 +149,19 @@ def mesh(
     with _progress() as watch:
         watch("mesh", 0, 0)
         made = part_mesh(link, part.parent)
-    _show(mesh_tables(part.name, made))
-    target = ready_folder(folder or part.parent)
+        found = offers(made)
+    _show(mesh_tables(part.name, made, found))
     stem = part.stem if solid is None else f"{part.stem}-{solid}"
-    write_mesh(made, target / f"{stem}-mesh.vtu")
+    target = ready_folder(folder or part.with_name(f"{stem}-mesh"))
+    write_mesh(made, target / "mesh.vtu")
     words = "the mesh, for ParaView or shape.kind = 'mesh'"
-    out.print(f"{target / f'{stem}-mesh.vtu'}  {words}", markup=False, soft_wrap=True)
+    out.print(f"{target / 'mesh.vtu'}  {words}", markup=False, soft_wrap=True)
     try:
-        write_mesh_picture([(part.name, made)], target / f"{stem}-mesh.png", f"{part.name}: {made.way}")
+        write_mesh_picture([(part.name, made)], target / "mesh.png", f"{part.name}: {made.way}", found)
     except OutputError as error:
         err.print(f"warning: {error}", style="yellow", markup=False)
     else:
-        out.print(f"{target / f'{stem}-mesh.png'}  its picture", markup=False, soft_wrap=True)
+        out.print(f"{target / 'mesh.png'}  its picture", markup=False, soft_wrap=True)
 
 
 def _given(keys: dict[str, Any]) -> dict[str, Any]:

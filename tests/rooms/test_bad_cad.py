@@ -100,7 +100,7 @@ class TestBadSolid:
         written(tmp_path, "cut", prism(*corners), ("step",))
         message = refused(tmp_path / "cut.step")
         assert message.startswith(
-            "links.rod.shape.file: must be a closed solid that does not cut itself, got face "
+            "links.rod.shape.file: must be a closed solid that does not cut itself, got a plane face facing "
         )
         assert message.endswith(" mm; mend the part in CAD")
 

@@ -31,7 +31,7 @@ REFUSED = [
     (bad_cad.overlapping, r"links.arm.shape.solid: is required, .* first, second"),
     (
         bad_cad.self_crossing,
-        r"links.arm.step: must be a closed solid that does not cut itself, got face \d+ with",
+        r"links.arm.step: must be a closed solid that does not cut itself, got a plane face facing .* \(face \d+\) with",
     ),
     (bad_cad.wrong_ending, r"links.arm.step: must hold STEP, as its ending says, got another text"),
     (

@@ -221,10 +221,10 @@ def test_mesh_shows_a_part_and_writes_its_mesh_and_picture(run_kedfem: Command, 
     said = run_kedfem("mesh", GEOMETRY / "crank.step", "--folder", tmp_path / "out")
     assert said.code == 0, said.err
     assert "quadrilaterals swept along z" in said.out
-    assert re.search(r"│ bore +│ +12 │ +\(0, 0, -27\) │ +\(0, 0, 1\) │", said.out)
+    assert re.search(r"│ +1 │ face 17 │ bore +│ +24 │ +\(0, 0, -27\) │ z +│ it +│", said.out)
     assert max(len(line) for line in said.out.splitlines() if "/" not in line) <= 80
-    assert (tmp_path / "out" / "crank-mesh.png").stat().st_size > 20_000
-    again = mesh_from_file("again", tmp_path / "out" / "crank-mesh.vtu", 1.0)
+    assert (tmp_path / "out" / "mesh.png").stat().st_size > 20_000
+    again = mesh_from_file("again", tmp_path / "out" / "mesh.vtu", 1.0)
     assert f" {len(again.cells)} hex27 " in said.out
 
 

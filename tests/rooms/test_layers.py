@@ -13,10 +13,11 @@ from numpy.testing import assert_allclose
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.hexahedra import HEX27, shape_functions, shape_gradients
 from kedfem.mesh.layered.cusps import Cusp, cusps
 from kedfem.mesh.layered.fills import Rim
-from kedfem.mesh.layered.layers import direction_in_words, layer_directions, layered_mesh
+from kedfem.mesh.layered.layers import layer_directions, layered_mesh
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.polygons import crosses_itself, polygon_quads
@@ -426,7 +427,8 @@ class TestRefusals:
 
         assert "swept along y" in meshed(drilled).way
         with pytest.raises(
-            OtherWayError, match=r"face \d+, a cylinder of radius [24] mm about .*, is neither along nor"
+            OtherWayError,
+            match=r"the [a-z ]+ of radius [24] mm along . near \(.*\) mm \(face \d+\) is neither along nor",
         ):
             meshed(crossed)
 
@@ -438,7 +440,7 @@ class TestRefusals:
 
         with pytest.raises(
             OtherWayError,
-            match=r"part: no layers along one direction, as face \d+, a cylinder of radius 2 mm",
+            match=r"part: no layers along one direction, as the rounded edge of radius 2 mm along z near",
         ):
             meshed(rounded)
 

@@ -11,11 +11,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError, SceneError
+from kedfem.links.offers import face_kind
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh, ways
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import Solid
-from kedfem.report import face_kind
 from kedfem.scene import LinkScene, Material, link_from, scene_from
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
@@ -72,7 +72,10 @@ class TestLadder:
     def test_a_part_that_is_no_layers_is_filled_another_way_and_the_reason_told(self) -> None:
         mesh = made("ball_ended_rod.step")
         assert "tetrahedra" in mesh.way
-        assert "no layers along one direction, as face 14, a sphere of radius 12 mm near" in mesh.way
+        assert (
+            "no layers along one direction, as the ball of radius 12 mm near (150, 0, 0) mm (face 14) is"
+            in mesh.way
+        )
         assert mesh.cell_type == "tetra10"
         assert valid_everywhere(mesh.points, mesh.cells).all()
 

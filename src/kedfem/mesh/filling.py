@@ -1,6 +1,6 @@
 """Any solid filled with 10-node tetrahedra, nodes on the CAD model's own faces: what is left where nothing sweeps."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -13,7 +13,8 @@ from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.faces import joined_faces
 from kedfem.mesh.cad.model import leave_only
 from kedfem.mesh.cad.solid_faces import cad_faces
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.words import with_faces_in_words
 from kedfem.mesh.hexahedra import SolidMesh, node_numbers
 from kedfem.mesh.quality import scaled_jacobian
 from kedfem.mesh.session import gmsh_options, numbered_nodes
@@ -110,7 +111,7 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh
     said: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
-    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, said):
+    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, said, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
@@ -210,8 +211,8 @@ def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[
 
 
 @contextmanager
-def _listening(gmsh: ModuleType, said: list[str]) -> Iterator[None]:
-    """Whatever gmsh complains of goes to `said`, and it goes on after the block."""
+def _listening(gmsh: ModuleType, said: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
+    """Whatever gmsh complains of goes to `said`, faces in words, and it goes on after the block."""
     gmsh.logger.start()
     try:
         yield
@@ -219,7 +220,8 @@ def _listening(gmsh: ModuleType, said: list[str]) -> Iterator[None]:
         if type(error) is not Exception:  # gmsh raises nothing more special
             raise
         lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
-        said += lines or [str(error)]
+        failed = [tag for dim, tag in gmsh.model.mesh.getLastEntityError() if dim == 2]
+        said += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
     finally:
         gmsh.logger.stop()
 
@@ -227,7 +229,7 @@ def _listening(gmsh: ModuleType, said: list[str]) -> Iterator[None]:
 def _generated(gmsh: ModuleType, solid: Solid, said: list[str]) -> SolidMesh | None:
     """A mesh under the settings that gmsh has now, or None; what it complains of goes to `said`."""
     points, cells, sides = np.zeros((0, 3)), np.zeros((0, 10), dtype=np.int64), {}
-    with _listening(gmsh, said):
+    with _listening(gmsh, said, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)

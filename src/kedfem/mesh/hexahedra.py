@@ -67,6 +67,8 @@ class Face:
         Corner nodes of the sides of elements on the face, in any order.
     chosen : bool
         Whether a joint chose it by what it is: then its name is what was said of it.
+    words : str
+        What a designer calls it, of a face from CAD: ``fillet of radius 2 mm``.
     """
 
     name: str
@@ -77,6 +79,7 @@ class Face:
     inward: bool
     sides: Int[np.ndarray, "f c"]
     chosen: bool = False
+    words: str = ""
 
 
 @dataclass(frozen=True, slots=True)

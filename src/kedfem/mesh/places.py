@@ -9,4 +9,4 @@ def in_mm(X: Iterable[float]) -> str:
     >>> in_mm((0.0127, -0.005, 0.0))
     '(12.7, -5, 0) mm'
     """
-    return "({:.5g}, {:.5g}, {:.5g}) mm".format(*(1e3 * float(x) + 0.0 for x in X))
+    return "({:.5g}, {:.5g}, {:.5g}) mm".format(*(round(1e3 * float(x), 6) + 0.0 for x in X))

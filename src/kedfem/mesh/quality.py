@@ -187,6 +187,8 @@ def _nearest_face(mesh: SolidMesh, place: Float[np.ndarray, "3"]) -> Face:
 
 def _described(face: Face) -> str:
     """A face in words."""
+    if face.words:
+        return f"the {face.words} ({face.name})"
     if not np.isfinite(face.radius):
         return f"{face.name}, a plane" if face.kind == "plane" else face.name
     return f"{face.name}, a {face.kind} of radius {1e3 * face.radius:.3g} mm"

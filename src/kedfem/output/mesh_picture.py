@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
+from kedfem.links.offers import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.hexahedra import QUAD9, shape_functions
@@ -65,12 +66,15 @@ def drawn(mesh: SolidMesh) -> Drawn:
     )
 
 
-def write_mesh_picture(meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str) -> None:
+def write_mesh_picture(
+    meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str, found: Sequence[Offer] = ()
+) -> None:
     """Draw meshes side by side, one alone with the histogram of its quality.
 
     Parameters
     ----------
     meshes : words and mesh of each
+    found : faces of the first that are numbered
 
     Raises
     ------
@@ -82,6 +86,8 @@ def write_mesh_picture(meshes: Sequence[tuple[str, SolidMesh]], png: Path, title
         each = drawn(mesh)
         arrays |= {f"words{i}": np.array(words), f"quality{i}": mesh_quality(mesh).scaled_jacobian}
         arrays |= {f"{key}{i}": getattr(each, key) for key in ("points", "patches", "values", "lines")}
+    if found:
+        arrays |= _numbers(meshes[0][1], found)
     with replacing(Path(png)) as part, tempfile.TemporaryDirectory() as folder:
         given = Path(folder) / "meshes.npz"
         np.savez(given, allow_pickle=False, **arrays)
@@ -93,3 +99,19 @@ def write_mesh_picture(meshes: Sequence[tuple[str, SolidMesh]], png: Path, title
             raise OutputError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
         if done.returncode != 0 or not part.is_file():
             raise OutputError(drawing_fault("the mesh: must be one", done))
+
+
+def _numbers(mesh: SolidMesh, found: Sequence[Offer]) -> dict[str, np.ndarray]:
+    """Where the numbers of faces may stand: on a plane at one place, else on any side of an element; and normals."""
+    places, numbers, normals = [], [], []
+    for each in found:
+        plane = each.kind == "plane"
+        at = each.at[None] if plane else mesh.points[each.face.sides].mean(axis=1)
+        places.append(at)
+        numbers.append(np.full(len(at), each.number))
+        normals.append(np.broadcast_to(each.face.direction if plane else np.zeros(3), at.shape))
+    return {
+        "label_places": np.concatenate(places),
+        "label_numbers": np.concatenate(numbers),
+        "label_normals": np.concatenate(normals),
+    }

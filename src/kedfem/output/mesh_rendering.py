@@ -109,9 +109,26 @@ def image(given: Any, i: int) -> Any:
     )
     plotter.add_mesh(edges, color="black", line_width=1.5)
     plotter.camera_position = [tuple(points.mean(axis=0) + direction), tuple(points.mean(axis=0)), tuple(up)]
+    if i == 0 and "label_places" in given:
+        add_numbers(plotter, given, direction)
     plotter.camera.parallel_projection = True
     plotter.reset_camera()
     return trimmed(plotter.screenshot(return_img=True))
+
+
+def add_numbers(plotter: Any, given: Any, direction: Any) -> None:
+    """Numbers of faces, each at its place nearest to the viewer; those on planes that face away are grey."""
+    places, numbers, normals = (given[f"label_{key}"] for key in ("places", "numbers", "normals"))
+    several = [np.flatnonzero(numbers == number) for number in np.unique(numbers)]
+    near = np.array([own[(places[own] @ direction).argmax()] for own in several])
+    away = normals[near] @ direction < 0
+    for which, colour in ((near[away], "grey"), (near[~away], "black")):
+        if len(which):
+            plotter.add_point_labels(
+                places[which], [str(x) for x in numbers[which]], always_visible=True, font_size=34, bold=True,
+                text_color=colour, shape="rounded_rect", shape_color="white", shape_opacity=0.85, margin=4,
+                show_points=True, point_color=colour, point_size=9,
+            )  # fmt: skip
 
 
 def colours() -> Any:

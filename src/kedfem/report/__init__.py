@@ -4,7 +4,7 @@ from kedfem.output.words import moment
 from kedfem.report.assembly import assembly_tables
 from kedfem.report.check import check_tables
 from kedfem.report.kinematics import kinematics_tables
-from kedfem.report.mesh import face_kind, mesh_tables
+from kedfem.report.mesh import mesh_tables
 from kedfem.report.run import run_tables
 from kedfem.report.sizes import size_line
 from kedfem.report.study import study_tables
@@ -12,7 +12,6 @@ from kedfem.report.study import study_tables
 __all__ = [
     "assembly_tables",
     "check_tables",
-    "face_kind",
     "kinematics_tables",
     "mesh_tables",
     "moment",

@@ -1,21 +1,20 @@
 """A part from CAD on its own: its mesh, its faces, its quality."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.links.rounds import CLOSED
+from kedfem.links.offers import Offer, axis_in_words
 from kedfem.mesh import SolidMesh, mesh_quality
-from kedfem.mesh.hexahedra import Face
 from kedfem.mesh.places import in_mm
 from kedfem.output.words import with_prefix
 from kedfem.report.links import ELEMENTS
 
-KINDS = ("bore", "journal", "ball seat", "ball", "plane", "part of a cylinder")
 
-
-def mesh_tables(name: str, mesh: SolidMesh) -> list[Table]:
+def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Table]:
     """A part on its own: how it was meshed, its faces that a joint can sit on, the quality of its elements."""
     quality = mesh_quality(mesh)
     table = Table(title=Text(name), show_header=False)
@@ -30,35 +29,27 @@ def mesh_tables(name: str, mesh: SolidMesh) -> list[Table]:
     for count, low_end in zip(counts, edges, strict=False):
         if count:
             bars.add_row(f"{low_end:.1f}", str(count), "█" * int(np.ceil(40 * count / counts.max())))
-    return [table, *([_seats(mesh)] if mesh.faces else []), bars]
+    return [table, *([_seats(found)] if found else []), bars]
 
 
-def _seats(mesh: SolidMesh) -> Table:
-    """Faces with a form, those first that a joint finds by itself."""
+def _seats(found: Sequence[Offer]) -> Table:
+    """What a joint can sit on, by the numbers in the picture."""
     table = Table(
-        title="Faces", caption="lengths in mm; for joints.NAME.faces, where a joint does not find its own"
+        title="What joints can sit on",
+        caption="mm; numbers as in the picture; what a joint finds that is put there, of round faces about their axis. "
+        "Others by joints.NAME.faces: the face's name, or what it is: "
+        '{ cylinder = "8 mm", axis = "z", near = [0.05, 0, 0] }',
     )
-    for column in ("face", "kind", "radius", "position", "axis or normal"):
-        left = column in ("face", "kind")
+    for column in ("no", "face", "what", "⌀", "at", "axis", "finds"):
         whole = column == "face"  # names are there to be copied: what is too wide breaks elsewhere
-        table.add_column(column, justify="left" if left else "right", no_wrap=whole, overflow="fold")
-    rows = [(face_kind(mesh, face), face) for face in mesh.faces if face.kind != "other"]
-    for kind, face in sorted(rows, key=lambda row: KINDS.index(row[0])):
-        radius = "" if np.isnan(face.radius) else f"{1e3 * face.radius:.4g}"
-        direction = "" if np.isnan(face.direction).any() else _shown(face.direction, 3)
-        table.add_row(Text(face.name), kind, radius, _shown(1e3 * face.centre, 2), direction)
+        right = column in ("no", "⌀", "at")
+        table.add_column(column, justify="right" if right else "left", no_wrap=whole, overflow="fold")
+    for each in found:
+        diameter = "" if np.isnan(each.face.radius) else f"{2e3 * each.face.radius:.4g}"
+        axis = "" if np.isnan(each.face.direction).any() else axis_in_words(each.face)
+        at = _shown(1e3 * each.at, 1 if each.kind == "plane" else 2)
+        table.add_row(str(each.number), Text(each.face.name), each.kind, diameter, at, axis, each.finds)
     return table
-
-
-def face_kind(mesh: SolidMesh, face: Face) -> str:
-    """What a joint can take a face for: cylinders only where they are closed."""
-    if face.kind != "cylinder":
-        return ("ball seat" if face.inward else "ball") if face.kind == "sphere" else "plane"
-    r = mesh.points[face.sides].mean(axis=1) - face.centre
-    r -= np.outer(r @ face.direction, face.direction)
-    if np.linalg.norm(r.mean(axis=0)) > CLOSED * face.radius:
-        return "part of a cylinder"
-    return "bore" if face.inward else "journal"
 
 
 def _shown(x: Float[np.ndarray, "3"], digits: int) -> str:

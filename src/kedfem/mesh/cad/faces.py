@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
+from kedfem.mesh.cad.words import face_form
 from kedfem.mesh.hexahedra import Face, SolidMesh
 
 _FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
@@ -67,7 +68,10 @@ def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face
         ends = [(a - face.length / 2, a + face.length / 2) for a, face in zip(along, parts, strict=True)]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
         centre = centre + middle * first.direction
-    return Face(first.name, first.kind, centre, first.direction, first.radius, first.inward, sides)
+    words = face_form(first)
+    return Face(
+        first.name, first.kind, centre, first.direction, first.radius, first.inward, sides, words=words
+    )
 
 
 def _one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.solids import CadFace
+from kedfem.mesh.cad.words import face_form
 from kedfem.mesh.places import in_mm
 
 _ACCURACY = 1e-4  # of points, in sizes of the face: what translators between CAD systems leave
@@ -69,7 +70,7 @@ def cad_faces(
     turned = []
     for face in faces:
         places = _inner_places(gmsh, face.tag, _FEWEST if slow else min(_MOST, max(1, _IN_ALL // len(faces))))
-        sign = _outward_sign(gmsh, where, (solid, face.tag), extent, places)
+        sign = _outward_sign(gmsh, where, (solid, face), extent, places)
         turned.append(face if sign > 0 else _cad_face(gmsh, face.tag, face.name, sign))
     return tuple(turned)
 
@@ -123,7 +124,15 @@ def _cad_face(gmsh: ModuleType, tag: int, name: str, sign: float) -> CadFace:
         inward=form.inward,
         area=float(gmsh.model.occ.getMass(2, tag)),
         length=form.length,
+        surface=gmsh.model.getType(2, tag) if form.kind == "other" else "",
+        bend=_least_radius(gmsh, tag, within) if form.kind == "other" else np.nan,
     )
+
+
+def _least_radius(gmsh: ModuleType, tag: int, places: Places) -> float:
+    """The least radius of curvature of a face [m]; nan where it is flat."""
+    bend = np.abs(gmsh.model.getPrincipalCurvatures(tag, places.at[::5].ravel())[:2]).max()
+    return float(1 / bend) if bend > 0 else np.nan
 
 
 def _places(gmsh: ModuleType, tag: int, share: Float[np.ndarray, "m"]) -> Places:
@@ -145,9 +154,11 @@ def _inner_places(gmsh: ModuleType, tag: int, most: int) -> Places:
     return Places(grid.at[chosen], grid.points[chosen], grid.normals[chosen])
 
 
-def _outward_sign(gmsh: ModuleType, where: str, tags: tuple[int, int], extent: float, inner: Places) -> float:
+def _outward_sign(
+    gmsh: ModuleType, where: str, of: tuple[int, CadFace], extent: float, inner: Places
+) -> float:
     """Whether gmsh's normals of a face point out of the solid (1) or into it (-1), by a step to either side."""
-    solid, tag = tags
+    solid, face = of
     step = max(_STEP_OFF * extent, _LEAST_STEP) * inner.normals
     ahead, behind = (
         np.array([gmsh.model.isInside(3, solid, X) > 0 for X in inner.points + side * step], dtype=bool)
@@ -157,7 +168,7 @@ def _outward_sign(gmsh: ModuleType, where: str, tags: tuple[int, int], extent: f
         X = inner.points[np.flatnonzero(ahead == behind)[0]]
         both = "both sides" if ahead[np.flatnonzero(ahead == behind)[0]] else "neither side"
         raise MeshError(
-            f"{where}: must be a closed solid that does not cut itself, got face {tag} with material on "
-            f"{both} at {in_mm(X)}; mend the part in CAD"
+            f"{where}: must be a closed solid that does not cut itself, got a {face_form(face)} ({face.name}) with "
+            f"material on {both} at {in_mm(X)}; mend the part in CAD"
         )
     return 1.0 if behind.sum() >= ahead.sum() else -1.0

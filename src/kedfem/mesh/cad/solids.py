@@ -15,7 +15,11 @@ class OtherWayError(KedfemError):
 
 @dataclass(frozen=True, slots=True)
 class CadFace:
-    """A face of a solid, as gmsh's model has it: its tag there, the rest as in `Face`; of a cylinder also its length."""
+    """A face of a solid, as gmsh's model has it: its tag there, the rest as in `Face`; of a cylinder also its length.
+
+    surface : OpenCASCADE's word for it, where `kind` is other
+    bend : the least radius of curvature of such a face [m]
+    """
 
     tag: int
     name: str
@@ -26,6 +30,8 @@ class CadFace:
     inward: bool
     area: float
     length: float
+    surface: str = ""
+    bend: float = np.nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.hexahedra import SolidMesh
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
@@ -23,7 +24,6 @@ _GAIN = 0.03  # of scaled Jacobian that more elements must bring
 _LEAST = 0.1  # scaled Jacobian below which another way may do better
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
 _SAMPLES = np.linspace(0.0, 1.0, 7)
-_AXES = ("x", "y", "z")
 
 
 def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
@@ -87,7 +87,9 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
             found.append(direction)
         else:
             largest = max(slanted, key=lambda face: face.area)
-            words = f"{_face_in_words(largest)}, is neither along nor across {direction_in_words(direction)}"
+            words = (
+                f"the {face_in_words(largest)} is neither along nor across {direction_in_words(direction)}"
+            )
             obstacles.append((sum(face.area for face in slanted), words))
     if not found:
         obstacle = min(obstacles)[1] if obstacles else "it has no plane face"
@@ -110,14 +112,6 @@ def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"
         (direction, [face for face in solid.faces if not _fits(normals[face.tag], direction)])
         for direction in directions
     ]
-
-
-def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
-    """x, y or z, or the direction's components."""
-    for axis, name in zip(np.eye(3), _AXES, strict=True):
-        if abs(direction @ axis) > 1 - 1e-9:
-            return name
-    return "({:.3g}, {:.3g}, {:.3g})".format(*direction)
 
 
 def _directions(normals: list[Float[np.ndarray, "3"]], areas: list[float]) -> list[Float[np.ndarray, "3"]]:
@@ -147,19 +141,6 @@ def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) 
     """Whether a face is across the direction everywhere, a cap, or along it everywhere, a wall."""
     across = np.linalg.norm(np.cross(normals, direction), axis=1).max() < _ALONG
     return bool(across or abs(normals @ direction).max() < _ALONG)
-
-
-def _face_in_words(face: CadFace) -> str:
-    """A face for the user: its name and what its geometry is."""
-    about = "({:.3g}, {:.3g}, {:.3g})".format(*(face.direction + 0.0))
-    near = "near ({:.3g}, {:.3g}, {:.3g}) mm".format(*(1e3 * face.centre + 0.0))
-    forms = {
-        "plane": f"a plane with normal {about}",
-        "cylinder": f"a cylinder of radius {1000 * face.radius:.4g} mm about {about}",
-        "sphere": f"a sphere of radius {1000 * face.radius:.4g} mm",
-        "other": "a free form, cone or torus",
-    }
-    return f"{face.name}, {forms[face.kind]} {near}"
 
 
 def _mesh_along(

@@ -1,0 +1,82 @@
+"""Faces of a part in a designer's words: a bore, a fillet, a drafted or conical face, and where it is."""
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.mesh.cad.solids import CadFace
+from kedfem.mesh.places import in_mm
+
+_CLOSED = 0.9  # of a full turn: cylinders with keyways are bores and journals still
+_QUARTER = 100.0  # [deg] that a fillet between two walls turns, at the most
+_CORNER = 0.15  # of a ball's area: less is a rounded corner
+_AXES = ("x", "y", "z")
+
+
+def face_form(face: CadFace) -> str:
+    """What a designer calls a face: ``fillet of radius 2 mm``, ``bore of radius 6 mm along z``."""
+    radius = f"of radius {1e3 * face.radius:.4g} mm"
+    match face.kind:
+        case "plane":
+            return f"plane face facing {direction_in_words(face.direction)}"
+        case "sphere":
+            whole = "ball seat" if face.inward else "ball"
+            corner = face.area < _CORNER * 4 * np.pi * face.radius**2
+            return f"{'rounded corner' if corner else whole} {radius}"
+        case "cylinder":
+            return f"{_cylinder(face)} {radius} along {direction_in_words(face.direction)}"
+        case _:
+            return _free_form(face)
+
+
+def _free_form(face: CadFace) -> str:
+    """What is neither plane nor cylinder nor sphere."""
+    if face.surface == "Cone":
+        return "conical face (chamfer, draft or countersink)"
+    if not np.isfinite(face.bend):
+        return "free-form face"
+    bend = f"radius {1e3 * face.bend:.4g} mm"
+    return f"fillet of {bend}" if face.surface == "Torus" else f"free-form face bent to {bend}"
+
+
+def face_in_words(face: CadFace) -> str:
+    """A face, where it is and its name: ``fillet of radius 2 mm near (10, 0, 3) mm (face 7)``."""
+    return f"{face_form(face)} near {in_mm(face.centre)} ({face.name})"
+
+
+def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[int] = ()) -> str:
+    """What gmsh said, its numbers of surfaces in words; else with those that it failed on.
+
+    Parameters
+    ----------
+    failed : tags of faces that gmsh notes as those where it failed
+    """
+    known = {face.tag: face for face in faces}
+
+    def words(found: re.Match[str]) -> str:
+        face = known.get(int(found[1]))
+        return found[0] if face is None else face_in_words(face)
+
+    told = re.sub(r"(?i)\bsurfaces? (\d+)", words, text)
+    named = [face_in_words(known[tag]) for tag in failed if tag in known]
+    return told if told != text or not named else f"{text} at the {', '.join(named[:3])}"
+
+
+def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
+    """x, −y or z, or the direction's components."""
+    for axis, name in zip(np.eye(3), _AXES, strict=True):
+        if abs(direction @ axis) > 1 - 1e-9:
+            return name if direction @ axis > 0 else f"-{name}"
+    return "({:.3g}, {:.3g}, {:.3g})".format(*(np.round(direction, 9) + 0.0))
+
+
+def _cylinder(face: CadFace) -> str:
+    """A bore or journal, a part of one, or the rounding between two walls."""
+    turn = np.degrees(face.area / (face.radius * face.length))
+    if turn > _CLOSED * 360:
+        return "bore" if face.inward else "journal"
+    if turn > _QUARTER:
+        return "part of a bore" if face.inward else "part of a journal"
+    return "fillet" if face.inward else "rounded edge"
