@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from kedfem.errors import KedfemError, SceneError
+from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.terminal import terminal
 
 USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
@@ -133,7 +133,6 @@ def mesh(
     ] = None,
 ) -> None:
     """Mesh one part from CAD: what joints can sit on, a mesh file, a picture, its quality."""
-    from kedfem.errors import OutputError
     from kedfem.links.offers import offers
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
@@ -212,8 +211,6 @@ def new(
     """Write a commented scene to start from."""
     from importlib.resources import files
 
-    from kedfem.errors import OutputError
-
     if kind not in KINDS:
         from kedfem.scene.faults import one_of
 
@@ -228,6 +225,34 @@ def new(
     except OSError as error:
         raise OutputError(f"{target}: must be a file that can be written, got {error.strerror}") from None
     out.print(f"{target} written; try: kedfem check {target}", markup=False, soft_wrap=True)
+
+
+@app.command()
+def cache(
+    clear: Annotated[bool, typer.Option("--clear", help="Remove all that is kept.")] = False,
+) -> None:
+    """Show what is kept between runs, and where."""
+    from kedfem.folders import cache_folder, named_cache
+    from kedfem.store import clear as cleared
+    from kedfem.store import entries
+
+    named, folder = named_cache(), cache_folder()
+    if named is None:
+        out.print("nothing is kept: KEDFEM_CACHE switches it off")
+    elif folder is None:
+        raise OutputError(
+            f"{named}: must be a folder that you own and that nobody else can write (entries can run code), got another "
+            "one; nothing is kept until it is, or KEDFEM_CACHE names another folder"
+        )
+    elif clear:
+        out.print(f"{folder}  {_count(cleared(folder))} removed", markup=False, soft_wrap=True)
+    else:
+        sizes = [path.stat().st_size for path in entries(folder)]
+        out.print(f"{folder}  {_count(len(sizes))}, {sum(sizes) / 1e6:.1f} MB", markup=False, soft_wrap=True)
+
+
+def _count(entries: int) -> str:
+    return f"{entries} entr{'y' if entries == 1 else 'ies'}"
 
 
 @app.command()

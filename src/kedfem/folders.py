@@ -5,15 +5,36 @@ from pathlib import Path
 
 
 def cache_folder() -> Path | None:
-    """Where entries are kept; None if nowhere, or if the folder cannot be made."""
+    """Where entries are kept; None if nowhere, if the folder cannot be made, or if others could put entries there."""
+    folder = named_cache()
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder if private(folder) else None
+    except OSError:
+        return None
+
+
+def named_cache() -> Path | None:
+    """The folder that the user's settings name, whether or not it can be used; None if they switch it off."""
     given = os.environ.get("KEDFEM_CACHE")
     if given in {"", "off"}:
         return None
     from platformdirs import user_cache_path
 
-    folder = Path(given) if given else user_cache_path("kedfem")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    return folder
+    return Path(given) if given else user_cache_path("kedfem")
+
+
+def private(path: Path) -> bool:
+    """Whether only this user can write a file or folder; always, where the system does not know such owners.
+
+    Raises
+    ------
+    OSError
+        There is none.
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    status = path.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022

@@ -2,22 +2,28 @@
 
 The folder is the user's cache folder, or that in KEDFEM_CACHE; KEDFEM_CACHE=off keeps nothing. An entry belongs to a key
 that holds all that it depends on, the versions of kedfem and of the libraries among it. One that cannot be read, or is
-not what was written, is made again.
+not what was written, is made again. Entries are pickles, which can run code: a folder that others own or may write is
+not used.
 """
 
+import os
 import pickle
-import warnings
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, TypeVar
 
-from kedfem.folders import cache_folder
+from kedfem.folders import cache_folder, private
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")
 MOST = 1_000_000_000  # bytes that the cache may take
+OLDEST = 90 * 86400.0  # seconds after which an entry that nobody read goes
+SUFFIX = ".kept"
 
 T = TypeVar("T")
 
@@ -36,27 +42,16 @@ def kept(what: str, key: str, made: Callable[[], T], packed: Callable[[T], Any],
     folder = cache_folder()
     if folder is None:
         return made()
-    from joblib import Memory
-
-    fresh: list[T] = []
-
-    def make() -> Any:
-        fresh.append(made())
-        return packed(fresh[0])
-
-    memory = Memory(folder, verbose=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # an entry that cannot be read or written is made again
-        entry = memory.cache(_sealed, ignore=["made"])
-        place = what, sha256((software() + key).encode()).hexdigest()
-        digest, content = entry(*place, make)
-        if not fresh and sha256(content).hexdigest() != digest:
-            entry.call(*place, make)
-        memory.reduce_size(bytes_limit=MOST)
-    if fresh:
-        return fresh[0]
-    found = pickle.loads(content)
-    return made() if found is None else unpacked(found)
+    entry = folder / what / (sha256((software() + key).encode()).hexdigest() + SUFFIX)
+    content = _read(entry)
+    if content is not None:
+        return unpacked(pickle.loads(content))
+    fresh = made()
+    if (small := packed(fresh)) is not None:
+        with suppress(OSError):  # nothing is kept where nothing can be written
+            _write(entry, pickle.dumps(small, protocol=pickle.HIGHEST_PROTOCOL))
+            _make_room(folder)
+    return fresh
 
 
 def itself(x: T) -> T:
@@ -64,11 +59,54 @@ def itself(x: T) -> T:
     return x
 
 
-def _sealed(what: str, key: str, made: Callable[[], Any]) -> tuple[str, bytes]:
-    """What is made, as bytes with their digest."""
-    del what, key
-    content = pickle.dumps(made(), protocol=pickle.HIGHEST_PROTOCOL)
-    return sha256(content).hexdigest(), content
+def entries(folder: Path) -> Iterator[Path]:
+    """All entries of a cache folder, also what killed runs left of unfinished ones."""
+    return (path for path in folder.glob("*/*") if path.suffix in {SUFFIX, ".part"} and path.is_file())
+
+
+def clear(folder: Path) -> int:
+    """Remove all entries of a cache folder, and nothing else; how many there were."""
+    found = list(entries(folder))
+    for path in found:
+        path.unlink(missing_ok=True)
+    return len(found)
+
+
+def _read(entry: Path) -> bytes | None:
+    """What an entry holds; None if there is none, if others may write it, or if it is not what was written."""
+    try:
+        if not (private(entry.parent) and private(entry)):
+            return None
+        whole = entry.read_bytes()
+        os.utime(entry)  # what is used stays longest
+    except OSError:
+        return None
+    digest, content = whole[:32], whole[32:]
+    return content if sha256(content).digest() == digest else None
+
+
+def _write(entry: Path, content: bytes) -> None:
+    """Put an entry in place whole."""
+    entry.parent.mkdir(mode=0o700, exist_ok=True)
+    part = entry.with_name(f"{entry.stem}.{token_hex(4)}.part")
+    try:
+        with os.fdopen(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
+            file.write(sha256(content).digest())
+            file.write(content)
+        part.replace(entry)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _make_room(folder: Path) -> None:
+    """Remove entries that are too old, then those used longest ago while all take too much space."""
+    found = sorted(((path.stat(), path) for path in entries(folder)), key=lambda each: each[0].st_mtime)
+    size = sum(status.st_size for status, _ in found)
+    for status, path in found:
+        if size <= MOST and time.time() - status.st_mtime < OLDEST:
+            break
+        path.unlink(missing_ok=True)
+        size -= status.st_size
 
 
 def contents(files: Iterable[Path]) -> bytes:

@@ -1,21 +1,26 @@
 """What is kept between runs: the same results, and new ones when anything changes or an entry is damaged."""
 
+import os
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from typer.testing import CliRunner
 
+from kedfem import store
 from kedfem.accuracy import reduction
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.reduction import prepared
+from kedfem.cli import app
 from kedfem.dynamics.model import Model
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery
 from kedfem.scene import Scene, scene_from
-from kedfem.store import contents, itself, kept
+from kedfem.store import clear, contents, entries, itself, kept
 
 from .test_dynamics import four_bar
 
@@ -72,8 +77,8 @@ def peak_stress(model: Model) -> np.ndarray:
 def test_a_damaged_entry_is_made_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = made(monkeypatch)
     prepared(scene())
-    for file in folder.rglob("*.pkl"):
-        file.write_bytes(b"not a pickle")
+    for file in entries(folder):
+        file.write_bytes(b"not an entry")
     found, _ = prepared(scene())
     assert len(calls) == 2
     assert [link.name for link in found.model.links] == ["coupler", "rocker"]
@@ -120,7 +125,7 @@ def test_an_entry_that_reads_well_but_is_not_what_was_written_is_made_again(fold
         return [1.0, 2.0]
 
     kept("numbers", "any", work, itself, itself)
-    (file,) = folder.rglob("output.pkl")
+    (file,) = entries(folder)
     file.write_bytes(file.read_bytes().replace(struct.pack(">d", 2.0), struct.pack(">d", 3.0)))
     assert [kept("numbers", "any", work, itself, itself) for _ in range(2)] == [[1.0, 2.0]] * 2
     assert len(calls) == 2
@@ -145,3 +150,89 @@ def test_a_folder_that_cannot_be_written_does_not_stop_a_run(
     monkeypatch.setenv("KEDFEM_CACHE", str(blocked / "cache"))
     found, _ = prepared(scene())
     assert found.model.links
+
+
+def numbers(calls: list[int], key: str = "any") -> list[float]:
+    """What is kept under a key; `calls` grows when it is made."""
+
+    def work() -> list[float]:
+        calls.append(1)
+        return [1.0, 2.0]
+
+    return kept("numbers", key, work, itself, itself)
+
+
+@pytest.mark.parametrize("place", ["folder", "kind", "entry"])
+def test_what_others_may_write_is_not_read(folder: Path, place: str) -> None:
+    calls: list[int] = []
+    numbers(calls)
+    (entry,) = entries(folder)
+    {"folder": folder, "kind": entry.parent, "entry": entry}[place].chmod(0o777)
+    numbers(calls)
+    assert len(calls) == 2
+
+
+def test_entries_belong_to_their_user_alone(folder: Path) -> None:
+    numbers([])
+    (entry,) = entries(folder)
+    assert [path.stat().st_mode & 0o077 for path in (folder, entry.parent, entry)] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("cut", [0, 10, 40])
+def test_a_cut_entry_is_made_again(folder: Path, cut: int) -> None:
+    calls: list[int] = []
+    numbers(calls)
+    (entry,) = entries(folder)
+    entry.write_bytes(entry.read_bytes()[:cut])
+    assert [numbers(calls) for _ in range(2)] == [[1.0, 2.0]] * 2
+    assert len(calls) == 2
+
+
+def test_every_changed_byte_is_noticed(folder: Path) -> None:
+    calls: list[int] = []
+    numbers(calls)
+    (entry,) = entries(folder)
+    whole = entry.read_bytes()
+    for k in range(len(whole)):
+        entry.write_bytes(whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :])
+        assert numbers(calls) == [1.0, 2.0]
+    assert len(calls) == 1 + len(whole)
+
+
+def test_old_entries_go_and_those_used_longest_ago_where_space_is_short(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in "abc":
+        numbers([], name)
+    size = sum(entry.stat().st_size for entry in entries(folder))
+    for age, entry in enumerate(sorted(entries(folder))):
+        os.utime(entry, (time.time() - 60 * (age + 1),) * 2)
+    kept_longest = {entry.name for entry in sorted(entries(folder))[:2]}
+    monkeypatch.setattr(store, "MOST", size)
+    numbers([], "d")
+    left = {entry.name for entry in entries(folder)}
+    assert len(left) == 3
+    assert kept_longest < left
+    for entry in entries(folder):
+        os.utime(entry, (time.time() - store.OLDEST - 1,) * 2)
+    numbers([], "e")
+    assert len(list(entries(folder))) == 1
+
+
+def test_clearing_removes_entries_and_nothing_else(folder: Path) -> None:
+    numbers([])
+    (folder / "numbers" / "letter.txt").write_text("mine", "utf-8")
+    assert clear(folder) == 1
+    assert [path.name for path in folder.rglob("*") if path.is_file()] == ["letter.txt"]
+
+
+def test_the_command_tells_what_is_kept_and_clears_it(folder: Path) -> None:
+    numbers([])
+    said = CliRunner().invoke(app, ["cache"]).output
+    assert "1 entry" in said
+    assert str(folder) in said
+    assert "1 entry removed" in CliRunner().invoke(app, ["cache", "--clear"]).output
+    assert not list(entries(folder))
+    folder.chmod(0o777)
+    refused = CliRunner().invoke(app, ["cache"])
+    assert "nobody else can write" in str(refused.exception)

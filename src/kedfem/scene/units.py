@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from kedfem.folders import cache_folder
 from kedfem.scene.wording import shown
 
 if TYPE_CHECKING:
@@ -90,8 +89,7 @@ def unit_registry() -> pint.UnitRegistry[float]:
     """Pint's registry of units, imported when the first string with a unit is met."""
     import pint
 
-    folder = cache_folder()
-    return pint.UnitRegistry(cache_folder=None if folder is None else folder / "units")
+    return pint.UnitRegistry()
 
 
 def si_number(text: str, unit: str) -> float:
