@@ -52,11 +52,15 @@ def run(
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
     from kedfem.report import run_tables, size_line
+    from kedfem.results import abandoned_rows
     from kedfem.scene import read_scene
 
     loaded = _quick(read_scene(scene)) if quick else read_scene(scene)
     file = loaded.results_folder / "results.h5"
     before = _version(file)
+    if (rows := abandoned_rows(file)) is not None:
+        said = f"{file}: an earlier run was killed after {rows} rows; they stay until this run's first rows replace them"
+        err.print(f"warning: {said}", style="yellow", markup=False, soft_wrap=True)
     try:
         with _progress() as watch:
             done = analyse(loaded, watch)
@@ -355,8 +359,21 @@ def _say_where(folder: Path) -> None:
             out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)
 
 
+def _terminated_as_interrupted() -> None:
+    """Let the system's wish that kedfem end keep what Ctrl-C keeps."""
+    import signal
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("SIGTERM", "SIGBREAK", "SIGHUP"):  # SIGBREAK: Windows; SIGHUP: a terminal that is closed
+        if (number := getattr(signal, name, None)) is not None and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, interrupt)
+
+
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
+    _terminated_as_interrupted()
     try:
         app()
     except KedfemError as error:

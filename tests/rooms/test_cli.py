@@ -112,7 +112,7 @@ MAIN = "from kedfem.cli import main; main()"
 def test_help_names_every_command_and_each_explains_itself(run_kedfem: Command) -> None:
     said = run_kedfem("--help")
     assert said.code == 0
-    for name in ("run", "check", "kinematics", "mesh", "accuracy", "new", "bench"):
+    for name in ("run", "check", "kinematics", "mesh", "accuracy", "new", "cache", "bench"):
         assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), (
             f"{name} is cut off or missing"
         )
@@ -346,7 +346,8 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
     assert file.read_bytes() == before
 
 
-def test_ctrl_c_leaves_what_was_computed(arm: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.Signals) -> None:
     arm.write_text(ARM.replace("TURNS", "10000"), encoding="utf-8")
     folder = arm.with_name("arm-results")
     running = process(MAIN, "run", arm.name, folder=arm.parent)
@@ -354,7 +355,7 @@ def test_ctrl_c_leaves_what_was_computed(arm: Path) -> None:
         wait_for(
             lambda: (folder / "animation_0050.vtu").exists() and (folder / "results.h5").exists(), running
         )
-        running.send_signal(signal.SIGINT)
+        running.send_signal(number)
         out, err = running.communicate(timeout=60)
     finally:
         running.kill()
@@ -366,6 +367,23 @@ def test_ctrl_c_leaves_what_was_computed(arm: Path) -> None:
     assert results.status == "interrupted"
     assert len(results.time) > 256
     expect_whole_animation(folder, results)
+
+
+def test_a_killed_run_is_named_by_the_next_one(run_kedfem: Command, arm: Path) -> None:
+    arm.write_text(ARM.replace("TURNS", "10000"), encoding="utf-8")
+    file = arm.with_name("arm-results") / "results.h5"
+    running = process(MAIN, "run", arm.name, folder=arm.parent)
+    try:
+        wait_for(file.exists, running)
+    finally:
+        running.kill()
+        running.communicate()
+    left = read_results(file)
+    assert left.status == "abandoned"
+    arm.write_text(ARM.replace("TURNS", "0.1"), encoding="utf-8")
+    said = run_kedfem("run", arm)
+    assert f"an earlier run was killed after {len(left.time)} rows" in said.err
+    assert read_results(file).status == "complete"
 
 
 def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(

@@ -18,15 +18,18 @@ from numpy.testing import assert_array_equal
 from kedfem.errors import OutputError
 from kedfem.results import (
     Channel,
+    Peak,
     Results,
     ResultsWriter,
+    abandoned_rows,
+    add_notes,
     claimed,
     read_results,
     ready_folder,
     replacing,
     write_csv,
 )
-from kedfem.results.writer import drive_channel
+from kedfem.results.writer import add_peaks, drive_channel
 from kedfem.scene import scene_from
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -95,6 +98,48 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
         read.channels[FORCE.name][1][0, 0] = 1.0
 
 
+def test_changed_bytes_are_noticed(tmp_path: Path) -> None:
+    """Of 300 files with one changed bit each, none is read with other contents."""
+    path = tmp_path / "results.h5"
+    write(path, 600)
+    add_peaks(path, {"rod": Peak(2e6, "rod", (0.1, 0.2, 0.3), 7, 3, 0.01, 0.5, "a corner")})
+    add_notes(path, {"error": 0.01, "way": "layers"})
+    whole, true = path.read_bytes(), said(read_results(path))
+    random = np.random.default_rng(3)
+    noticed = 0
+    for k in random.integers(len(whole), size=300):
+        changed = bytearray(whole)
+        changed[k] ^= 1 << random.integers(8)
+        path.write_bytes(changed)
+        try:
+            assert said(read_results(path)) == true, f"byte {k}"
+        except OutputError:
+            noticed += 1
+    assert noticed > 220
+
+
+@pytest.mark.parametrize("text", ["layers", "Schub", "world", "Größe", "a corner", "motion law"])
+def test_changed_texts_are_noticed(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "results.h5"
+    with writer(path) as results:
+        results.append(*rows(0, 2))
+        results.note({"way": "layers", "part": "Schub"})
+    add_peaks(path, {"rod": Peak(2e6, "rod", (0.1, 0.2, 0.3), 7, 3, 0.01, 0.5, "a corner")})
+    old = text.encode()
+    assert old in path.read_bytes()
+    path.write_bytes(path.read_bytes().replace(old, bytes([old[0] ^ 2]) + old[1:]))
+    with pytest.raises(OutputError, match=r"text that is not what was written|corrupt"):
+        read_results(path)
+
+
+def said(results: Results) -> str:
+    """All that a file holds."""
+    values = [values.tobytes() for _, values in results.channels.values()]
+    kinds = [str(channel) for channel, _ in results.channels.values()]
+    rest = replace(results, channels={}, time=results.time.tobytes(), angle=results.angle.tobytes())
+    return f"{rest} {kinds} {values}"
+
+
 def test_units_stand_inside_the_file(tmp_path: Path) -> None:
     write(tmp_path / "results.h5", 2)
     with h5py.File(tmp_path / "results.h5", "r") as file:
@@ -125,7 +170,9 @@ def test_a_run_under_way_can_be_read(tmp_path: Path) -> None:
         here = read_results(path)
         code = "import sys; from kedfem.results import read_results as r; print(r(sys.argv[1]).status)"
         elsewhere = run(code, path)
+        assert abandoned_rows(path) is None
     assert (here.status, len(here.time)) == ("running", 4)
+    assert abandoned_rows(path) is None
     assert elsewhere.stdout.strip() == "running", elsewhere.stderr
 
 
@@ -157,7 +204,8 @@ def test_a_killed_run_is_not_complete_and_keeps_its_rows(tmp_path: Path) -> None
     )
     assert run(code, tmp_path / "results.h5").returncode == -signal.SIGKILL
     read = read_results(tmp_path / "results.h5")
-    assert read.status == "running"
+    assert read.status == "abandoned"
+    assert abandoned_rows(tmp_path / "results.h5") == 9
     np.testing.assert_array_equal(read.channels["a/b"][1][:, 0], np.arange(9))
 
 
@@ -363,7 +411,7 @@ def gap(path: Path) -> None:
         (corrupt, "must be a results file of kedfem, got a corrupt file"),
         (truncated, "must be a results file of kedfem, got a corrupt file .*truncated"),
         (foreign, "must be a results file of kedfem, got another HDF5 file"),
-        (newer, "must be a results file of kedfem with layout 1 or older, got layout 99"),
+        (newer, "must be a results file of kedfem with layout 2, got layout 99"),
         (gap, "must be a results file of kedfem, got one with a gap .*angle"),
     ],
 )

@@ -7,12 +7,14 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
   older ``NAME``.
   A run that fails earlier removes its own file and leaves the old one as it was.
 * The file says ``status = "running"`` from then on, ``"complete"`` only after a clean end, and
-  ``"interrupted"`` (with the reason) after an error or Ctrl-C. A killed process leaves ``"running"``.
+  ``"interrupted"`` (with the reason) after an error, Ctrl-C or SIGTERM. A killed process leaves ``"running"``, and no
+  lock: whoever reads the file is told ``"abandoned"``.
+* Changed bytes are noticed: such a file is refused.
 * Whatever the status, all rows up to the last :meth:`ResultsWriter.append` can be read.
 """
 
 from kedfem.results.files import claimed, ready_folder, replacing
-from kedfem.results.reader import read_results
+from kedfem.results.reader import abandoned_rows, read_results
 from kedfem.results.records import Channel, Peak, Results
 from kedfem.results.table import write_csv
 from kedfem.results.writer import ResultsWriter, add_notes
@@ -22,6 +24,7 @@ __all__ = [
     "Peak",
     "Results",
     "ResultsWriter",
+    "abandoned_rows",
     "add_notes",
     "claimed",
     "read_results",

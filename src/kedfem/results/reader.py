@@ -8,8 +8,8 @@ import numpy as np
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
+from kedfem.results.layout import FORMAT, PEAKS, all_rows, opened, sealed, series
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results
-from kedfem.results.writer import FORMAT, PEAKS
 
 WANTED = "a results file of kedfem"
 
@@ -38,21 +38,44 @@ def read_results(path: Path) -> Results:
     try:
         with _opened(path) as file:
             _refuse_foreign(file, path)
-            return _results(file)
+            found = _results(file)
+            if not sealed(file):
+                raise ValueError("a text that is not what was written")
+        abandoned = found.status == "running" and not _alive(path)
+        return replace(found, status="abandoned") if abandoned else found
     except (OSError, RuntimeError) as error:
         raise OutputError(f"{path}: must be {WANTED}, got a corrupt file ({reason(error)})") from error
     except (KeyError, ValueError, TypeError) as error:
         raise OutputError(f"{path}: must be {WANTED}, got one with a gap ({error})") from error
 
 
+def abandoned_rows(path: Path) -> int | None:
+    """How many rows a run left whose process was killed; None if there is no such run."""
+    try:
+        with _opened(path) as file:
+            if file.attrs.get("status") != "running":
+                return None
+            rows = len(file[TIME.name])
+        return None if _alive(path) else rows
+    except (OSError, RuntimeError, KeyError):
+        return None
+
+
 def _opened(path: Path) -> Any:
     """The file, whether or not a run is writing it."""
-    import h5py
-
     try:
-        return h5py.File(path, "r", locking=False)  # the run holds the lock
+        return opened(path, "r", False)  # the run holds the lock
     except OSError:
-        return h5py.File(path, "r")  # HDF5 wants equal locking flags where the run is this same process
+        return opened(path, "r")  # HDF5 wants equal locking flags where the run is this same process
+
+
+def _alive(path: Path) -> bool:
+    """Whether a process holds the lock of a file that says that its run is under way; yes, where nobody can tell."""
+    try:
+        opened(path, "r", True).close()
+    except OSError:
+        return True
+    return False
 
 
 def _refuse_foreign(file: Any, path: Path) -> None:
@@ -60,23 +83,23 @@ def _refuse_foreign(file: Any, path: Path) -> None:
     layout = file.attrs.get("format")
     if layout is None or "kedfem_version" not in file.attrs:
         raise OutputError(f"{path}: must be {WANTED}, got another HDF5 file")
-    if int(layout) > FORMAT:
+    if int(layout) != FORMAT:
         got = f"layout {layout} of kedfem {file.attrs['kedfem_version']}"
-        raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT} or older, got {got}")
+        raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT}, got {got}")
 
 
 def _results(file: Any) -> Results:
     """The record; every series is cut to the rows that all of them have."""
-    series = sorted(_series(file), key=lambda rows: int(rows.attrs["index"]))
-    n = min(len(rows) for rows in series)
-    named = {rows.name.removeprefix("/"): rows for rows in series}
+    every = sorted(series(file), key=lambda rows: int(rows.attrs["index"]))
+    n = min(len(rows) for rows in every)
+    named = {rows.name.removeprefix("/"): rows for rows in every}
     toml = file["scene"].get("toml")
     position = TRAVEL if TRAVEL.name in named else ANGLE
     drive = named.pop(position.name)
     return Results(
-        time=_frozen(named.pop(TIME.name)[:n]),
-        angle=_frozen(drive[:n]),
-        channels={name: (_channel(name, rows), _frozen(rows[:n])) for name, rows in named.items()},
+        time=all_rows(named.pop(TIME.name), n),
+        angle=all_rows(drive, n),
+        channels={name: (_channel(name, rows), all_rows(rows, n)) for name, rows in named.items()},
         status=file.attrs["status"],
         scene_json=file["scene/json"].asstr()[()],
         scene_toml=None if toml is None else toml.asstr()[()],
@@ -98,26 +121,9 @@ def _peak(group: Any) -> Peak:
     )  # fmt: skip
 
 
-def _series(file: Any) -> list[Any]:
-    """Every dataset that carries a unit."""
-    found: list[Any] = []
-
-    def keep(_: str, item: Any) -> None:
-        if "unit" in item.attrs:
-            found.append(item)
-
-    file.visititems(keep)
-    return found
-
-
 def _channel(name: str, rows: Any) -> Channel:
     said = rows.attrs
     return Channel(name, tuple(map(str, said["columns"])), said["unit"], said["frame"], said["description"])
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array.flags.writeable = False
-    return array
 
 
 def _plain(value: Any) -> str | float:

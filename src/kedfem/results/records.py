@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-Status = Literal["running", "complete", "interrupted"]
+Status = Literal["running", "complete", "interrupted", "abandoned"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Results:
     channels
         Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
     status
-        ``complete``; ``interrupted``; ``running``: still being written, or the process was killed.
+        ``complete``; ``interrupted``; ``running``: still being written; ``abandoned``: its process was killed.
     scene_json, scene_toml
         The scene that was analysed; the TOML text is None for a scene made in Python.
     notes

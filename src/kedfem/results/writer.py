@@ -12,19 +12,12 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
+from kedfem.results.layout import CHUNK_ROWS, FORMAT, PEAKS, new_rows, opened, seal
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
 from kedfem.scene import Scene
 
-FORMAT = 1
-"""Version of the file's layout."""
-
-CHUNK_ROWS = 512
-"""Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
-
 SPARE_SPACE = 1_000_000
 """Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
-
-PEAKS = "peaks"
 
 
 def drive_channel(scene: Scene) -> Channel:
@@ -110,7 +103,7 @@ class ResultsWriter:
         self._refuse_another_run()
         try:
             require_space(self.path.parent, SPARE_SPACE)
-            self._open(self._part, "x")
+            self._file = opened(self._part, "x")
             self._lay_out()
         except OSError as error:
             self._discard()
@@ -157,6 +150,7 @@ class ResultsWriter:
         """Store more facts about the run, e.g. what is known only at its end."""
         try:
             self._file["notes"].attrs.update(notes)
+            seal(self._file)
         except OSError as error:
             raise self._fault(error) from error
 
@@ -174,21 +168,13 @@ class ResultsWriter:
             if kind is None:
                 raise self._fault(fault) from fault
 
-    def _open(self, path: Path, mode: str) -> None:
-        """Open the file, locked against a second writer where the disk knows locks."""
-        import h5py
-
-        self._file = h5py.File(path, mode, locking="best-effort")
-
     def _refuse_another_run(self) -> None:
         """An older file is only replaced when no run is at work on it."""
-        import h5py
-
         try:
             if self.path.is_dir():
                 raise IsADirectoryError(21, "a folder of that name")
             if self.path.exists():
-                h5py.File(self.path, "r", locking="best-effort").close()
+                opened(self.path, "r").close()
         except (BlockingIOError, IsADirectoryError) as error:
             raise self._fault(error) from error
         except OSError:
@@ -205,11 +191,10 @@ class ResultsWriter:
         self._file.create_group("notes").attrs.update(self._notes)
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if channel.columns else ()
-            rows = self._file.create_dataset(
-                channel.name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width)
-            )
+            rows = new_rows(self._file, channel.name, width)
             rows.attrs.update(unit=channel.unit, frame=channel.frame, description=channel.description)
             rows.attrs.update(columns=list(channel.columns) or [channel.name], index=index)
+        seal(self._file)
 
     def _check(self, length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
         """Names and shapes of a block."""
@@ -230,15 +215,16 @@ class ResultsWriter:
         self._refuse_another_run()
         self._part.replace(self.path)
         self._published = True
-        self._open(self.path, "r+")
+        self._file = opened(self.path, "r+")
 
     def _end(self, status: str, why: str) -> None:
         """Close the file, all channels cut to the rows that were written whole."""
         if not self._file:  # stopped while it was being put in place
-            self._open(self.path, "r+")
+            self._file = opened(self.path, "r+")
         for channel in (TIME, self.drive, *self.channels):
             self._file[channel.name].resize(self.rows, axis=0)
         self._file.attrs.update(reason=why, status=status)
+        seal(self._file)
         if self._published:
             self._file.close()
         else:
@@ -266,12 +252,11 @@ def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
     OutputError
         The file cannot be written.
     """
-    import h5py
-
     try:
-        with h5py.File(path, "r+", locking="best-effort") as file:
+        with opened(path, "r+") as file:
             for name, peak in peaks.items():
                 _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
+            seal(file)
     except (OSError, RuntimeError) as error:
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
 
@@ -295,10 +280,9 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
     OutputError
         The file cannot be written.
     """
-    import h5py
-
     try:
-        with h5py.File(path, "r+", locking="best-effort") as file:
+        with opened(path, "r+") as file:
             file["notes"].attrs.update(notes)
+            seal(file)
     except (OSError, RuntimeError) as error:
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error

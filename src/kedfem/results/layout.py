@@ -1,0 +1,114 @@
+"""How a results file is laid out in HDF5, and how damage to it is noticed.
+
+Numbers carry HDF5's own checksum (Fletcher's), its tables those of the layout of HDF5 1.8 and later. Texts lie where HDF5
+checks nothing: their digest is stored beside them.
+"""
+
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+FORMAT = 2
+"""Version of the file's layout."""
+
+CHUNK_ROWS = 512
+"""Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
+
+PEAKS = "peaks"
+DIGEST = "digest_of_texts"
+CHECKSUM = 4  # bytes of a chunk
+
+
+def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
+    """The file, locked against a second writer where the disk knows locks.
+
+    Raises
+    ------
+    OSError
+        As HDF5 says.
+    """
+    import h5py
+
+    return h5py.File(path, mode, locking=locking, libver=("v108", "v110"))
+
+
+def new_rows(file: Any, name: str, width: tuple[int, ...]) -> Any:
+    """An empty dataset of rows that can grow, with checksums."""
+    return file.create_dataset(
+        name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width), fletcher32=True
+    )
+
+
+def series(file: Any) -> list[Any]:
+    """Every dataset that carries a unit."""
+    found: list[Any] = []
+
+    def keep(_: str, item: Any) -> None:
+        if "unit" in item.attrs:
+            found.append(item)
+
+    file.visititems(keep)
+    return found
+
+
+def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n c"]:
+    """The first rows of a dataset, a frozen array.
+
+    Raises
+    ------
+    OSError
+        Numbers are not those that were written.
+    ValueError
+        The list of chunks is not: HDF5 has no checksum of it, and a wrong one leaves gaps, or checks nothing.
+    """
+    size = rows.dtype.itemsize * int(np.prod(rows.chunks)) + CHECKSUM
+    for first in range(0, len(rows), rows.chunks[0]):
+        mask, stored = rows.id.read_direct_chunk(
+            (first,) + (0,) * (rows.ndim - 1)
+        )  # refuses one that is not found
+        if (len(stored), mask) != (size, 0):
+            raise ValueError(f"rows of {rows.name} that are not those that were written")
+    values: np.ndarray = rows[:n]
+    values.flags.writeable = False
+    return values
+
+
+def seal(file: Any) -> None:
+    """Store the digest of the file's texts as they are now."""
+    file.attrs[DIGEST] = np.frombuffer(_digest(file), np.uint8)
+
+
+def sealed(file: Any) -> bool:
+    """Whether the texts are those that were written."""
+    return bytes(file.attrs[DIGEST]) == _digest(file)
+
+
+def _digest(file: Any) -> bytes:
+    digest = sha256()
+    for text in _texts(file):
+        digest.update(sha256(text.encode("utf-8", "surrogateescape")).digest())
+    return digest.digest()
+
+
+def _texts(file: Any) -> Iterator[str]:
+    """All that is said in words, in an order of its own."""
+    yield from _said("", file)
+    for key in sorted(file["scene"]):
+        yield f"{key} = {file['scene'][key].asstr()[()]}"
+    yield from _said("notes", file["notes"])
+    for rows in sorted(series(file), key=lambda each: str(each.name)):
+        yield from _said(rows.name, rows)
+    if PEAKS in file:
+        for name in sorted(file[PEAKS]):
+            yield from _said(name, file[PEAKS][name])
+
+
+def _said(where: str, item: Any) -> Iterator[str]:
+    for key in sorted(item.attrs):
+        value = item.attrs[key]
+        if isinstance(value, str) or np.asarray(value).dtype == object:
+            yield f"{where} {key} = {value if isinstance(value, str) else list(value)}"
