@@ -68,11 +68,13 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room):  # type: ig
 def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untyped-def]
     """Newmark's formulas from the displacement u at the end of the step; state and history."""
     n0, n1, n2 = c.acceleration
+    u0, v0, a0, F0, late, early = state.u, state.v, state.a, state.F, c.late, c.early
+    us, vs, as_, Fs = history.u[t], history.v[t], history.a[t], history.F[t]
     for x in range(first, last):
-        a = n0 * (u[x - first] - state.u[x]) - n1 * state.v[x] - n2 * state.a[x]
-        state.v[x] += c.late * a + c.early * state.a[x]
-        state.u[x], state.a[x], state.F[x] = u[x - first], a, F[x]
-        history.u[t, x], history.v[t, x], history.a[t, x], history.F[t, x] = state.u[x], state.v[x], a, F[x]
+        a = n0 * (u[x - first] - u0[x]) - n1 * v0[x] - n2 * a0[x]
+        v0[x] += late * a + early * a0[x]
+        u0[x], a0[x], F0[x] = u[x - first], a, F[x]
+        us[x], vs[x], as_[x], Fs[x] = u0[x], v0[x], a, F[x]
 
 
 @inner
@@ -175,10 +177,12 @@ def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no
     """out becomes what is missing to balance at the end of the step, without interface forces, in the frame R."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     n0, n1, n2 = c.acceleration
+    u0, v0, a0, F0, f0, f1 = state.u, state.v, state.a, state.F, state.f, trial.f
+    c_m, c_f, alpha_m, alpha_f = 1 - c.alpha_m, 1 - c.alpha_f, c.alpha_m, c.alpha_f
     for x in range(first, last):
-        a = n0 * (u[x] - state.u[x]) - n1 * state.v[x] - n2 * state.a[x]
-        r = (1 - c.alpha_f) * (F[x] - trial.f[x]) - (1 - c.alpha_m) * a
-        room[x - first] = r + c.alpha_f * (state.F[x] - state.f[x]) - c.alpha_m * state.a[x]
+        a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
+        r = c_f * (F[x] - f1[x]) - c_m * a
+        room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
     turned_back(R, d, room[: last - first], out[first:last])
 
 

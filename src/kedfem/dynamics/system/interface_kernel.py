@@ -19,7 +19,8 @@ REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknown
 @inner
 def gathered(bodies, trial):  # type: ignore[no-untyped-def]
     """Rᵀ B and S Rᵀ B of all bodies in their frames, and the matrix of z."""
-    trial.H[:] = 0.0
+    H, S = trial.H, bodies.S
+    H[:] = 0.0
     for i in range(len(bodies.motion)):
         q, c = bodies.port_at[i + 1] - bodies.port_at[i], bodies.column_at[i + 1] - bodies.column_at[i]
         at, columns = bodies.B_at[i], bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
@@ -28,7 +29,7 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
         SRB[:] = 0.0
         for r in range(q):
             for p in range(q):
-                s = bodies.S[bodies.S_at[i] + r * q + p]
+                s = S[bodies.S_at[i] + r * q + p]
                 for m in range(c):
                     SRB[r * c + m] += s * RB[p * c + m]
         for r in range(q):
@@ -36,7 +37,7 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
                 x, row = RB[r * c + m], columns[m]
                 if x != 0.0:
                     for o in range(c):
-                        trial.H[row, columns[o]] += x * SRB[r * c + o]
+                        H[row, columns[o]] += x * SRB[r * c + o]
 
 
 @inner
@@ -50,27 +51,31 @@ def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
     """
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
     q, N = last - first, bodies.at[i + 1] - bodies.at[i]
+    RB, W, z, w, at = trial.RB, bodies.W, trial.z, trial.w, bodies.B_at[i]
+    columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
     for r in range(q):
         x = 0.0
         for m in range(c):
-            x += trial.RB[bodies.B_at[i] + r * c + m] * trial.z[bodies.columns[bodies.column_at[i] + m]]
+            x += RB[at + r * c + m] * z[columns[m]]
         if base:
+            of = bodies.Y_at[i] + r * N
             for y in range(N):
-                x -= bodies.W[bodies.Y_at[i] + r * N + y] * u[y]
-        trial.w[first + r] = x
+                x -= W[of + y] * u[y]
+        w[first + r] = x
 
 
 @inner
-def pushed(bodies, i, trial, room):  # type: ignore[no-untyped-def]
+def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
     """Add to the right-hand side what a body exerts on z: Bᵀ R (Yᵀ Rᵀ r − S w₀)."""
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
     q, at = last - first, bodies.B_at[i]
+    RB, SRB, reaction, w, right = trial.RB, trial.SRB, trial.reaction, trial.w, trial.right
+    columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
     for m in range(c):
         x = 0.0
         for r in range(q):
-            x += trial.RB[at + r * c + m] * trial.reaction[first + r]
-            x -= trial.SRB[at + r * c + m] * trial.w[first + r]
-        trial.right[bodies.columns[bodies.column_at[i] + m]] += x
+            x += RB[at + r * c + m] * reaction[first + r] - SRB[at + r * c + m] * w[first + r]
+        right[columns[m]] += x
 
 
 @compiled
@@ -193,11 +198,12 @@ def compliances(trial):  # type: ignore[no-untyped-def]
 
 
 @inner
-def interface_solved(bodies, trial):  # type: ignore[no-untyped-def]
-    """trial.dz and trial.m from the right-hand side."""
+def interface_solved(bodies, trial, begins):  # type: ignore[no-untyped-def]
+    """trial.dz and trial.m from the right-hand side; without constraints the step's matrix is factored once."""
     first, r = bodies.first, len(trial.m)
     copied(trial.right, trial.dz)
-    stiffened(bodies, trial)
+    if r > 0 or begins:
+        stiffened(bodies, trial)
     L = trial.H_rows
     forward(L, first, trial.dz)
     for a in range(r):

@@ -136,9 +136,9 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work):  # type: 
             product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
-        pushed(bodies, i, trial, work.room)
+        pushed(bodies, i, trial)
     evaluated(c, ends, of, driving, t, state, trial, work)
-    interface_solved(bodies, trial)
+    interface_solved(bodies, trial, sweep == 0)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
         if bodies.frame[i] != NOMINAL:
@@ -159,9 +159,15 @@ def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
     """trial.w and trial.force become displacements and forces at a body's interface points, in its frame."""
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
     q, at = last - first, bodies.B_at[i]
+    RB, w, dz, columns = (
+        trial.RB,
+        trial.w,
+        trial.dz,
+        bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]],
+    )
     for r in range(q):
         for m in range(c):
-            trial.w[first + r] += trial.RB[at + r * c + m] * trial.dz[bodies.columns[bodies.column_at[i] + m]]
+            w[first + r] += RB[at + r * c + m] * dz[columns[m]]
     product(bodies.S, bodies.S_at[i], q, q, trial.w[first:last], trial.force[first:last])
     for r in range(first, last):
         trial.force[r] -= trial.reaction[r]
@@ -171,13 +177,14 @@ def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
 def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     """Squares of the change asked for, and of what a step has moved; the body that changes most."""
     size, reached, most, worst, k = 0.0, 0.0, -1.0, -1, len(trial.z)
+    change, u, u0 = trial.change, trial.u, state.u
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == NOMINAL:
             continue
-        own = 0.0
-        for x in range(bodies.at[i + 1] - bodies.at[i]):
-            own += trial.change[bodies.passed[i] + x] ** 2
-            reached += (trial.u[bodies.at[i] + x] - state.u[bodies.at[i] + x]) ** 2
+        own, to = 0.0, bodies.passed[i]
+        for x in range(bodies.at[i], bodies.at[i + 1]):
+            own += change[to + x - bodies.at[i]] ** 2
+            reached += (u[x] - u0[x]) ** 2
         size += own
         if own > most:
             most, worst = own, i
@@ -191,10 +198,11 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
 @inner
 def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
     """The change becomes part of the end of the step."""
+    u, change = trial.u, trial.change
     for i in range(len(bodies.motion)):
         if bodies.frame[i] != NOMINAL:
             for x in range(bodies.at[i + 1] - bodies.at[i]):
-                trial.u[bodies.at[i] + x] += trial.change[bodies.passed[i] + x]
+                u[bodies.at[i] + x] += change[bodies.passed[i] + x]
     k = len(trial.z)
     for m in range(k):
         trial.z[m] += trial.change[len(trial.change) - k + m] / c.weight
