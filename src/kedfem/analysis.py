@@ -297,8 +297,6 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
     ) as writer:
         table = _Table(writer, channels, folder)
-        if not wanted:
-            remove_animation(folder, STEM)
         try:
             for block in leveled(scene, ready.linkage, ready.path, model, solvers, fine=True):
                 if block.fine or not block.levels:
@@ -325,13 +323,13 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
 
 @dataclass
 class _Table:
-    """Rows that wait for the results file; with the first of them an earlier run's pictures and table go."""
+    """Rows that wait for the results file, but the first: with those an earlier run's frames, pictures and table go."""
 
     writer: ResultsWriter
     channels: list[Channel]
     folder: FilePath
     waiting: int = 0
-    since: float = field(default_factory=perf_counter)
+    since: float = 0.0
     when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list)
     values: list[dict[str, Float[np.ndarray, "T c"]]] = field(default_factory=list)
 
@@ -360,6 +358,7 @@ def _remove_derived(folder: FilePath) -> None:
     for name in (TABLE, PICTURE, MESH, WORST, ENVELOPE):
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
+    remove_animation(folder, STEM)
 
 
 def _fields(ready: Prepared, recoveries: list[StressRecovery], snapshot: Snapshot) -> list[LinkField]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from kedfem.errors import KedfemError, OutputError, SceneError
+from kedfem.processes import end_as_interrupted
 from kedfem.terminal import terminal
 
 USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
@@ -359,21 +360,9 @@ def _say_where(folder: Path) -> None:
             out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)
 
 
-def _terminated_as_interrupted() -> None:
-    """Let the system's wish that kedfem end keep what Ctrl-C keeps."""
-    import signal
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    for name in ("SIGTERM", "SIGBREAK", "SIGHUP"):  # SIGBREAK: Windows; SIGHUP: a terminal that is closed
-        if (number := getattr(signal, name, None)) is not None and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, interrupt)
-
-
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
-    _terminated_as_interrupted()
+    end_as_interrupted()
     try:
         app()
     except KedfemError as error:

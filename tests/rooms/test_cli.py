@@ -14,9 +14,11 @@ from typing import NamedTuple
 import pytest
 
 import kedfem
+from kedfem.analysis import _Table, analyse
 from kedfem.cli import DEFECT, INTERRUPTED, KINDS, USER_ERROR, main
 from kedfem.mesh.file import mesh_from_file
 from kedfem.results import Results, read_results
+from kedfem.scene import read_scene
 
 SOURCE = Path(kedfem.__file__).parents[1]
 ARM = """
@@ -367,6 +369,26 @@ def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.S
     assert results.status == "interrupted"
     assert len(results.time) > 256
     expect_whole_animation(folder, results)
+
+
+def test_frames_of_an_earlier_run_never_stand_beside_other_rows(
+    arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever moment a run is killed at: as soon as its rows are in place, the old frames are gone."""
+    folder = analyse(read_scene(arm)).folder
+    old = {path.stat().st_ino for path in folder.glob("animation*")}
+    real, seen = _Table.flush, []
+
+    def flushed(table: _Table) -> None:
+        real(table)
+        seen.append(old & {path.stat().st_ino for path in folder.glob("animation*")})
+
+    assert old
+    monkeypatch.setattr(_Table, "flush", flushed)
+    arm.write_text(arm.read_text("utf-8").replace("frames_per_turn = 36", "frames_per_turn = 1"), "utf-8")
+    analyse(read_scene(arm))
+    assert seen
+    assert not any(seen)
 
 
 def test_a_killed_run_is_named_by_the_next_one(run_kedfem: Command, arm: Path) -> None:

@@ -24,6 +24,7 @@ from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
 from kedfem.mesh.tetrahedra import FORMS
+from kedfem.processes import end_with_parent
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
@@ -119,6 +120,7 @@ def apart(where: str, work: Callable[..., T], *given: Any) -> T:
 
 def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns, in silence; the process is ended if that takes more processor time than so much."""
+    end_with_parent()
     try:
         import resource
     except ImportError:  # a system without such limits
