@@ -9,14 +9,15 @@ import time
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
 import kedfem
-from kedfem.analysis import _Table, analyse
+from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, INTERRUPTED, KINDS, USER_ERROR, main
 from kedfem.mesh.file import mesh_from_file
+from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Results, read_results
 from kedfem.scene import read_scene
 
@@ -371,24 +372,24 @@ def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.S
     expect_whole_animation(folder, results)
 
 
-def test_frames_of_an_earlier_run_never_stand_beside_other_rows(
+def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
     arm: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever moment a run is killed at: as soon as its rows are in place, the old frames are gone."""
+    """Whatever moment a run is killed at, once its first rows are in place."""
     folder = analyse(read_scene(arm)).folder
-    old = {path.stat().st_ino for path in folder.glob("animation*")}
-    real, seen = _Table.flush, []
+    real, seen, begun = AnimationWriter.add, [], time.time_ns()
+    time.sleep(0.05)
 
-    def flushed(table: _Table) -> None:
-        real(table)
-        seen.append(old & {path.stat().st_ino for path in folder.glob("animation*")})
+    def added(writer: AnimationWriter, *given: Any) -> Path:
+        rows = (folder / "results.h5").stat().st_mtime_ns >= begun
+        frames = [path.stat().st_mtime_ns >= begun for path in folder.glob("animation*")]
+        seen.append((rows, all(frames)))
+        return real(writer, *given)
 
-    assert old
-    monkeypatch.setattr(_Table, "flush", flushed)
+    monkeypatch.setattr(AnimationWriter, "add", added)
     arm.write_text(arm.read_text("utf-8").replace("frames_per_turn = 36", "frames_per_turn = 1"), "utf-8")
     analyse(read_scene(arm))
-    assert seen
-    assert not any(seen)
+    assert set(seen) == {(True, True)}
 
 
 def test_a_killed_run_is_named_by_the_next_one(run_kedfem: Command, arm: Path) -> None:
