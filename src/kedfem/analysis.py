@@ -379,10 +379,9 @@ def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath
     if clock(scene) != "time":
         title += f", drive {moment(scene, peak.time, peak.angle)}"
     animation = scene.output.animation
-    if animation and animation.exaggeration != 1.0:
-        title += f", deformation × {animation.exaggeration:g}"
+    scale = animation.exaggeration if animation else 1.0
     try:
-        write_picture(folder / WORST, folder / PICTURE, title, scene.gravity)
+        write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity)
     except OutputError as err:
         return (str(err),)
     return ()

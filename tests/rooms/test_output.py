@@ -5,18 +5,25 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import meshio
 import numpy as np
 import pytest
 
 from kedfem.errors import OutputError
+from kedfem.links.recovery import stress_recovery
 from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
 from kedfem.output.abscissa import abscissa
+from kedfem.output.bars import THINNEST, bars, heights, shape_functions
+from kedfem.output.frames import link_fields
 from kedfem.output.plots import drawn_over, envelope
-from kedfem.output.rendering import shape_functions, sight, view
+from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
+from kedfem.output.vtu import SECTION
 from kedfem.results import Channel, Results
+from tests.moving import ran
+from tests.spatial_joints import P, pushed
 
 # Parametric coordinates (halves) of the nodes in VTK's order, after its documentation of the triquadratic
 # hexahedron: corners, edges of the bottom, of the top, upright edges, faces −x +x −y +y −z +z, centre.
@@ -385,6 +392,77 @@ def test_flat_linkages_are_seen_from_their_flat_side(extents: tuple[float, ...],
 def test_curved_beams_pass_through_their_nodes() -> None:
     for nodes, places in ((2, [-1.0, 1.0]), (3, [-1.0, 1.0, 0.0])):
         np.testing.assert_allclose(shape_functions(nodes, np.array(places)), np.eye(nodes), atol=1e-15)
+
+
+def drawn_beam(field: LinkField) -> Any:
+    """The surface of one link of lines."""
+    import pyvista
+
+    kinds = {"line": 3, "line3": 21}
+    cells = np.c_[np.full(len(field.cells), field.cells.shape[1]), field.cells]
+    grid = pyvista.UnstructuredGrid(
+        cells.ravel(), np.full(len(cells), kinds[field.cell_type]), field.points.astype(float)
+    )
+    grid.point_data["MPa"] = field.von_mises / 1e6
+    grid.cell_data["link"] = np.zeros(len(cells), int)
+    if field.section:
+        grid.cell_data[SECTION] = np.tile(np.array(field.section, float), (len(cells), 1))
+    return bars(grid, heights(grid))
+
+
+@pytest.mark.parametrize(
+    ("round_", "area"), [(False, 0.1), (True, 12 * np.sin(np.pi / 12) / np.pi * 0.1 * np.pi / 4)]
+)
+def test_beams_are_drawn_with_their_sections(round_: bool, area: float) -> None:
+    """A rod and an arch of two elements: closed, section times length, height across it and thickness along z."""
+    straight = drawn_beam(replace(rod(), section=(0.5, 0.2, round_)))
+    np.testing.assert_allclose(np.ptp(straight.points, axis=0), [8.0, 0.5, 0.2], rtol=1e-6)
+    length = np.sqrt(2) * 2 + np.arcsinh(1) * 2  # of y = x (8 − x)/8 from 0 to 8
+    for surface, wanted in (
+        (straight, 8.0),
+        (drawn_beam(replace(arch(), section=(0.5, 0.2, round_))), 2 * length),
+    ):
+        assert surface.n_open_edges == 0
+        assert surface.triangulate().volume == pytest.approx(area * wanted, rel=2e-3)
+
+
+def test_beams_too_thin_to_be_seen_are_drawn_thicker() -> None:
+    surface = drawn_beam(replace(rod(), section=(1e-6, 0.2, False)))
+    np.testing.assert_allclose(np.ptp(surface.points[:, 1]), THINNEST * 8.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("exaggeration", [1.0, 500.0])
+def test_a_slider_without_a_shape_is_a_block_about_its_pin_along_its_guide(exaggeration: float) -> None:
+    """Grey, and where the end of the rod that carries it is drawn."""
+    ready, blocks = ran(pushed(driven=False))
+    recoveries = [stress_recovery(link) for link in ready.model.links]
+    (slider,) = ready.model.sliders
+    rod = ready.model.links[slider.carrier]
+    now = blocks[-1].at(len(blocks[-1]) - 1)
+    fields = {field.name: field for field in link_fields(ready.model, recoveries, now, exaggeration)}
+    block, end = fields["ram"], fields[rod.name].points
+    section = np.linalg.norm(recoveries[slider.carrier].at_points(rod.X) - P, axis=1) < 0.011  # about the pin
+    np.testing.assert_allclose(block.points.mean(axis=0), end[section].mean(axis=0), atol=1e-9)
+    assert np.isnan(block.von_mises).all()
+    along = np.ptp(block.points, axis=0)
+    np.testing.assert_allclose(along, along[2] / np.array([1.5, 1.5, 1.0]))
+
+
+def test_the_highest_stress_is_cut_free_where_no_side_shows_it(tmp_path: Path) -> None:
+    """Inside a cell: in the cut the end of the colour map is seen; at a corner below, the picture is drawn from there."""
+    import pyvista
+
+    inside = replace(warped(), von_mises=np.where(np.arange(27) == 26, 1e6, 1e5))
+    below = replace(warped(), von_mises=np.where(np.arange(27) == 0, 1e6, 1e5))
+    found = []
+    for link in (inside, below):
+        vtu = AnimationWriter(tmp_path, "run").add(0.0, [link])
+        found.append(view(pyvista.read(vtu), np.zeros(3)))
+        write_picture(vtu, tmp_path / "picture.png", "one link")
+        red, green, blue = pixels(tmp_path / "picture.png")[:, :-260].reshape(-1, 3).T.astype(int)
+        assert ((red > green + 60) & (red > blue + 60)).sum() > 100  # nothing else is above the blue tenth
+    np.testing.assert_allclose(found[0].cut, inside.points[26])
+    assert found[1].cut is None
 
 
 def test_a_missing_frame(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, rigid_func
 from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights, rigid_seat
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
-from kedfem.motion.linkage import Linkage, unit
+from kedfem.motion.linkage import Linkage, joint_axis, unit
 from kedfem.motion.path import Path
 from kedfem.scene import (
     Body,
@@ -51,6 +51,7 @@ class Slider:
     name, mass [kg] : of the slider
     guide, joint : its prismatic joint, and the joint with the elastic link
     carrier : number of that link
+    axis : (3,) along which it slides
     weights : (n,) of the joint's point on the carrier
     loads : its own loads, as patterns of the carrier
     """
@@ -60,6 +61,7 @@ class Slider:
     guide: str
     joint: str
     carrier: int
+    axis: Float[np.ndarray, "3"]
     weights: Float[np.ndarray, " n"]
     loads: tuple[Pattern, ...]
 
@@ -397,4 +399,5 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
         if x.link == name and isinstance(x, ForceLoad)
     )
     mass = scene.links[name].mass + extra
-    return Slider(name, mass, guide, key, numbers[carrier], weights, loads)
+    axis = joint_axis(joints[guide])
+    return Slider(name, mass, guide, key, numbers[carrier], axis, weights, loads)

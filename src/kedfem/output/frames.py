@@ -6,9 +6,12 @@ import numpy as np
 
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.links.record import in_space
+from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von_mises
+from kedfem.mesh.hexahedra import HEX8
 from kedfem.output.vtu import LinkField
+
+BLOCK = 0.08  # width of the block that stands for a slider without a shape, of the longest link
 
 
 def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
@@ -26,7 +29,9 @@ def _one(parts: Sequence[LinkField]) -> LinkField:
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("points", "displacement", "stress", "von_mises")
     )
-    return LinkField(parts[0].name, parts[0].cell_type, cells, points, displacement, stress, von)
+    return LinkField(
+        parts[0].name, parts[0].cell_type, cells, points, displacement, stress, von, parts[0].section
+    )
 
 
 def link_fields(
@@ -53,7 +58,14 @@ def link_fields(
         points = motion.p[k, body] + drawn @ motion.R[k, body].T + exaggeration * displacement
         fields.append(
             LinkField(
-                link.name, recovery.cell_type, recovery.cells, points, displacement, stress, von_mises(stress)
+                link.name,
+                recovery.cell_type,
+                recovery.cells,
+                points,
+                displacement,
+                stress,
+                von_mises(stress),
+                _section(link),
             )
         )
     for carried, recovery in zip(model.carried, recoveries[len(model.links) :], strict=True):
@@ -61,5 +73,35 @@ def link_fields(
         points = motion.p[k, carried.body] + X @ motion.R[k, carried.body].T
         none = np.full((len(X), 6), np.nan)
         name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
-        fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0]))
-    return _joined(fields)
+        section = _section(carried.link)
+        fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], section))
+    return _joined(fields) + _blocks(model, snapshot, exaggeration)
+
+
+def _section(link: Link) -> tuple[float, float, bool] | None:
+    """Of a planar beam, which is a line."""
+    of = (link.full or link).section
+    if link.kind != "beam" or of is None:
+        return None
+    return of.height, of.thickness, of.kind in {"round", "tube"}
+
+
+def _blocks(model: Model, snapshot: Snapshot, exaggeration: float) -> list[LinkField]:
+    """Sliders without a shape: blocks along their guides, at the joints with the links that carry them."""
+    if not model.sliders:
+        return []
+    motion, k, out = snapshot.motion, snapshot.k, []
+    size = BLOCK * max(float(np.ptp(link.X, axis=0).max()) for link in model.links)
+    for slider in model.sliders:
+        link, body = model.links[slider.carrier], model.bodies[slider.carrier]
+        moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
+        place = motion.p[k, body] + motion.R[k, body] @ (slider.weights @ link.X) + exaggeration * moved
+        z = slider.axis
+        x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
+        x /= np.linalg.norm(x)
+        frame = np.array([1.5 * z, np.cross(z, x), x])  # longer along the guide
+        points = place + size / 2 * HEX8 @ frame
+        none = np.full((8, 6), np.nan)
+        shift = np.tile(moved, (8, 1))
+        out.append(LinkField(slider.name, "hexahedron", np.arange(8)[None], points, shift, none, none[:, 0]))
+    return out

@@ -14,7 +14,11 @@ ADVICE = "picture: must be drawn by VTK, for which Linux without a display needs
 
 
 def write_picture(
-    vtu: Path, png: Path, title: str, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    vtu: Path,
+    png: Path,
+    title: str,
+    exaggeration: float = 1.0,
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
     """Draw the links of a VTU file, deformed as they are there, coloured by von Mises stress.
 
@@ -29,6 +33,8 @@ def write_picture(
         The picture.
     title
         Written above; long ones are wrapped.
+    exaggeration
+        Of the deformation in the frame, written below.
     gravity : (3,) [m/s²]
         Points down in the picture, unless it is looked along.
 
@@ -42,7 +48,16 @@ def write_picture(
         raise OutputError(f"{vtu}: must be a frame of the animation, got no such file")
     with replacing(Path(png)) as part:
         drawing = Path(__file__).with_name("rendering.py")
-        command = [sys.executable, "-P", str(drawing), str(vtu), str(part), title, *map(str, gravity)]
+        command = [
+            sys.executable,
+            "-P",
+            str(drawing),
+            str(vtu),
+            str(part),
+            title,
+            str(exaggeration),
+            *map(str, gravity),
+        ]
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
         except subprocess.TimeoutExpired as error:

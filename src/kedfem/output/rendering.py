@@ -1,15 +1,18 @@
 """The drawing process of :func:`kedfem.output.write_picture`.
 
-It is run by its path and imports nothing of kedfem.
+It is run by its path.
 """
 
 import sys
 import textwrap
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+
+from kedfem.output.bars import LINES, THINNEST, bars, heights
 
 WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)
 """Least and most pixels; in between as the linkage asks."""
@@ -20,8 +23,8 @@ LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60
 FLAT = 0.35
 """A linkage whose least extent is below this part of its second is seen from that side."""
 
-BEAM_RADIUS = 0.007
-"""Radius of the tube that stands for a beam, as part of the diagonal."""
+THROUGH = 0.12
+"""Opacity of what lies before the highest stress where it would be hidden from both sides."""
 
 FINEST, TRIANGLES = 4, 200_000
 """Quadratic faces are halved so many times, unless that makes more triangles than this."""
@@ -29,17 +32,13 @@ FINEST, TRIANGLES = 4, 200_000
 SHARP = 35.0
 """Degrees between faces from which an edge is drawn."""
 
-LINES = {3: 2, 21: 3}
-"""VTK's numbers of the line and the quadratic line, and their nodes."""
-
 QUADRILATERAL = 28
 """VTK's number of the biquadratic quadrilateral, of plane links."""
 
-LIFT = 1e-3
-"""How far plane links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it."""
+FLAT_CELLS = {QUADRILATERAL, *LINES}
 
-STATIONS = {2: 2, 3: 17}
-"""Points along a beam of so many nodes."""
+LIFT = 1e-3
+"""How far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +49,8 @@ class View:
     ----------
     direction, across, up : (3,) [-]
         Unit vectors towards the eye, to the right and upwards in the picture.
+    cut : (3,) [m]
+        The highest stress, where it is hidden: what is before it is drawn translucent; else None.
     middle, size : (2,) [m]
         Centre, width and height of the linkage in the picture.
     """
@@ -59,14 +60,15 @@ class View:
     up: Float[np.ndarray, " 3"]
     middle: Float[np.ndarray, " 2"]
     size: Float[np.ndarray, " 2"]
+    cut: Float[np.ndarray, " 3"] | None = None
 
 
-def render(vtu: str, png: str, title: str, *gravity: str) -> None:
+def render(vtu: str, png: str, title: str, exaggeration: str = "1", *gravity: str) -> None:
     """Draw a frame.
 
     Parameters
     ----------
-    vtu, png, title, gravity
+    vtu, png, title, exaggeration, gravity
         As in :func:`kedfem.output.write_picture`.
     """
     import pyvista
@@ -77,8 +79,8 @@ def render(vtu: str, png: str, title: str, *gravity: str) -> None:
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    draw_links(plotter, grid)
-    draw_words(plotter, title)
+    draw_links(plotter, grid, shown)
+    draw_words(plotter, title, float(exaggeration), shown.cut is not None)
     aim(plotter, grid, shown)
     mark(plotter, grid)
     plotter.screenshot(png)
@@ -131,11 +133,11 @@ def _flat(lines: Any, width: float, colour: str) -> Any:
 
 
 def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
-    """The view of a linkage, all of it in the picture; from behind where only so the highest stress is seen."""
+    """The view of a linkage, all of it in the picture; from another side where only so the highest stress is seen."""
     direction, upwards = sight(np.ptp(grid.points, axis=0))
-    behind = direction * np.where(np.abs(direction) == np.abs(direction).max(), -1.0, 1.0)
-    if hidden(grid, direction) and not hidden(grid, behind):
-        direction = behind
+    seen = next((each for each in sides(direction) if not hidden(grid, each)), None)
+    cut = grid.points[int(np.nanargmax(grid.point_data["von_mises"]))] if seen is None else None
+    direction = direction if seen is None else seen
     if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
         upwards = -gravity
     across = np.cross(upwards, direction)
@@ -143,7 +145,18 @@ def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
     up = np.cross(direction, across)
     drawn = grid.points @ np.column_stack([across, up])
     low, high = drawn.min(axis=0), drawn.max(axis=0)
-    return View(direction, across, up, (low + high) / 2, high - low + 3 * BEAM_RADIUS * grid.length)
+    edge = max(4 * THINNEST * grid.length, *heights(grid).max(axis=0, initial=0.0))
+    return View(direction, across, up, (low + high) / 2, high - low + edge, cut)
+
+
+def sides(direction: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
+    """A direction to look from, then that from behind, then those mirrored at other axes."""
+    mirrored = [direction * signs for signs in product((1.0, -1.0), repeat=3)]
+    main = int(np.abs(direction).argmax())
+    turned = [
+        int(np.sum(each * direction < 0)) - 0.5 * (each[main] * direction[main] < 0) for each in mirrored
+    ]
+    return [mirrored[k] for k in np.argsort(turned, kind="stable")]
 
 
 def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
@@ -178,9 +191,8 @@ def window(size: Float[np.ndarray, " 2"]) -> list[int]:
     return [int(np.clip((high - TOP - BOTTOM) * aspect + LEFT + RIGHT, *WIDTHS)), high]
 
 
-def draw_links(plotter: Any, grid: Any) -> None:
-    """Solids and plane links with their edges, beams as tubes, on one colour scale."""
-    is_line = np.isin(grid.celltypes, list(LINES))
+def draw_links(plotter: Any, grid: Any, shown: View) -> None:
+    """All links with their edges on one colour scale; what hides the highest stress is translucent."""
     stress = grid.point_data["MPa"]
     look = {
         "scalars": "MPa",
@@ -192,23 +204,34 @@ def draw_links(plotter: Any, grid: Any) -> None:
         "ambient": 0.55,
         "diffuse": 0.5,
     }
-    if not is_line.all():
-        surface = curved_surface(lifted(grid).extract_cells(~is_line))
-        links = plotter.add_mesh(surface, split_sharp_edges=True, feature_angle=SHARP, **look)
-        edges = surface.extract_feature_edges(SHARP, manifold_edges=False, non_manifold_edges=False)
-        if edges.n_cells:
-            plotter.add_mesh(edges, color="black", line_width=2.0, opacity=0.7)
+    above = lifted(grid)
+    is_line = np.isin(grid.celltypes, list(LINES))
+    solids, pieces = above.extract_cells(~is_line), []
+    if solids.n_cells and shown.cut is not None:
+        before = curved_surface(solids.clip(-shown.direction, shown.cut))
+        plotter.add_mesh(before, **look, opacity=THROUGH)
+        solids = solids.clip(shown.direction, shown.cut)
+    if solids.n_cells:
+        pieces.append(curved_surface(solids))
     if is_line.any():
-        links = plotter.add_mesh(tubes(grid.extract_cells(is_line), BEAM_RADIUS * grid.length), **look)
+        pieces.append(bars(above.extract_cells(is_line), heights(grid)))
+    import pyvista
+
+    surface = pyvista.merge(pieces, merge_points=False) if len(pieces) > 1 else pieces[0]
+    links = plotter.add_mesh(surface, split_sharp_edges=True, feature_angle=SHARP, **look)
+    edges = surface.extract_feature_edges(SHARP, manifold_edges=False, non_manifold_edges=False)
+    if edges.n_cells:
+        plotter.add_mesh(edges, color="black", line_width=2.0, opacity=0.7)
     draw_bar(plotter, links)
 
 
 def lifted(grid: Any) -> Any:
-    """The links with plane ones moved apart along z, so that their faces do not flicker through each other."""
+    """The links with planar ones moved apart along z, so that their faces do not flicker through each other."""
     out = grid.copy()
-    numbers = grid.cell_data["link"][grid.celltypes == QUADRILATERAL]
-    for cell, link in zip(grid.cells_dict.get(QUADRILATERAL, ()), numbers, strict=True):
-        out.points[cell, 2] = grid.points[cell, 2] + LIFT * grid.length * link
+    for kind in FLAT_CELLS:
+        numbers = grid.cell_data["link"][grid.celltypes == kind]
+        for cell, link in zip(grid.cells_dict.get(kind, ()), numbers, strict=True):
+            out.points[cell, 2] = grid.points[cell, 2] + LIFT * grid.length * link
     return out
 
 
@@ -225,32 +248,8 @@ def curved_surface(solids: Any) -> Any:
     return pyvista.wrap(faces.GetOutput())
 
 
-def tubes(lines: Any, radius: float) -> Any:
-    """Beams as tubes with round ends; quadratic ones curved."""
-    import pyvista
-
-    pieces = []
-    for kind, nodes in LINES.items():
-        for cell in lines.cells_dict.get(kind, np.zeros((0, nodes), int)):
-            weights = shape_functions(nodes, np.linspace(-1.0, 1.0, STATIONS[nodes]))
-            axis = pyvista.PolyData(weights @ lines.points[cell], lines=[len(weights), *range(len(weights))])
-            axis.point_data["MPa"] = weights @ lines.point_data["MPa"][cell]
-            ends = pyvista.PolyData(lines.points[cell[:2]])
-            ends.point_data["MPa"] = lines.point_data["MPa"][cell[:2]]
-            ball = pyvista.Sphere(radius=radius, theta_resolution=24, phi_resolution=24)
-            pieces += [axis.tube(radius=radius, n_sides=24), ends.glyph(geom=ball, scale=False, orient=False)]
-    return pyvista.merge(pieces, merge_points=False)
-
-
-def shape_functions(nodes: int, r: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m"]:
-    """Lagrange's polynomials on a line, ends first, then the middle."""
-    if nodes == 2:
-        return np.column_stack([(1 - r) / 2, (1 + r) / 2])
-    return np.column_stack([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r])
-
-
-def draw_words(plotter: Any, title: str) -> None:
-    """Title and axes."""
+def draw_words(plotter: Any, title: str, exaggeration: float, cut: bool) -> None:
+    """Title, scale of the deformation, and axes."""
     import matplotlib as mpl
 
     font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
@@ -259,6 +258,8 @@ def draw_words(plotter: Any, title: str) -> None:
     words = plotter.add_text(text, (0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font)
     words.prop.justification_vertical = "top"
     words.prop.SetLineSpacing(1.2)
+    scale = f"deformation × {exaggeration:g}" + ("; cut at the highest stress" if cut else "")
+    plotter.add_text(scale, (0.03, 0.015), viewport=True, font_size=11, color="black", font_file=font)
     wide, high = plotter.window_size
     plotter.add_axes(color="black", line_width=3, viewport=(1 - 210 / wide, 0.0, 1 - 30 / wide, 180 / high))
 

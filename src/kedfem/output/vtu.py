@@ -14,6 +14,7 @@ from kedfem.errors import OutputError
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.results.files import ready_folder, reason, replacing
 
+SECTION = "height, thickness, round"
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
@@ -36,6 +37,7 @@ class LinkField:
     stress : (n, 6) [Pa]
         xx, yy, zz, xy, yz, zx in the link's axes.
     von_mises : (n,) [Pa]
+    section : height and thickness [m] of a beam that is drawn as a line, and whether they are diameters of an ellipse
     """
 
     name: str
@@ -45,6 +47,7 @@ class LinkField:
     displacement: Float[np.ndarray, "n 3"]
     stress: Float[np.ndarray, "n 6"]
     von_mises: Float[np.ndarray, " n"]
+    section: tuple[float, float, bool] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,8 +272,18 @@ def _merged(fields: Fields) -> Any:
                 else ("displacement", "von_mises", "stress")
             )
         },
-        cell_data={"link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields)]},
+        cell_data={"link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields)]}
+        | _sections(fields),
     )
+
+
+def _sections(fields: Fields) -> dict[str, list[np.ndarray]]:
+    """Of beams drawn as lines height, thickness [m] and whether they are round; 0 elsewhere."""
+    every = [getattr(field, "section", None) for field in fields]
+    if not any(every):
+        return {}
+    rows = [np.array(section or (0, 0, 0), float) for section in every]
+    return {SECTION: [np.tile(row, (len(field.cells), 1)) for row, field in zip(rows, fields, strict=True)]}
 
 
 def _field_data(time: float, fields: Fields) -> str:

@@ -1,0 +1,94 @@
+"""Beams that a frame has as lines, drawn with their sections."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.output.vtu import SECTION
+
+THINNEST = 0.004
+"""Least height and thickness of a beam in the picture, as part of the diagonal."""
+
+JOINED = 1e-6
+"""Corners nearer than this part of the diagonal are one."""
+
+LINES = {3: 2, 21: 3}
+"""VTK's numbers of the line and the quadratic line, and their nodes."""
+
+RECTANGLE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+ELLIPSE = np.column_stack([f(np.linspace(0, 2 * np.pi, 24, endpoint=False)) for f in (np.cos, np.sin)])
+"""Sections of height and thickness 2."""
+
+STATIONS = {2: 2, 3: 17}
+"""Points along a beam of so many nodes."""
+
+
+def heights(grid: Any) -> Float[np.ndarray, "e 2"]:
+    """Height and thickness of each beam element as drawn [m]."""
+    lines = np.isin(grid.celltypes, list(LINES))
+    least = np.full((lines.sum(), 2), THINNEST * grid.length)
+    return np.maximum(grid.cell_data[SECTION][lines, :2], least) if SECTION in grid.cell_data else least
+
+
+def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
+    """Beams in the xy plane with their sections, curved as they are bent; mitred where two elements of one meet."""
+    import pyvista
+
+    round_ = lines.cell_data[SECTION][:, 2] > 0 if SECTION in lines.cell_data else np.zeros(len(sizes), bool)
+    tangents, elements = end_tangents(lines)
+    pieces = []
+    for kind, nodes in LINES.items():
+        which = np.flatnonzero(lines.celltypes == kind)
+        for e, cell in zip(which, lines.cells_dict.get(kind, ()), strict=True):
+            r = np.linspace(-1.0, 1.0, STATIONS[nodes])
+            weights = shape_functions(nodes, r)
+            axis = weights @ lines.points[cell]
+            along = np.gradient(axis, axis=0)
+            along /= np.linalg.norm(along, axis=1, keepdims=True)
+            across = np.column_stack([-along[:, 1], along[:, 0], 0 * along[:, 0]])
+            for end, node in ((0, cell[0]), (-1, cell[1])):
+                mitred = np.array([-tangents[node, 1], tangents[node, 0], 0.0])
+                across[end] = mitred / max(0.5, mitred @ across[end])
+            profile = (ELLIPSE if round_[e] else RECTANGLE) * sizes[e] / 2
+            rim = axis[:, None] + profile[:, :1] * across[:, None] + profile[:, 1:] * [0.0, 0.0, 1.0]
+            faces = swept(len(r), len(profile), [elements[node] == 1 for node in cell[:2]])
+            piece = pyvista.PolyData(rim.reshape(-1, 3), faces)
+            piece.point_data["MPa"] = np.repeat(weights @ lines.point_data["MPa"][cell], len(profile))
+            pieces.append(piece)
+    every = pyvista.merge(pieces, merge_points=False) if len(pieces) > 1 else pieces[0]
+    return every.clean(tolerance=JOINED, absolute=False)
+
+
+def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
+    """Directions at the ends of elements, the mean where elements of one link meet; how many meet at each node."""
+    out, count = np.zeros((lines.n_points, 3)), np.zeros(lines.n_points, int)
+    for kind, nodes in LINES.items():
+        for cell in lines.cells_dict.get(kind, np.zeros((0, nodes), int)):
+            X = lines.points[cell]
+            bent = np.outer([-2.0, 2.0], X[0] + X[1] - 2 * X[2]) if nodes == 3 else np.zeros((2, 3))
+            for node, t in zip(cell[:2], X[1] - X[0] + bent, strict=True):
+                out[node] += t / np.linalg.norm(t)
+                count[node] += 1
+    return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12), count
+
+
+def swept(stations: int, corners: int, closed: list[bool]) -> list[int]:
+    """Faces of a prism through rims of so many corners, closed at its first end, its last or both."""
+    first, last = range(corners), range((stations - 1) * corners, stations * corners)
+    sides = [
+        (4, at + i, at + j, at + corners + j, at + corners + i)
+        for at in range(0, (stations - 1) * corners, corners)
+        for i, j in zip(first, (*first[1:], 0), strict=True)
+    ]
+    ends = (corners, *reversed(first)), (corners, *last)
+    return [
+        x for face in (*sides, *(end for end, shut in zip(ends, closed, strict=True) if shut)) for x in face
+    ]
+
+
+def shape_functions(nodes: int, r: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m"]:
+    """Lagrange's polynomials on a line, ends first, then the middle."""
+    if nodes == 2:
+        return np.column_stack([(1 - r) / 2, (1 + r) / 2])
+    return np.column_stack([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r])
