@@ -70,7 +70,7 @@ class Run:
     balance : of energy and momentum, as far as it was kept account of
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     sizes : plain sizes of the scene, for a look at its units
-    step : what the run itself knows of its step's error
+    step : what is known of its step's error
     """
 
     folder: FilePath
@@ -132,7 +132,8 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     results = read_results(folder / "results.h5")
     known = step.errors if step.levels > 1 else None
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), known))
-    notes = attributes(found)
+    step = replace(step, errors=found.step or step.errors)
+    notes = attributes(found) | step.notes
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
     peak = highest(results.peaks)

@@ -35,11 +35,13 @@ class Budget:
     shares : by source; one that is not there does not err so
     limits : where no estimate is claimed, in words
     links : link → its mesh's error in the energy norm [-], of meshed links
+    step : channel → error of the step
     """
 
     shares: tuple[Share, ...]
     limits: tuple[str, ...] = ()
     links: Mapping[str, float] = field(default_factory=dict)
+    step: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def kinds(self) -> tuple[str, ...]:

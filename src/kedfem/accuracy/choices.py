@@ -1,16 +1,19 @@
 """What an accuracy chooses by trial runs: frames, elements of beams, the step, meshes of solid and plane links."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
-from kedfem.accuracy.estimates import ORDERS, Strained, believed, link_errors, mesh_errors, observed_order
+from kedfem.accuracy.estimates import Strained, link_errors, mesh_errors
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.stability import fewest_steps
+from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import TRIAL_STEPS, Trials, shortened
 from kedfem.accuracy.variants import refinable, refined, with_analysis, with_links, with_steps
+from kedfem.dynamics.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, spatial_beams, time_grid
+from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, spatial_beams, time_grid, turn_steps
 
 FOLLOWED = (
     0.5  # of the accuracy: nominal frames that err by more give way to frames that follow, in scenes of beams
@@ -26,13 +29,17 @@ ELEMENTS = (
 )  # tried, coarsest first
 COUNTS = 1, 2, 3, 4, 6, 8, 12, 16, 24  # tried of an element that the scene states
 FINEST = 2  # times the elements of the last one tried: the reference of beams
-FEWEST = 20  # steps of an analysis
+FEWEST = 50  # time points of an analysis
+ROWS = 180  # the same of a turn: curves and animations have no others
+TRIED, COARSER = (
+    3,
+    4,
+)  # levels of a trial, which show whether errors fall with the step; its coarsest step, of the finest
+LEAST = 12  # steps of the coarsest level of a trial
 MOST_STEPS = 200_000  # of the analysis
 TRIES = 5  # steps tried
 SHORTER, PATIENCE = 2.0, 2  # by which steps are made shorter that do not resolve what vibrates, and how often
 CLOSE = 0.15  # of the steps: as many more are not worth another trial
-SAFE = 0.8  # of an allowed error that a step is chosen for
-LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
 MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
 FACTOR = 2.0  # by which elements are made smaller at most in one go
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
@@ -154,67 +161,86 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
 
 
 def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene with the largest step whose error is allowed, and that error.
+    """The scene with the step and the levels in time that reach an allowed error with the least work, and that error.
 
-    Three steps, each half of the last, show the order at which each channel's error falls; the next one tried is where it
-    would be allowed. Channels whose order shows that they hold vibration that is not resolved are given PATIENCE shorter
-    steps; then they are told, and the others choose.
+    One trial in several levels tells what they differ by, and where the error would be allowed; the next is made there.
+    Channels whose differences do not fall with the step hold vibration that is not resolved: they are given PATIENCE
+    shorter steps; then they are told, and the others choose. What the scene states of step and levels stays.
     """
     trial = shortened(scene)
-    whole = time_grid(scene).end / time_grid(trial).end
-    fewest = 4 * math.ceil(max(FEWEST, _least(trial)) / 4)
-    steps = max(4 * math.ceil(time_grid(trial).steps / 4), fewest)
-    found = _errors(search, trial, steps)
     if not open_step(scene):
-        if _worst(found) > allowed:
-            search.notes.append(f"the scene states its step; its error is about {_worst(found):.2g}")
-        return scene, _worst(found)
-    patience = PATIENCE
+        error = _stated_error(search, trial)
+        if error > allowed:
+            search.notes.append(
+                f"the scene states its step; its error is about {error:.2g}{_with_levels(scene)}"
+            )
+        return scene, error
+    span, whole = time_grid(trial).end, time_grid(scene).end
+    least = math.ceil(max(_least(trial), LEAST))
+    longest, levels = span / max(_fewest_rows(trial), least), _possible_levels(search, scene)
+    steps, patience = max(math.ceil(time_grid(trial).steps / COARSER), least), PATIENCE
+    slow: set[str] = set()
     for _ in range(TRIES):
-        slow = {name for name, (error, p) in found.items() if p < LEAST_ORDER and error > allowed}
-        factors = [
-            (e / (SAFE * allowed)) ** (1 / max(p, LEAST_ORDER))
-            for n, (e, p) in found.items()
-            if n not in slow
-        ]
-        factor = max(factors, default=0.0)
+        found, channels = search.step(with_analysis(with_steps(trial, steps), levels=TRIED))
+        slow = {name for name in channels if _slow(found, name, allowed)}
+        choice = cheapest(found, allowed, set(channels) - slow, levels, longest)
+        finest = span / choice.h * 2 ** (choice.levels - 1)
+        wanted = max(least, math.ceil(finest / COARSER * (1 - 1e-9)))
         if slow and patience:
-            factor, patience = max(factor, SHORTER), patience - 1
-        wanted = max(fewest, 4 * math.ceil(steps * min(max(factor, 0.125), 8.0) / 4))
-        if (
-            0.5 * steps <= wanted <= steps * (1 + CLOSE)
-            or wanted * whole > MOST_STEPS
-            or wanted > TRIAL_STEPS
-        ):
+            wanted, patience = max(wanted, math.ceil(SHORTER * steps)), patience - 1
+        elif wanted <= steps * (1 + CLOSE) and choice.h <= SHORTER * found.h:
+            break
+        if COARSER * wanted * whole / span > MOST_STEPS or COARSER * wanted > TRIAL_STEPS or wanted == steps:
             break
         steps = wanted
-        found = _errors(search, trial, steps)
-    error = _worst(found)
+    left = {name: min(1.0, found.differences[name][0]) for name in slow}
+    error = max([choice.error, *left.values()])
     if error > allowed:
-        channels = [name for name, (e, _) in found.items() if e > allowed]
-        search.notes.append(_unresolved(round(steps * whole), error, channels))
-    return with_analysis(scene, step=time_grid(trial).end / steps, steps_per_turn=None), error
+        names = sorted(left, key=left.__getitem__, reverse=True) or _over(found, allowed)
+        search.notes.append(_unresolved(math.ceil(whole / choice.h), error, names))
+    return with_analysis(scene, step=choice.h, steps_per_turn=None, levels=choice.levels), error
 
 
-def _worst(found: Mapping[str, tuple[float, float]]) -> float:
-    return max((error for error, _ in found.values()), default=0.0)
+def _fewest_rows(trial: Scene) -> int:
+    """Time points of a trial, at the least, for curves and animations to be smooth."""
+    turn = turn_steps(trial)
+    return FEWEST if turn is None else max(FEWEST, math.ceil(ROWS * time_grid(trial).steps / turn))
 
 
-def _errors(search: Trials, trial: Scene, steps: int) -> dict[str, tuple[float, float]]:
-    """Channel → error of so many steps, a multiple of four, and its order: against half and a quarter of them."""
-    if steps // 4 < max(_least(trial), 8):
-        now, half = (search.run(with_steps(trial, count)) for count in (steps, 2 * steps))
-        return {
-            name: (error / (1 - 2 ** -ORDERS[1]), ORDERS[1])
-            for name, error in relative_errors(now, half).items()
-        }
-    now, half, quarter = (search.run(with_steps(trial, steps // k)) for k in (1, 2, 4))
-    near, far = relative_errors(half, now), relative_errors(quarter, half)
-    out = {}
-    for name, error in near.items():
-        p = observed_order(far.get(name, 0.0), error)
-        out[name] = error / (2 ** believed(p) - 1), p
-    return out
+def _possible_levels(search: Trials, scene: Scene) -> range:
+    """How many levels there may be: those stated, or as many as the memory holds factors of."""
+    stated = scene.analysis.levels
+    if stated is not None:
+        return range(stated, stated + 1)
+    model = search.ready(shortened(scene)).model
+    links = tuple(link if scene.links[link.name].reduced else link.full or link for link in model.links)
+    return range(1, 1 + most_levels(replace(model, links=links)))
+
+
+def _slow(found: StepEstimate, name: str, allowed: float) -> bool:
+    """Whether a channel's error is beyond the allowed one and does not fall as it should."""
+    far, near = found.differences.get(name, (0.0, 0.0))[:2]
+    return far > allowed and near > far / 2**LEAST_ORDER and found.fast[name] > IN_STEP
+
+
+def _over(found: StepEstimate, allowed: float) -> list[str]:
+    """Channels whose levels differ by more than is allowed, the worst first."""
+    differ = {name: x[0] for name, x in found.differences.items()}
+    return sorted((n for n in differ if differ[n] > allowed), key=differ.__getitem__, reverse=True)
+
+
+def _stated_error(search: Trials, trial: Scene) -> float:
+    """The error of a step that the scene states, in the levels that it states."""
+    levels = trial.analysis.levels or 1
+    found, channels = search.step(with_analysis(trial, levels=max(levels, 2)))
+    if levels > 1:
+        return max((found.errors.get(name, 0.0) for name in channels), default=0.0)
+    left = ((found.differences[n][0], found.fast[n]) for n in channels if n in found.differences)
+    return max((D * single_level(q)[1] for D, q in left), default=0.0)
+
+
+def _with_levels(scene: Scene) -> str:
+    return "" if scene.analysis.levels else "; analysis.levels = 2 would make it smaller"
 
 
 def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:

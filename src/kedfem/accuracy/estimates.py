@@ -3,13 +3,12 @@
 Small models are run again as they are; of large links a companion on a few functions is run instead, on which a step
 takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
 
-* **Step**: the run's step against twice and four times that one; the ratio of the differences shows the order.
+* **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`).
 * **Mesh of beams**: twice the elements, in the same step.
 * **Meshes of solid and plane links**: their indicator η (`links.indicator`). Compliance errs by about 2 η², so the
   companion is run with links that much softer; stress errs besides by a part of η itself.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,8 +22,8 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
 from kedfem.accuracy.stability import fewest_steps
-from kedfem.accuracy.step_estimate import SINGLE
-from kedfem.accuracy.variants import refined, with_analysis, with_links, with_steps
+from kedfem.accuracy.step_estimate import SINGLE, single_errors
+from kedfem.accuracy.variants import refined, with_analysis, with_links
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, elastic_model
@@ -38,11 +37,9 @@ LARGE = 100_000  # unknowns of a model for which no companion is made: its funct
 FUNCTIONS = 1e-3  # tolerance of the companion's functions: differences of runs need no better ones
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 SLOW = 1000  # the same where no compiled loop runs them
-ORDERS = 1.3, 2.0  # between which the observed order in the step is believed
 REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
 SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
 LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
-SLIGHT = 1e-12
 
 
 @dataclass
@@ -125,16 +122,17 @@ def budget(
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
     small = replace(small, scene=spanned(small.scene, small.model))
+    known = dict(step or {})
     try:
         base = histories(small) if ran is None or not own else replace(ran, size=extent(ready.model))
         counts = by_kind(counted(base))
         shares[1] = frames_share(seen.geometric, [kind for kind in kinds if kind in counts])
-        errors = step_errors(small, base) if step is None else step
-        shares.append(_step_share({name: error for name, error in errors.items() if name in counted(base)}))
+        known = known or step_errors(small, base)
+        shares.append(_step_share({name: error for name, error in known.items() if name in counted(base)}))
         shares.append(_mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
-    return Budget(joined(shares), tuple(limits), eta)
+    return Budget(joined(shares), tuple(limits), eta, known)
 
 
 def wanted(ready: Prepared) -> tuple[str, ...]:
@@ -165,32 +163,22 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
 
 
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
-    """Channel → error of the step of a run in memory, by runs with steps twice and four times as long.
+    """Channel → error of the step of a run in memory, of a single level: what it differs by from another level.
 
-    Where those would grow without bound: by one with half the step.
+    That one has steps twice as long; where those would grow without bound, half as long.
     """
-    steps, least = time_grid(ready.scene).steps, fewest_steps(ready.scene)
-    if steps // 4 >= max(least, 8):
-        twice, four = (histories(replace(ready, scene=with_steps(ready.scene, steps // k))) for k in (2, 4))
-        near, far = relative_errors(twice, base), relative_errors(four, twice)
-        return {
-            name: near[name] / (2 ** believed(observed_order(far.get(name, 0.0), near[name])) - 1)
-            for name in near
-        }
-    half = histories(replace(ready, scene=with_steps(ready.scene, 2 * steps)))
-    return {name: error / (1 - 2 ** -ORDERS[1]) for name, error in relative_errors(base, half).items()}
+    grid = time_grid(ready.scene)
+    if grid.steps // 2 >= max(fewest_steps(ready.scene), 4):
+        return single_errors(
+            base, histories(replace(ready, scene=_beside(ready.scene, 2.0, grid.steps // 2)))
+        )[0]
+    return single_errors(histories(replace(ready, scene=_beside(ready.scene, 0.5, 2 * grid.steps))), base)[1]
 
 
-def observed_order(far: float, near: float) -> float:
-    """Order in the step from the differences of three steps, each half of the last; below 1 nothing converges yet."""
-    if near <= SLIGHT:
-        return ORDERS[1]
-    return math.log2(max(far, SLIGHT) / near)
-
-
-def believed(order: float) -> float:
-    """Within ORDERS: while nothing converges, two steps are as far apart as the better one is from the truth."""
-    return min(max(order, ORDERS[0]), ORDERS[1])
+def _beside(scene: Scene, factor: float, steps: int) -> Scene:
+    """The scene in so many steps, by a factor longer."""
+    h = factor * time_grid(scene).step
+    return with_analysis(scene, end_time=h * steps, turns=None, step=h, steps_per_turn=None, levels=1)
 
 
 def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:

@@ -39,6 +39,7 @@ class Histories:
 def histories(
     ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None,
     look: Callable[[Block], None] = lambda block: None,
+    follow: Callable[[Block, dict[str, Float[np.ndarray, "T c"]]], None] = lambda block, values: None,
 ) -> Histories:  # fmt: skip
     """Run a prepared scene and keep its channels.
 
@@ -47,6 +48,7 @@ def histories(
     keep : numbers of the steps whose states are kept too
     watch : called now and then; what it raises ends the run
     look : sees every block
+    follow : sees every block with its rows
     """
     recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
     times, taken, kept = [], [], []
@@ -56,6 +58,7 @@ def histories(
         taken.append(rows(recorded, block))
         watch()
         look(block)
+        follow(block, taken[-1])
         kept += [block.at(k) for k in range(len(block)) if block.step + k in keep]
     channels = {
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))

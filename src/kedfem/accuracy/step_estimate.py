@@ -1,5 +1,6 @@
 """The error of the time step in every channel, from what the levels in time differ by."""
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -8,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.budget import kind_of_name
+from kedfem.accuracy.histories import Histories, counted
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
 from kedfem.dynamics.history import Block
@@ -15,6 +17,7 @@ from kedfem.results.recorded import Recorded
 from kedfem.scene import time_grid
 
 IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
+LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
 SURE = 0.7  # of the error asked for, that a step is chosen for
 SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
 TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the truth
@@ -32,8 +35,9 @@ class StepEstimate:
         a single level
     fast : channel → by which share the finest pair of levels disagrees about its fastest motion, that with the largest
         second differences in time: small where the order shows, 1 where that motion is out of step
-    running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows,
-        which puts twice of it for the error of every channel
+    running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows
+        while it runs, which puts twice of it for the error of every channel; a march beside it, with steps twice as
+        long, tells more (`single_errors`)
     local : the largest local error of a step, of the largest displacement [-]
     """
 
@@ -59,7 +63,7 @@ class StepEstimate:
 
 @dataclass(frozen=True, slots=True)
 class StepChoice:
-    """A step and a number of levels, the error that is expected, and the work, in steps per second of motion."""
+    """A step, a number of levels, the error that is expected, and the work: all marches' steps in a second of motion."""
 
     h: float
     levels: int
@@ -67,38 +71,63 @@ class StepChoice:
     work: float
 
 
-def cheapest(found: StepEstimate, wanted: float, channels: Collection[str] | None = None) -> StepChoice:
-    """The step and the levels that reach an error in every channel with the least steps, from a trial's differences.
+def cheapest(
+    found: StepEstimate, wanted: float, channels: Collection[str] | None = None,
+    levels: Collection[int] = (1, 2, 3), longest: float = math.inf,
+) -> StepChoice:  # fmt: skip
+    """The step and the levels that reach an error in every channel with the least work, from a trial's differences.
 
     D falls with h², what two levels leave, about q D, with h⁴, three, q² D, with h⁶, as long as the fastest motion stays
-    in step: q, which falls with h², no more than IN_STEP. Where it is more in the trial already no order can be relied
-    on: then a step that brings it there, to try again.
+    in step: q, which falls with h², no more than IN_STEP. Where it is more in the trial levels gain nothing: what the
+    finest one leaves falls as D did in the trial, by which another trial is found. D and q are those of the trial's
+    finest pair of levels. A single level has another march beside it, with steps twice as long, which tells its error.
 
     Parameters
     ----------
     found : of a run of two or three levels
     wanted : relative error
     channels : that count, all that were followed if not given
+    levels : how many there may be
+    longest : step that may be chosen [s]
     """
-    names = found.differences if channels is None else [x for x in found.differences if x in channels]
+    names = [x for x in found.differences if channels is None or x in channels]
     if found.levels < 2:
         raise ValueError("the trial must have two or three levels, got one")
     if not names:
-        return StepChoice(found.h, 1, 0.0, 1 / found.h)
-    D = np.array([found.differences[name][0] for name in names])
-    q = np.minimum(1.0, np.array([found.fast[name] for name in names]) * 4.0 ** (found.levels - 2))
+        h, fewest = min(found.h, longest), min(levels)
+        return StepChoice(h, fewest, 0.0, _work(fewest) / h)
     out = []
-    for levels, left in ((1, 4 / 3 * D), (2, TWO * q * D), (3, q * q * D)):
-        order = 2 * levels
-        error = np.maximum(left, 1e-300)
-        factor = float(((SURE * wanted / error) ** (1 / order)).min())
-        if levels > 1:
-            factor = min(
-                factor, float(np.sqrt(IN_STEP / np.maximum(q[wanted < D], 1e-300)).min(initial=np.inf))
-            )
-        expected = float((error * factor**order).max())
-        out.append(StepChoice(found.h * factor, levels, expected, (2**levels - 1) / (found.h * factor)))
+    D = np.array([found.differences[name][-1] for name in names])
+    fast = np.array([found.fast[name] for name in names])
+    left, order = np.array([single_level(each)[0] for each in fast]) * D, _orders(found, names)
+    up = 4.0 ** (found.levels - 2)  # from the finest pair to the coarsest
+    whole, q, known = up * D, up * fast, fast <= IN_STEP
+    for count in sorted(levels):
+        of = {1: 4 / 3 * whole, 2: TWO * q * whole, 3: q * q * whole}[count]
+        error = np.where(known, of, left * 2.0 ** (order * (found.levels - count)))
+        power = np.where(known, 2 * count, order)
+        factor = float(((SURE * wanted / np.maximum(error, 1e-300)) ** (1 / power)).min())
+        if count > 1:
+            seen = q[known & (wanted < whole)]
+            factor = min(factor, float(np.sqrt(IN_STEP / np.maximum(seen, 1e-300)).min(initial=np.inf)))
+        factor = min(factor, longest / found.h)
+        h = found.h * factor
+        out.append(StepChoice(h, count, float((error * factor**power).max()), _work(count) / h))
     return min(out, key=lambda choice: choice.work)
+
+
+def _orders(found: StepEstimate, names: Sequence[str]) -> Float[np.ndarray, " c"]:
+    """Powers of the step with which the differences of three levels fall, at most 2 and at least LEAST_ORDER."""
+    pairs = np.array([found.differences[name] for name in names])
+    if found.levels == 2:
+        return np.full(len(names), 2.0)
+    ratio = np.maximum(pairs[:, 0], 1e-300) / np.maximum(pairs[:, 1], 1e-300)
+    return np.asarray(np.clip(np.log2(ratio), LEAST_ORDER, 2.0))
+
+
+def _work(levels: int) -> float:
+    """Steps of all marches in one of the coarsest level's."""
+    return 1.5 if levels == 1 else 2.0**levels - 1
 
 
 def watched(name: str) -> bool:
@@ -197,6 +226,37 @@ def _error(x: _Sizes) -> float:
         return float(x.differences[0]) / peak * min(1.0, TWO * q)
     s = x.next / float(x.differences[0]) if x.differences[0] else 0.0
     return x.next / peak * min(1.0, THREE * float(np.sqrt(q * min(1.0, s))))
+
+
+def single_level(fast: float) -> tuple[float, float]:
+    """Factors of D for the errors of two marches by themselves, the finer one and that with steps twice as long.
+
+    Of the finer one D/3 as long as the order shows; where the fastest motion is out of step, what two levels leave. Of
+    the other D more.
+    """
+    finer = max(1 / 3, min(1.0, TWO * fast))
+    return finer, 1 + finer
+
+
+def single_errors(fine: Histories, coarse: Histories) -> tuple[dict[str, float], dict[str, float]]:
+    """Channel → error of two marches by themselves: of the finer one, and of that with steps twice as long.
+
+    Parameters
+    ----------
+    fine, coarse : from the same time on, both with all their time points
+    """
+    finer, coarser = {}, {}
+    for name in counted(fine):
+        channel, every = fine.channels[name]
+        which = [k for k, column in enumerate(channel.columns) if column != "von_mises"]
+        other = coarse.channels[name][1][:, which]
+        own = every[::2, which][: len(other)]
+        sizes = _Sizes()
+        sizes.add((4 * own - other[: len(own)]) / 3, [other[: len(own)], own])
+        if sizes.peak:
+            D = float(sizes.differences[0]) / _largest(every[:, which])
+            finer[name], coarser[name] = (D * factor for factor in single_level(sizes.fast))
+    return finer, coarser
 
 
 def _largest(x: Rows) -> float:

@@ -1,14 +1,16 @@
 """Trial runs of changed copies of one scene, reduced; what several of them share is made once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.histories import Histories, asked_for, counted, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.accuracy.reduction import first_reduced
+from kedfem.accuracy.resolution import step_error
+from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.transient import drive_range
@@ -16,6 +18,7 @@ from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
+from kedfem.results.recording import recording
 from kedfem.scene import Ramp, Scene, spatial_beams, time_grid, turn_steps
 
 TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
@@ -36,6 +39,7 @@ class Trials:
     stage: Stage
     notes: list[str] = field(default_factory=list)
     runs: dict[str, Histories] = field(default_factory=dict)
+    steps: dict[str, tuple[StepEstimate, Collection[str]]] = field(default_factory=dict)
     models: dict[str, Prepared] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
     functions: dict[str, Float[np.ndarray, "_ _"]] = field(default_factory=dict)
@@ -52,6 +56,18 @@ class Trials:
         if key not in self.runs:
             self.runs[key] = histories(self.ready(scene))
         return self.runs[key]
+
+    def step(self, scene: Scene) -> tuple[StepEstimate, Collection[str]]:
+        """What a trial run of several levels in time knows of its step's error, and the channels that count."""
+        scene = shortened(scene)
+        key = scene.model_dump_json()
+        if key not in self.steps:
+            ready = self.ready(scene)
+            recorded = [x for x in recording(scene, ready.model) if asked_for(x.channel.name)]
+            watch = StepWatch(ready, recorded, step_error(ready))
+            base = histories(ready, look=watch.running.add, follow=watch.add)
+            self.runs[key], self.steps[key] = base, (watch.estimate, counted(base))
+        return self.steps[key]
 
     def ready(self, scene: Scene) -> Prepared:
         """A scene's reduced model; scenes that differ in the step only share it."""

@@ -5,7 +5,7 @@ from rich.text import Text
 
 from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.reduction import Reduction
-from kedfem.scene import LinkScene, time_grid
+from kedfem.scene import LinkScene, Scene, time_grid
 
 
 def plan_tables(plan: Plan) -> list[Table]:
@@ -23,12 +23,19 @@ def chosen_table(plan: Plan) -> Table:
     """What was chosen, and what was tried for it."""
     chosen = Table(title=f"Chosen for {100 * plan.asked:.3g} %", show_header=False)
     chosen.add_row("frames", str(plan.scene.analysis.frames))
-    chosen.add_row("step", f"{time_grid(plan.scene).step:.4g} s, {time_grid(plan.scene).steps} steps")
+    chosen.add_row("step", _step(plan.scene))
     for name, link in plan.scene.links.items():
         chosen.add_row(name, _chosen(link))
     for note in plan.notes:
         chosen.add_row("note", Text(note))
     return chosen
+
+
+def _step(scene: Scene) -> str:
+    """Step and levels in words."""
+    grid, levels = time_grid(scene), scene.analysis.levels or 1
+    halved = f", combined with {', '.join(f'1/{2**k}' for k in range(1, levels))} of it" if levels > 1 else ""
+    return f"{grid.step:.4g} s, {grid.steps} steps{halved}"
 
 
 def _chosen(link: LinkScene) -> str:

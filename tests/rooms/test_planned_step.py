@@ -1,0 +1,65 @@
+"""The step and the levels in time that a plan chooses: right, no dearer than needed, only what the scene leaves open."""
+
+import pytest
+
+from kedfem.accuracy import choices
+from kedfem.accuracy.choices import chosen_step
+from kedfem.accuracy.plan import STEP
+from kedfem.accuracy.trials import Trials
+from kedfem.accuracy.variants import with_analysis
+from kedfem.scene import Scene, time_grid
+from tests.planned_steps import ASKED, Planned, four_bar, judged
+
+ALLOWED = STEP * ASKED
+BEAMS = {"element": "beam5", "mesh": {"elements": 1}}
+
+
+def chosen(scene: Scene) -> tuple[Scene, float, list[str]]:
+    search = Trials(ASKED, lambda name: None)
+    return *chosen_step(search, scene, ALLOWED), search.notes
+
+
+def held(found: Planned) -> None:
+    """Allowed, and expected within a factor 3; no more work than twice what a single level of the right step has."""
+    assert found.true < ALLOWED
+    assert found.true / 1.1 < found.expected <= ALLOWED
+    assert found.work < 2 * found.needed
+
+
+def test_at_speed_levels_do_with_less_work_than_order_2() -> None:
+    found = judged(four_bar(600, BEAMS))
+    held(found)
+    assert found.scene.analysis.levels in {2, 3}
+    assert found.work < 0.9 * found.needed
+
+
+def test_vibration_that_is_hardly_in_step_is_left_to_short_steps() -> None:
+    """At 60 rpm the channels hold vibration of 0.3 % whose order a trial does not show."""
+    held(judged(four_bar(60, BEAMS)))
+
+
+@pytest.mark.long
+def test_co_rotational_links_from_rest() -> None:
+    held(judged(four_bar(600, BEAMS, frames="following", initial="rest")))
+
+
+def test_levels_and_steps_that_the_scene_states_stay() -> None:
+    for levels in (1, 2, 3):
+        scene, error, _ = chosen(four_bar(600, BEAMS, levels=levels, turns=0.5))
+        assert scene.analysis.levels == levels
+        assert error <= ALLOWED
+    scene, error, notes = chosen(four_bar(600, BEAMS, steps_per_turn=360, turns=0.5))
+    assert scene.analysis.levels is None
+    assert time_grid(scene).steps == 180
+    assert error > ALLOWED
+    assert notes[0].startswith("the scene states its step; its error is about")
+    assert "analysis.levels = 2" in notes[0]
+    both, better, _ = chosen(with_analysis(scene, levels=2))
+    assert both.analysis.levels == 2
+    assert better < 0.5 * error
+
+
+def test_factors_that_do_not_fit_twice_leave_one_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choices, "most_levels", lambda model: 1)
+    scene, _, _ = chosen(four_bar(600, BEAMS, turns=0.5))
+    assert scene.analysis.levels == 1
