@@ -1,7 +1,8 @@
-"""Cost that grows with the number of links, stage by stage: `python -m benchmarks.links [--sizes 10 30 100] [--limit 120]`.
+"""Cost that grows with the number of links, stage by stage: `python -m benchmarks.links --before ../another-checkout`.
 
-Mechanisms of beams with one element, 100 steps, written as a whole run writes them, in four topologies. Every run is a process of its own, given up
-after a limit; with `--before FOLDER`, another checkout, each size is measured there too, in turn.
+Mechanisms of beams with one element, 100 steps, as a whole run writes them, in four topologies. Every run is a process of
+its own, given up after a limit. Sizes, limit and topologies can be chosen; with another checkout each size is measured
+there too, in turn.
 """
 
 import argparse
@@ -31,6 +32,7 @@ def beam(a: Any, b: Any, **more: Any) -> Raw:
 
 
 def hinge(one: str, other: str, at: Any) -> Raw:
+    """A revolute joint about z."""
     return {"kind": "revolute", "links": [one, other], "at": [float(x) for x in at], "axis": Z}
 
 
@@ -98,9 +100,14 @@ def truss(n: int) -> Raw:
     turn = 2 * np.pi / 3
     node = [np.array([0.2 * np.cos(turn * k), 0.2 * np.sin(turn * k), 0.12 * k]) for k in range(n // 3 + 3)]
     links: Raw = {"base": beam(node[0], node[2])}
-    links["base"]["shape"] = {"kind": "polyline", "points": [x.tolist() for x in node[:3]], "width": 0.02, "thickness": 0.02}
+    links["base"]["shape"] = {
+        "kind": "polyline",
+        "points": [x.tolist() for x in node[:3]],
+        "width": 0.02,
+        "thickness": 0.02,
+    }
     joints: Raw = {"A": hinge("ground", "base", node[1])}
-    middle = {k: "base" for k in range(3)}  # of each node, the link that the others are joined to
+    middle = dict.fromkeys(range(3), "base")  # of each node, the link that the others are joined to
     for k in range(3, len(node)):
         for j in (k - 3, k - 2, k - 1):
             name = f"r{j}_{k}"
@@ -109,9 +116,18 @@ def truss(n: int) -> Raw:
             one = np.cross(d, Z)
             other = np.cross(d, one)
             axes = [(x / np.linalg.norm(x)).tolist() for x in (one, other)]
-            joints[f"U{j}_{k}"] = {"kind": "universal", "links": [middle[j], name], "at": node[j].tolist(), "axes": axes}
+            joints[f"U{j}_{k}"] = {
+                "kind": "universal",
+                "links": [middle[j], name],
+                "at": node[j].tolist(),
+                "axes": axes,
+            }
             if k in middle:
-                joints[f"S{j}_{k}"] = {"kind": "spherical", "links": [middle[k], name], "at": node[k].tolist()}
+                joints[f"S{j}_{k}"] = {
+                    "kind": "spherical",
+                    "links": [middle[k], name],
+                    "at": node[k].tolist(),
+                }
             else:
                 middle[k] = name
     return scene(links, joints, drive=turning("A"))
@@ -149,7 +165,12 @@ def measured(topology: str, n: int) -> Raw:
     raw = make(n)
     spent = ran(raw)
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return {"links": len(raw["links"]), "seconds": spent, "memory": 1024.0 * (after - before), "peak": 1024.0 * after}
+    return {
+        "links": len(raw["links"]),
+        "seconds": spent,
+        "memory": 1024.0 * (after - before),
+        "peak": 1024.0 * after,
+    }
 
 
 def one(topology: str, n: int, limit: float, checkout: Path | None) -> Raw | None:
@@ -170,10 +191,13 @@ def one(topology: str, n: int, limit: float, checkout: Path | None) -> Raw | Non
 
 
 def row(name: str, found: Raw | None, limit: float) -> str:
+    """A line of the table: seconds, memory, and the dearest stages."""
     if found is None:
         return f"| {name} | > {limit:.0f} |  |  |  |"
     spent = found["seconds"]
-    stages = sorted((k for k in spent if k != "whole" and spent[k] >= 0.03 * spent["whole"]), key=lambda k: -spent[k])
+    stages = sorted(
+        (k for k in spent if k != "whole" and spent[k] >= 0.03 * spent["whole"]), key=lambda k: -spent[k]
+    )
     most = ", ".join(f"{k} {spent[k]:.2f}" for k in stages[:5])
     return f"| {name} | {spent['whole']:.2f} | {found['memory'] / 1e6:.0f} | {found['peak'] / 1e6:.0f} | {most} |"
 
@@ -190,7 +214,9 @@ def main() -> None:
     if asked.one:
         print(json.dumps(measured(asked.one[0], int(asked.one[1]))))
         return
-    print("| links | processor time [s] | memory [MB] | peak of the process [MB] | stages [s] |\n|---|---:|---:|---:|---|")
+    print(
+        "| links | processor time [s] | memory [MB] | peak of the process [MB] | stages [s] |\n|---|---:|---:|---:|---|"
+    )
     for name in asked.only:
         found: dict[int, Raw] = {}
         lost = set()

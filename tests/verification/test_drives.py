@@ -218,15 +218,20 @@ def test_rates_per_drive_add_up() -> None:
     """v = Σ (∂p/∂q_d) q_d', and each is the difference of the poses that this drive alone makes."""
     scene = linkage_scene(five_bar(), None, sections=FIVE)
     m = motion_at(scene, T)
+    other_way = {"drives": dict(reversed(list(FIVE["drives"].items())))}
+    each = [
+        m,
+        motion_at(linkage_scene(five_bar(), None, sections=other_way), T),
+    ]  # v_phi is of the first drive
     rates = [0.9 * (1 - np.cos(2 * np.pi * T)), -0.6 * 140 * T**3 * (1 - T) ** 3]
-    total = sum(m.v_drives[:, d] * rates[d][:, None, None] for d in (0, 1))
+    total = sum(one.v_phi * rate[:, None, None] for one, rate in zip(each, rates, strict=True))
     assert_allclose(m.v, total, atol=1e-13)
     first = linkage_scene(
         five_bar(), None, sections=drives(left=("A", steady(1.0)), right=("E", steady(0.0)))
     )
     alone = motion_at(first, np.zeros(1))
-    assert_allclose(alone.v[0], m.v_drives[0, 0], atol=1e-13)
-    assert_allclose(alone.omega[0], m.omega_drives[0, 0], atol=1e-13)
+    assert_allclose(alone.v[0], m.v_phi[0], atol=1e-13)
+    assert_allclose(alone.omega[0], m.omega_phi[0], atol=1e-13)
 
 
 AXES = (Z, Y, Y, X, Y, X)

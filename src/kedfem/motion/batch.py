@@ -13,16 +13,19 @@ import scipy.linalg
 from jaxtyping import Float, Int
 
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import SETTLED, Target, moved, remainder, stride, twists
+from kedfem.motion.newton import SETTLED, Target, driven_rows, moved, remainder, stride, twists
 from kedfem.motion.rows import Rows
-from kedfem.motion.values import Poses, Twists, convective, features, jacobian
+from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian
 
 EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
 QUADRATIC = 1e-7  # after such a step the next one would be rounding
 SWEEPS = 12
 SPREAD = 30.0  # how much worse a square set of rows may be conditioned than all rows
 TRIES = 4  # places on a path whose own best rows are tried for all of it
-POINTS = 250  # time points solved together: as many as stay in the cache
+POINTS, USUAL = (
+    250,
+    12,
+)  # time points solved together, as many as stay in the cache, of linkages of so many bodies
 
 Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 
@@ -75,14 +78,14 @@ class Moving:
 
     poses : R (T, B, 3, 3), p (T, B, 3)
     first, second : twists (v, ω) and their time derivatives, each a pair of (T, B, 3)
-    partial : (T, D, B, 3) each: twists per unit of each drive
+    partial : (T, B, 3) each: twists per unit of the first drive
     gap : (T,) largest gap left, in units of size; infinite where Newton has not settled
     """
 
     poses: Poses
     first: Twists
     second: Twists
-    partial: tuple[Float[np.ndarray, "T D B 3"], Float[np.ndarray, "T D B 3"]]
+    partial: Twists
     gap: Float[np.ndarray, " T"]
 
 
@@ -93,7 +96,8 @@ def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Targe
     """
     chosen = choice(link.rows, which)
     rest = choice(link.rows, np.setdiff1d(np.arange(link.rows.count), which))
-    blocks = [slice(k, k + POINTS) for k in range(0, max(len(aim), 1), POINTS)]
+    few = max(POINTS * USUAL // max(USUAL, len(link.bodies)), 1)
+    blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
     parts = [
         _block(link, chosen, rest, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b]))
         for b in blocks
@@ -102,16 +106,17 @@ def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Targe
 
 
 def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Target, rates: Rates) -> Moving:
-    rows, own, bodies = chosen.rows, chosen.target(aim), len(link.bodies)
-    scale, columns = rows.scale(link.size)[: rows.count], drive_columns(rows, aim.q.shape[1])
-    rhs = np.empty((len(aim), rows.count, 1 + columns.shape[1]))
-    rhs[..., 1:] = columns * scale[:, None]
+    rows, own = chosen.rows, chosen.target(aim)
+    scale = rows.scale(link.size)[: rows.count]
+    rhs = np.empty((len(aim), rows.count, 3))
+    rhs[..., 1] = driven_rows(rows, rates[0]) * scale
+    rhs[..., 2] = (rows.drive == 0) * scale
     step = before = np.full(len(aim), np.inf)
     for _ in range(SWEEPS):
         f = features(rows, poses, own.near)
         rhs[..., 0] = -scale * remainder(rows, f, own)
         try:
-            solve = solver(jacobian(rows, f, bodies, link.size))
+            solve = solver(link, rows, f)
             x = solve(rhs)
         except np.linalg.LinAlgError:
             return _one_by_one(link, chosen, rest, poses, aim, rates)
@@ -122,25 +127,22 @@ def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Targe
             break
     if not (step <= SETTLED).all():
         return _failed(poses, aim, step)
-    first, second = ((x[..., 1:] * rate[:, None]).sum(axis=2) for rate in rates)
-    bent = convective(rows, f, twists(link, first)) * -scale
-    second += solve(bent[..., None])[..., 0]
+    first = twists(link, x[..., 1])
+    bent = scale * (driven_rows(rows, rates[1]) - convective(rows, f, first))
+    second = solve(bent[..., None])[..., 0]
     gap = _gap(link, rest, poses, aim)
-    by_drive = twists(link, np.swapaxes(x[..., 1:], 1, 2))
-    return Moving(poses, twists(link, first), twists(link, second), by_drive, gap)
+    return Moving(poses, first, twists(link, second), twists(link, x[..., 2]), gap)
 
 
-def solver(J: Float[np.ndarray, "T m k"]) -> Callable[[np.ndarray], np.ndarray]:
+def solver(link: Linkage, rows: Rows, f: Features) -> Callable[[np.ndarray], np.ndarray]:
     """Solution of J x = b; in least squares if there are more rows than unknowns."""
+    if link.blocks is not None:
+        return partial(link.blocks.least_squares, link.blocks.values(rows, f, link.size))
+    J = jacobian(rows, f, len(link.bodies), link.size)
     if J.shape[1] == J.shape[2]:
         return partial(np.linalg.solve, J)
     Q, U = np.linalg.qr(J)
     return lambda b: np.linalg.solve(U, np.swapaxes(Q, 1, 2) @ b)
-
-
-def drive_columns(rows: Rows, drives: int) -> Float[np.ndarray, "m D"]:
-    """Right-hand sides of the rows for a unit of each drive."""
-    return np.asarray(rows.drive[:, None] == np.arange(drives), float)
 
 
 def _gap(link: Linkage, rest: Choice, poses: Poses, aim: Target) -> Float[np.ndarray, " T"]:
@@ -168,9 +170,8 @@ def _one_by_one(
 def _failed(poses: Poses, aim: Target, step: Float[np.ndarray, " T"]) -> Moving:
     """Points of which some have not settled; without rates."""
     nothing = np.zeros_like(poses[1])
-    none = np.zeros((len(aim), aim.q.shape[1], *nothing.shape[1:]))
     twist, gap = (nothing, nothing), np.where(step <= SETTLED, 0.0, np.inf)
-    return Moving(poses, twist, twist, (none, none), gap)
+    return Moving(poses, twist, twist, twist, gap)
 
 
 def _joined(parts: list[Moving]) -> Moving:

@@ -11,6 +11,7 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.motion.blocks import Blocks, blocks
 from kedfem.motion.drives import Drives, drives
 from kedfem.motion.freedom import RANK_TOLERANCE, Drawn, free_motions, listed, rank
 from kedfem.motion.freedom import remedy as held_by
@@ -31,6 +32,7 @@ from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Joint, Scene, following_links
 
 GROUND = "ground"
+MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Linkage:
     drives : what is driven
     start : poses (1, B, ...) that the path starts from
     mobility : free motions that the drives leave; as many rows, the last ones, hold these
+    blocks : how rows are solved entry by entry, of linkages of many bodies
     """
 
     bodies: tuple[str, ...]
@@ -57,6 +60,7 @@ class Linkage:
     drives: Drives
     start: Poses
     mobility: int = 0
+    blocks: Blocks | None = None
 
     @property
     def drive(self) -> str | None:
@@ -84,8 +88,10 @@ def linkage(scene: Scene) -> Linkage:
         free = J.shape[1] - rank(J)
     names = tuple(row.joint for row in rows)
     start = resting_poses(1, len(bodies))
+    every = stacked(rows)
+    several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     return Linkage(
-        bodies, stacked(rows), names, size, drawn.centre, _redundant(J, names), driven, start, free
+        bodies, every, names, size, drawn.centre, _redundant(J, names), driven, start, free, several
     )
 
 

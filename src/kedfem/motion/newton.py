@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from kedfem.motion.blocks import Blocks
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rows import Rows
 from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian, residuals
@@ -74,15 +75,53 @@ class Factor:
     """QR of the scaled rows at T poses; least squares over all rows, so redundant ones need no choice."""
 
     def __init__(self, link: Linkage, f: Features) -> None:
-        self.link, self.f, self.bodies = link, f, len(link.bodies)
+        self.link, self.f = link, f
         self.row = link.rows.scale(link.size)[: link.rows.count]
-        self.J = jacobian(link.rows, f, self.bodies, link.size)
+        self.J = jacobian(link.rows, f, len(link.bodies), link.size)
         self.Q, self.U = np.linalg.qr(self.J)
 
     def twists(self, rhs: Float[np.ndarray, "T m"]) -> Twists:
         """Least-squares solution of J (v, ω) = rhs; the ground's are zero."""
         projected = np.swapaxes(self.Q, 1, 2) @ (rhs * self.row)[..., None]
         return twists(self.link, np.linalg.solve(self.U, projected)[..., 0])
+
+    def extremes(self) -> Float[np.ndarray, "T 2"]:
+        """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
+        if not self.U.shape[-1]:
+            return np.ones((len(self.U), 2))
+        return np.asarray(np.linalg.svd(self.U, compute_uv=False)[:, [0, -1]])
+
+
+class BlockFactor:
+    """The same of a large linkage, entry by entry."""
+
+    def __init__(self, link: Linkage, f: Features, blocks: Blocks) -> None:
+        self.link, self.f, self.blocks = link, f, blocks
+        self.row = link.rows.scale(link.size)[: link.rows.count]
+        self.values = blocks.values(link.rows, f, link.size)
+
+    def twists(self, rhs: Float[np.ndarray, "T m"]) -> Twists:
+        """Least-squares solution of J (v, ω) = rhs; the ground's are zero."""
+        found = self.blocks.least_squares(self.values, (rhs * self.row)[..., None])
+        return twists(self.link, found[..., 0])
+
+    def extremes(self) -> Float[np.ndarray, "T 2"]:
+        """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
+        return self.blocks.extremes(self.values)
+
+
+def factored(link: Linkage, f: Features) -> Factor | BlockFactor:
+    """The scaled rows at T poses, ready to be solved."""
+    return Factor(link, f) if link.blocks is None else BlockFactor(link, f, link.blocks)
+
+
+def agree(here: Factor | BlockFactor, there: Factor | BlockFactor) -> bool:
+    """Whether no singular position lies between the first poses of two that are close by: det J₁ᵀ J₂ > 0."""
+    if isinstance(here, BlockFactor) and isinstance(there, BlockFactor):
+        return here.blocks.agree(here.values[0], there.values[0])
+    if isinstance(here, Factor) and isinstance(there, Factor):
+        return bool(np.linalg.slogdet(here.J[0].T @ there.J[0])[0] > 0)
+    raise TypeError("both must be of one linkage")
 
 
 def twists(
@@ -94,11 +133,11 @@ def twists(
     return full[..., :3] * link.size, full[..., 3:]
 
 
-def of_drives(link: Linkage, rates: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
-    """Right-hand side of the rows from rates of the drives."""
-    out = np.zeros((len(rates), link.rows.count))
-    driven = np.flatnonzero(link.rows.drive >= 0)
-    out[:, driven] = rates[:, link.rows.drive[driven]]
+def driven_rows(rows: Rows, rates: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
+    """Right-hand sides of the rows for rates of the drives."""
+    out = np.zeros((len(rates), rows.count))
+    driven = np.flatnonzero(rows.drive >= 0)
+    out[:, driven] = rates[:, rows.drive[driven]]
     return out
 
 
@@ -135,7 +174,7 @@ def closed(
     for _ in range(sweeps):
         f = features(link.rows, poses, aim.near)
         try:
-            change = Factor(link, f).twists(-remainder(link.rows, f, aim))
+            change = factored(link, f).twists(-remainder(link.rows, f, aim))
         except np.linalg.LinAlgError:
             return poses, np.full(len(aim), np.inf)
         poses = moved(poses, change)
@@ -160,10 +199,10 @@ def gaps(link: Linkage, poses: Poses, aim: Target) -> Float[np.ndarray, "T m"]:
 
 def derivatives(
     link: Linkage, poses: Poses, tau: Float[np.ndarray, " T"], aim: Target
-) -> tuple[Twists, Twists, Factor]:
+) -> tuple[Twists, Twists, Factor | BlockFactor]:
     """First and second derivatives of the motion by τ, as twists: differentiated constraints."""
     _, q1, q2 = link.drives.at(tau)
-    factor = Factor(link, features(link.rows, poses, aim.near))
-    first = factor.twists(of_drives(link, q1))
-    second = factor.twists(of_drives(link, q2) - convective(link.rows, factor.f, first))
+    factor = factored(link, features(link.rows, poses, aim.near))
+    first = factor.twists(driven_rows(link.rows, q1))
+    second = factor.twists(driven_rows(link.rows, q2) - convective(link.rows, factor.f, first))
     return first, second, factor

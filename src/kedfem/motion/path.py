@@ -15,11 +15,14 @@ from kedfem.motion.messages import stopped
 from kedfem.motion.newton import (
     OPEN,
     SETTLED,
+    BlockFactor,
     Factor,
     Target,
+    agree,
     closed,
     cross_matrix,
     derivatives,
+    factored,
     moved,
     orthonormal,
     target,
@@ -36,6 +39,7 @@ WEAK, SINGULAR = 0.05, 1e-7  # relative singular values: worth a closer look; a 
 MOST_TURNS = 60  # that a linkage may take to return to its pose
 RETURNED = 1e-9  # of the size [-, rad]: as closely gears must return
 FINE = 3e-14  # of the size: error of a prediction from which rates can be taken
+NEAR = 1e-8  # of large linkages: one more sweep of Newton costs less than a finer grid
 REFINEMENTS, MOST_POINTS = 4, 20_000
 
 
@@ -184,12 +188,11 @@ def _checked(grid: list["_Stand"], period: float) -> Path:
     R, p = (np.concatenate([g.poses[k] for g in grid]) for k in (0, 1))
     near = np.concatenate([g.near for g in grid])
     first, second, factor = derivatives(link, (R, p), phi, target(link, phi, near))
-    s = _singular(factor)
-    weakness = s[:, -1] / s[:, 0]
+    weakness, singular = _weakness(factor)
     least = int(weakness.argmin())
     along = Path(
         phi, R, p, first, second, near, period, _gathered(link, near, period),
-        (float(weakness[least]), float(phi[least])), independent(factor.J, s[:, -1]),
+        (float(weakness[least]), float(phi[least])), _solving(link, factor, singular),
         _curve(phi, R, p, first, second),
     )  # fmt: skip
     beside = np.pad(weakness, 1, constant_values=np.inf)
@@ -225,7 +228,7 @@ def _refined(link: Linkage, along: Path) -> Path:
             break
         aim, guess = aimed(link, along, middle), predicted(along, middle)
         poses, gap = closed(link, guess, aim)
-        off = np.isfinite(gap) & (_distances(link, poses, guess) > FINE)
+        off = np.isfinite(gap) & (_distances(link, poses, guess) > (FINE if link.blocks is None else NEAR))
         if not off.any():
             break
         poses, aim = (orthonormal(poses[0][off]), poses[1][off]), aim.at(off)
@@ -266,8 +269,7 @@ def _closer(link: Linkage, along: Path, low: float, high: float) -> Path:
         tau = np.linspace(low, high, 33)
         aim = aimed(link, along, tau)
         poses, _ = closed(link, predicted(along, tau), aim, sweeps=2)
-        s = _singular(Factor(link, features(link.rows, poses, aim.near)))
-        weakness = s[:, -1] / s[:, 0]
+        weakness, _ = _weakness(factored(link, features(link.rows, poses, aim.near)))
         k = int(weakness.argmin())
         low, high = tau[max(k - 1, 0)], tau[min(k + 1, 32)]
         if weakness[k] < along.weakest[0]:
@@ -275,15 +277,23 @@ def _closer(link: Linkage, along: Path, low: float, high: float) -> Path:
     return along
 
 
-def _singular(factor: Factor) -> Float[np.ndarray, "T k"]:
-    """Singular values of the scaled rows, falling; the last is 0 at a dead point."""
-    if not factor.U.shape[-1]:
-        return np.ones((len(factor.U), 1))
-    return np.asarray(np.linalg.svd(factor.U, compute_uv=False))
+def _weakness(factor: Factor | BlockFactor) -> tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"]]:
+    """Least singular values of the scaled rows, 0 at a dead point: relative to the greatest, and absolute."""
+    greatest, least = factor.extremes().T
+    return least / greatest, least
+
+
+def _solving(
+    link: Linkage, factor: Factor | BlockFactor, least: Float[np.ndarray, " G"]
+) -> Int[np.ndarray, " k"]:
+    """Rows that are solved for: of a small linkage as many as motions, else all in the least squares."""
+    if isinstance(factor, Factor):
+        return independent(factor.J, least)
+    return np.arange(link.rows.count)
 
 
 class _Stand:
-    """One grid point with its rows' derivatives J and the rates of the motion."""
+    """One grid point with its factored rows and the rates of the motion."""
 
     def __init__(self, link: Linkage, tau: float, poses: Poses, near: Float[np.ndarray, "1 A"]) -> None:
         self.link, self.tau, self.poses = link, tau, poses
@@ -291,7 +301,7 @@ class _Stand:
         self.first, self.second, factor = derivatives(link, poses, at, target(link, at, near))
         self.near = factor.f.value[link.rows.angles].T
         self.turning = turning(link.rows, factor.f, self.first)
-        self.J = factor.J[0]
+        self.factor = factor
 
     def predicted(self, step: float) -> Poses:
         """Second-order Taylor."""
@@ -333,7 +343,7 @@ def _next(here: _Stand, step: float, usual: float) -> _Stand:
             there = _Stand(link, tau, (orthonormal(R), p), aim.near)
         except np.linalg.LinAlgError:
             continue
-        if np.linalg.slogdet(here.J.T @ there.J)[0] > 0:  # else a singular position lies between
+        if agree(here.factor, there.factor):  # else a singular position lies between
             return there
     at = np.array([here.tau])
     raise MotionError(stopped(link, here.poses, here.tau, target(link, at, here.near)))

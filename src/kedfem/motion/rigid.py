@@ -25,7 +25,8 @@ class RigidMotion:
     v : (T, B, 3) p' [m/s]
     R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
     drives : (T, D) turn or travel of each drive [rad or m]; phi is the first of them
-    omega_drives, v_drives : (T, D, B, 3) rotation and displacement of the origin per turn or travel of each drive
+    omega_phi, v_phi : (T, B, 3) rotation and displacement of the origin per turn or travel of the first drive; zero
+        without one [- and m, of a slide 1/m and -]
     """
 
     t: Float[np.ndarray, " T"]
@@ -38,18 +39,8 @@ class RigidMotion:
     R2: Float[np.ndarray, "T B 3 3"]
     p2: Float[np.ndarray, "T B 3"]
     drives: Float[np.ndarray, "T D"]
-    omega_drives: Float[np.ndarray, "T D B 3"]
-    v_drives: Float[np.ndarray, "T D B 3"]
-
-    @property
-    def omega_phi(self) -> Float[np.ndarray, "T B 3"]:
-        """Rotation per turn or travel of the first drive; zero without one [- or 1/m]."""
-        return self.omega_drives[:, 0] if self.drives.shape[1] else np.zeros_like(self.omega)
-
-    @property
-    def v_phi(self) -> Float[np.ndarray, "T B 3"]:
-        """Displacement of the origin per turn or travel of the first drive; zero without one [m or -]."""
-        return self.v_drives[:, 0] if self.drives.shape[1] else np.zeros_like(self.v)
+    omega_phi: Float[np.ndarray, "T B 3"]
+    v_phi: Float[np.ndarray, "T B 3"]
 
     def part(self, first: int, end: int) -> "RigidMotion":
         """The time points from one number up to another."""
@@ -70,10 +61,10 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
     """Nominal motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
-    p, omega, alpha, v, p2 = np.zeros((5, len(t), bodies, 3))
-    none = np.zeros((len(t), 0, bodies, 3))
+    p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
+    none = np.zeros((len(t), 0))
     return RigidMotion(
-        t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, none[:, :, 0, 0], none, none
+        t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, none, omega_phi, v_phi
     )
 
 
@@ -119,5 +110,5 @@ def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got:
     c_now = R @ c
     return RigidMotion(
         t, q[:, 0], R, p + c - c_now, omega, alpha, v - cross(omega, c_now), R2, v2 - R2 @ c,
-        q, omega_q, v_q - cross(omega_q, c_now[:, None]),
+        q, omega_q, v_q - cross(omega_q, c_now),
     )  # fmt: skip

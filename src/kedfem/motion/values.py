@@ -3,6 +3,7 @@
 Inside, time runs along the last axis: of a few hundred points all that one operation touches then lies in the cache.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +70,27 @@ def jacobian(rows: Rows, f: Features, bodies: int, size: float = 1.0) -> Float[n
 
     With a size, rows of gaps are divided and columns of velocities multiplied by it: entries of order one.
     """
-    g, k, T = rows.gaps, rows.angles, f.u.shape[2]
+    each = gradients(rows, f, size)
+    m, T = rows.count, each.shape[3]
+    J = np.zeros((len(rows.kind), bodies, 6, T))
+    every = np.arange(len(rows.kind))
+    J[every, rows.i] = each[:, 0]
+    J[every, rows.j] = each[:, 1]
+    for row, other, c in coupled_terms(rows, size):
+        J[row] += c * J[other]
+    return np.ascontiguousarray(J[:m, 1:].reshape(m, 6 * (bodies - 1), T).transpose(2, 0, 1))
+
+
+def coupled_terms(rows: Rows, size: float) -> Iterator[tuple[int, int, float]]:
+    """Further elementary rows of constraints, with their coefficients in scaled rows."""
+    scale = rows.scale(size)
+    for row, other, c in rows.plus:
+        yield row, other, c * scale[row] / scale[other]
+
+
+def gradients(rows: Rows, f: Features, size: float = 1.0) -> Float[np.ndarray, "E 2 6 T"]:
+    """Derivatives of elementary rows by the twists (v, ω) of their bodies i and j; scaled as in `jacobian`."""
+    g, k = rows.gaps, rows.angles
     # d(u·w) = w · du + u · dw;  du: gap v_i + ω_i × arm_i − v_j − ω_j × arm_j, turn ω_i × u;  dw = ω_j × w
     by_i, arm = _cross(f.arm_i, f.w), f.u.copy()
     arm[:, g] += f.arm_j[:, g]
@@ -78,16 +99,11 @@ def jacobian(rows: Rows, f: Features, bodies: int, size: float = 1.0) -> Float[n
     if size != 1.0:
         by_i[:, g] /= size
         by_j[:, g] /= size
-    J = np.zeros((len(rows.kind), bodies, 6, T))
-    every = np.arange(len(rows.kind))
-    J[g, rows.i[g], :3] = f.w[:, g].transpose(1, 0, 2)
-    J[g, rows.j[g], :3] = -f.w[:, g].transpose(1, 0, 2)
-    J[every, rows.i, 3:], J[every, rows.j, 3:] = by_i.transpose(1, 0, 2), by_j.transpose(1, 0, 2)
-    scale = rows.scale(size)
-    for row, other, c in rows.plus:
-        J[row] += c * scale[row] / scale[other] * J[other]
-    m = rows.count
-    return np.ascontiguousarray(J[:m, 1:].reshape(m, 6 * (bodies - 1), T).transpose(2, 0, 1))
+    out = np.zeros((len(rows.kind), 2, 6, f.u.shape[2]))
+    out[g, 0, :3] = f.w[:, g].transpose(1, 0, 2)
+    out[g, 1, :3] = -out[g, 0, :3]
+    out[:, 0, 3:], out[:, 1, 3:] = by_i.transpose(1, 0, 2), by_j.transpose(1, 0, 2)
+    return out
 
 
 def convective(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T m"]:

@@ -193,8 +193,7 @@ def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
     c, zero = linkage.centre, np.zeros_like(along.p)
     p = along.p + c - along.R @ c
     still = np.zeros_like(along.R)
-    T, B = along.p.shape[:2]
-    none = np.zeros((T, 0, B, 3))
+    T = len(along.phi)
     return RigidMotion(
-        np.zeros(T), along.phi, along.R, p, zero, zero, zero, still, zero, none[:, :, 0, 0], none, none
+        np.zeros(T), along.phi, along.R, p, zero, zero, zero, still, zero, np.zeros((T, 0)), zero, zero
     )

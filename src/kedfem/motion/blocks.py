@@ -1,0 +1,182 @@
+"""Constraint rows of large linkages by their entries: least squares and singular values, each row joining few bodies.
+
+The matrix of a small linkage is dealt with as a whole (`newton.Factor`). Of a large one only those entries are kept that
+join a row to one of its two to four bodies. JᵀJ is factored in blocks of six, bodies in order of least degree, so that a
+hundred four-bars, or loops in a row, cost a hundred times what one does.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.motion.rows import Rows
+from kedfem.motion.values import Features, coupled_terms, gradients
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Where the entries of constraint rows are, and the plan by which JᵀJ is factored.
+
+    count : moving bodies
+    row : (e,) constraint of each entry, rising
+    term, side, share : (e,) its elementary row, which of the two bodies there, and the coefficient
+    body : (e,) its body's place in the order of elimination
+    place : (b,) of each moving body
+    columns, below : first block of each column of the factor, and the block row of each
+    updates, of_column : blocks that change another, and first of each column
+    pairs : (n, 3) block of JᵀJ and the two entries whose product goes there
+    """
+
+    count: int
+    row: Int[np.ndarray, " e"]
+    term: Int[np.ndarray, " e"]
+    side: Int[np.ndarray, " e"]
+    share: Float[np.ndarray, " e"]
+    body: Int[np.ndarray, " e"]
+    place: Int[np.ndarray, " b"]
+    columns: Int[np.ndarray, " c"]
+    below: Int[np.ndarray, " n"]
+    updates: Int[np.ndarray, "u 3"]
+    of_column: Int[np.ndarray, " c"]
+    pairs: Int[np.ndarray, "p 3"]
+    rows: int
+
+    @cached_property
+    def starts(self) -> Int[np.ndarray, " m"]:
+        """First entry of each row, and their number."""
+        return np.searchsorted(self.row, np.arange(self.rows + 1))
+
+    def values(self, rows: Rows, f: Features, size: float) -> Float[np.ndarray, "T e 6"]:
+        """Entries of the scaled rows, as `values.jacobian` has them."""
+        found = gradients(rows, f, size)[self.term, self.side]
+        return np.ascontiguousarray(found.transpose(2, 0, 1) * self.share[:, None])
+
+    def least_squares(
+        self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]
+    ) -> Float[np.ndarray, "T k c"]:
+        """x that leaves least of J x = rhs.
+
+        Raises
+        ------
+        LinAlgError
+            Where J has not the rank of its columns.
+        """
+        from kedfem.motion.blocks_kernel import least_squares
+
+        T, _, c = rhs.shape
+        x = np.empty((T, c, self.count, 6))
+        right = np.ascontiguousarray(np.swapaxes(rhs, 1, 2))
+        if least_squares(values, right, self.starts, self.body, *self._plan(), x) < T:
+            raise np.linalg.LinAlgError("rows leave a motion free")
+        return np.moveaxis(x[:, :, self.place].reshape(T, c, -1), 1, 2)
+
+    def extremes(self, values: Float[np.ndarray, "T e 6"]) -> Float[np.ndarray, "T 2"]:
+        """Greatest and least singular value of J, the latter 0 where J has not the rank of its columns."""
+        from kedfem.motion.blocks_kernel import extremes
+
+        out = np.empty((len(values), 2))
+        first = np.random.default_rng(1).standard_normal((self.count, 6))
+        first /= np.linalg.norm(first)
+        extremes(values, self.starts, self.body, *self._plan(), first, out)
+        return out
+
+    def dense(self, values: Float[np.ndarray, "e 6"]) -> Float[np.ndarray, "m k"]:
+        """The rows as a matrix."""
+        J = np.zeros((self.rows, self.count, 6))
+        np.add.at(J, (self.row, self.body), values)
+        return J[:, self.place].reshape(self.rows, -1)
+
+    def agree(self, one: Float[np.ndarray, "e 6"], other: Float[np.ndarray, "e 6"]) -> bool:
+        """Whether J₁ᵀ J₂ has a positive determinant, so that no singular position lies between both."""
+        import scipy.sparse as sp
+        from scipy.sparse.linalg import splu
+
+        columns = (6 * self.body[:, None] + np.arange(6)).ravel()
+        shape = (self.rows, 6 * self.count)
+        J1, J2 = (sp.csr_matrix((x.ravel(), (np.repeat(self.row, 6), columns)), shape) for x in (one, other))
+        try:
+            factor = splu((J1.T @ J2).tocsc())
+        except RuntimeError:  # singular
+            return False
+        sign = np.sign(factor.U.diagonal()).prod() * _parity(factor.perm_r) * _parity(factor.perm_c)
+        return bool(sign > 0)
+
+    def _plan(self) -> tuple[np.ndarray, ...]:
+        return self.pairs, self.columns, self.below, self.updates, self.of_column
+
+
+def blocks(rows: Rows, bodies: int, size: float) -> Blocks:
+    """The entries of rows on all bodies but the ground, scaled with a size, and the plan to factor JᵀJ."""
+    terms = [(k, k, 1.0) for k in range(rows.count)] + list(coupled_terms(rows, size))
+    entries = sorted(
+        (row, term, side, c, int(b) - 1)
+        for row, term, c in terms
+        for side, b in enumerate((rows.i[term], rows.j[term]))
+        if b > 0
+    )
+    of_row: dict[int, list[int]] = {}
+    for n, each in enumerate(entries):
+        of_row.setdefault(each[0], []).append(n)
+    near: list[set[int]] = [set() for _ in range(bodies - 1)]
+    for here in of_row.values():
+        together = {entries[n][4] for n in here}
+        for b in together:
+            near[b] |= together - {b}
+    order, later = _elimination(near)
+    place = np.empty(bodies - 1, int)
+    place[order] = np.arange(bodies - 1)
+    below: list[int] = []
+    columns, number = [0], {}
+    for k, b in enumerate(order):
+        for at in (k, *sorted(int(place[x]) for x in later[b])):
+            number[at, k] = len(below)
+            below.append(at)
+        columns.append(len(below))
+    updates, of_column = [], [0]
+    for k in range(len(order)):
+        here = below[columns[k] + 1 : columns[k + 1]]
+        updates += [(number[i, j], number[i, k], number[j, k]) for n, j in enumerate(here) for i in here[n:]]
+        of_column.append(len(updates))
+    body = place[[each[4] for each in entries]] if entries else np.zeros(0, int)
+    pairs = [
+        (number[int(body[a]), int(body[b])], a, b)
+        for here in of_row.values()
+        for a in here
+        for b in here
+        if body[a] >= body[b]
+    ]
+    row, term, side, share, _ = (np.array(x) for x in zip(*entries, strict=True))
+    return Blocks(
+        bodies - 1, row, term, side, share.astype(float), body, place, np.array(columns), np.array(below),
+        np.array(updates, int).reshape(-1, 3), np.array(of_column), np.array(pairs, int).reshape(-1, 3), rows.count,
+    )  # fmt: skip
+
+
+def _elimination(near: list[set[int]]) -> tuple[list[int], dict[int, set[int]]]:
+    """Bodies in order of least degree, and of each those later ones that its column of the factor has."""
+    near = [set(each) for each in near]
+    left, order, later = set(range(len(near))), [], {}
+    while left:
+        b = min(left, key=lambda x: (len(near[x]), x))
+        left.remove(b)
+        order.append(b)
+        later[b] = near[b]
+        for x in near[b]:
+            near[x] |= near[b]
+            near[x] -= {b, x}
+    return order, later
+
+
+def _parity(order: Int[np.ndarray, " n"]) -> int:
+    """1 of an even permutation, -1 of an odd one."""
+    seen, sign = np.zeros(len(order), bool), 1
+    for first in range(len(order)):
+        k, length = first, 0
+        while not seen[k]:
+            seen[k] = True
+            k, length = int(order[k]), length + 1
+        if length and length % 2 == 0:
+            sign = -sign
+    return sign

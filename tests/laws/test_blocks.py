@@ -1,0 +1,115 @@
+"""Linkages solved entry by entry move, and are refused, as those that are solved as one matrix."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.errors import MotionError
+from kedfem.motion import linkage as linkages
+from kedfem.motion.linkage import linkage
+from kedfem.motion.newton import BlockFactor, Factor
+from kedfem.motion.path import path
+from kedfem.motion.values import features
+from kedfem.scene import Scene
+from tests.linkages import four_bar, linkage_scene, motion_at, slider_crank
+from tests.spatial_linkages import rssr
+
+Z = (0.0, 0.0, 1.0)
+
+
+def geared() -> Scene:
+    """A four-bar, a wheel on its rocker geared to the turn of the coupler on the crank: a row of four bodies."""
+    joints = four_bar(0.3, 0.95, 0.35, 1.0, 1.2)
+    joints["V"] = ("revolute", "rocker", "wheel", joints["C"][3], Z)
+    return linkage_scene(joints, sections={"gears": {"pair": {"joints": ["B", "V"], "ratio": 2.0}}})
+
+
+def row_of_loops(n: int) -> Scene:
+    """Four-bars one behind the other, the rocker of each the crank of the next."""
+    joints = dict(four_bar(0.3, 0.95, 0.35, 1.0, 1.2))
+    C, D = (np.asarray(joints[x][3]) for x in "CD")
+    for k in range(n):
+        ahead = np.array([0.9, 0.02, 0.0])
+        joints |= {
+            f"C{k}": ("revolute", f"rocker{k - 1}" if k else "rocker", f"coupler{k}", C, Z),
+            f"E{k}": ("revolute", f"coupler{k}", f"rocker{k}", C + ahead, Z),
+            f"D{k}": ("revolute", f"rocker{k}", "ground", D + ahead, Z),
+        }
+        C, D = C + ahead, D + ahead
+    return linkage_scene(joints)
+
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "four-bar": lambda: linkage_scene(four_bar(0.3, 0.95, 0.35, 1.0, 1.2)),
+    "slider-crank": lambda: linkage_scene(slider_crank(0.1, 0.3, 0.4), sliders=("slider",)),
+    "in space": lambda: linkage_scene(rssr(0.3)),
+    "gears": geared,
+    "seven loops": lambda: row_of_loops(6),
+}
+T = np.linspace(0.0, 0.3, 7)
+
+
+Work = Callable[[], Any]
+
+
+@pytest.fixture
+def whole_up_to(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, Work], Any]:
+    """What a function gives where linkages of so many bodies are solved as one matrix, larger ones by entries."""
+
+    def given(bodies: int, work: Work) -> Any:
+        monkeypatch.setattr(linkages, "MANY", bodies)
+        return work()
+
+    return given
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_solved_by_entries_a_linkage_moves_the_same(name: str, whole_up_to: Any) -> None:
+    scene = SCENES[name]()
+    one, other = (whole_up_to(many, lambda: motion_at(scene, T)) for many in (0, 1000))
+    for key in ("R", "p", "v", "omega", "alpha", "p2", "v_phi", "omega_phi"):
+        wanted = getattr(other, key)
+        assert_allclose(getattr(one, key), wanted, atol=1e-10 * np.abs(wanted).max())  # condition² · rounding
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_singular_values_and_least_squares_are_those_of_the_whole_matrix(name: str, whole_up_to: Any) -> None:
+    scene = SCENES[name]()
+    link = whole_up_to(0, lambda: linkage(scene))
+    along = whole_up_to(1000, lambda: path(linkage(scene), 0.0, 0.3))
+    f = features(link.rows, (along.R, along.p), along.near)
+    whole, by_entry = Factor(link, f), BlockFactor(link, f, link.blocks)
+    assert_allclose(by_entry.extremes(), whole.extremes(), rtol=0.03)  # power iteration: close ones mix
+    rhs = np.random.default_rng(2).standard_normal((len(along.phi), link.rows.count))  # not to be fulfilled
+    for one, other in zip(by_entry.twists(rhs), whole.twists(rhs), strict=True):
+        assert_allclose(one, other, atol=1e-9 * np.abs(other).max())
+    for k in range(len(along.phi)):
+        there = link.blocks.values(link.rows, f, link.size)[k]
+        assert link.blocks.agree(there, by_entry.values[0]) == (
+            np.linalg.slogdet(whole.J[k].T @ whole.J[0])[0] > 0
+        )
+
+
+PARALLEL = four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60))
+LOCKING = {
+    "a change point": (PARALLEL, 121.0),
+    "a limit of the crank": (four_bar(0.5, 0.6, 0.5, 1.0, 0.7), 60.0),
+    "no triangle": (slider_crank(0.3, 0.2, 0.4), 80.0),
+}
+
+
+@pytest.mark.parametrize("name", LOCKING)
+def test_dead_points_are_found_and_told_the_same(name: str, whole_up_to: Any) -> None:
+    joints, end = LOCKING[name]
+    scene = linkage_scene(joints, sliders=("slider",) if "triangle" in name else ())
+
+    def refusal() -> str:
+        with pytest.raises(MotionError) as caught:
+            motion_at(scene, np.linspace(0, np.radians(end), 9))
+        return str(caught.value)
+
+    one, other = (whole_up_to(many, refusal) for many in (0, 1000))
+    assert one == other
