@@ -1,0 +1,235 @@
+"""Where a march begins deflected: quasi-static, so that nothing vibrates; in static balance; or plucked.
+
+With a drive the deflection turns with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own nominal motion:
+the matrix has that inertia in it, so that no frequency is too near. Its rate is a difference of fourth order over one
+step. Without a drive links accelerate as rigid bodies where they are, and K δ = P − M a carries that.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.dense import component_first
+from kedfem.dynamics.mixing import Mixing
+from kedfem.dynamics.system.accelerations import accelerations, own_spin
+from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body
+from kedfem.dynamics.system.instant import Flat, Instant, Motion
+from kedfem.dynamics.system.internal import Inside, own, rows, turned_rate
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
+from kedfem.dynamics.system.start import as_coordinates, begun
+from kedfem.errors import SolveError
+from kedfem.links.record import Link
+from kedfem.motion.newton import cross_matrix
+
+SWEEPS = 60
+CONVERGED = 1e-10  # change of a sweep, of the deflection
+SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a body that nothing else holds; taken out again by sweeps
+LATER = np.array([
+    [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
+]) / 12  # rates at five instants, of fourth order  # fmt: skip
+
+Rows = Sequence[Float[np.ndarray, "_ _"]]
+Spins = Float[np.ndarray, "L 3 3"]
+
+
+def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0) -> State:
+    """The state at a time with the deflection that its links have as they move on without vibrating.
+
+    Parameters
+    ----------
+    motion_at : nominal motion at given times; of a system with a drive over a step from `time` on
+    rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
+
+    Raises
+    ------
+    SolveError
+        If no deflection is found.
+    """
+    now = Instant(of, motion_at, time)
+    if not now.motion.drives.shape[1]:
+        return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
+    u, v = _moving(of, motion_at, time)
+    return begun(now, u, v)
+
+
+def static(of: Ready, motion_at: Motion, time: float = 0.0, forces: Rows | None = None) -> State:
+    """The state at a time at rest in static balance.
+
+    Parameters
+    ----------
+    forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
+
+    Raises
+    ------
+    SolveError
+        If no balance is found: as of a link that hangs, and is not held.
+    """
+    now = Instant(of, motion_at, time)
+    none = np.zeros(int(of.bodies.at[-1]))
+    pull = none if forces is None else as_work(of, forces)
+    u = _balanced(now, none, lambda u, inside: pull, None, None)
+    return begun(now, u, none)
+
+
+def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> State:
+    """The state at a time in which the system is let go by forces that have deflected it.
+
+    With a drive these act on the quasi-static deflection, whose rates it has; without one, on a system at rest.
+    """
+    now = Instant(of, motion_at, time)
+    if not now.motion.drives.shape[1]:
+        return static(of, motion_at, time, forces)
+    u, v = _moving(of, motion_at, time)
+    pull = as_work(of, forces)
+    return begun(now, _balanced(now, u, lambda u, inside: pull, _spins(now), now.interface(v)), v)
+
+
+def as_work(of: Ready, forces: Rows) -> Flat:
+    """Nodal forces (n, d) of all bodies on their coordinates."""
+    from kedfem.dynamics.dense import work_on
+
+    return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
+
+
+def _moving(of: Ready, motion_at: Motion, time: float) -> tuple[Flat, Flat]:
+    """Deflection and rate with the nominal motion, from five instants within a step."""
+    h = of.c.h / 4
+    instants = [Instant(of, motion_at, time + k * h) for k in range(5)]
+    u = np.zeros((5, int(of.bodies.at[-1])))
+    z1: list[Flat | None] = [None] * 5
+    for _ in range(2 if _feels_rates(of) else 1):
+        for k, now in enumerate(instants):
+            guess = u[k] if u[k].any() or not k else u[k - 1]
+            u[k] = _balanced(now, guess, lambda u, inside: np.zeros_like(u), _spins(now), z1[k])
+        v = LATER @ u / h
+        z1 = [now.interface(x) for now, x in zip(instants, v, strict=True)]
+    return u[0], v[0]
+
+
+def _feels_rates(of: Ready) -> bool:
+    """Whether a law's force depends on a rate."""
+    laws = [each.law for each in of.system.constraints]
+    return any(law.damping != 0 if isinstance(law, Spring | Stop) else isinstance(law, Curve) and law.over == RATE
+               for law in laws)  # fmt: skip
+
+
+def _spins(now: Instant) -> Spins:
+    """[α]× + [ω]×² of all bodies, world components."""
+    alpha = cross_matrix(now.motion.alpha[0][now.of.bodies.motion])
+    omega = cross_matrix(now.omega)
+    return np.asarray(alpha + omega @ omega)
+
+
+def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
+    """Deflection of a system that nothing drives, and its rates: it turns with its links."""
+    of, links = now.of, now.of.system.model.links
+    spins = [own_spin(link, rows(of, k, v[own(of, k)]), now.R[k]) for k, link in enumerate(links)]
+
+    def rate(u: Flat) -> Flat:
+        turning = [turned_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
+        return v + as_coordinates(of, turning)
+
+    def inertia(u: Flat, inside: Sequence[Inside]) -> Flat:
+        z, moving = now.interface(u), rate(u)
+        C, e = now.gradients(z), now.coordinates(np.stack([z, now.interface(moving), 0 * z]))
+        hard = now.hard(C)
+        m = np.where(hard, 0.0, now.forces(e)[:, 0])
+        asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
+        f = np.concatenate([x.f for x in inside])
+        return -accelerations(now, now.F - f, u, moving, asked, [True] * len(links)).x
+
+    u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v), v)
+    return u, rate(u)
+
+
+def _balanced(
+    now: Instant, u: Flat, more: Callable[[Flat, Sequence[Inside]], Flat], spins: Spins | None,
+    z1: Flat | None, v: Flat | None = None,
+) -> Flat:  # fmt: skip
+    """The deflection at which all forces balance, by Newton's method with the stiffness of the mean frames.
+
+    Parameters
+    ----------
+    more : forces beside applied and internal ones, at a deflection
+    spins : of the inertia that it has as it turns, if any
+    z1 : rates of the interface unknowns
+    """
+    of, mixing, bodies, settled = now.of, Mixing(), _Held(now, spins), False
+    for _ in range(SWEEPS):
+        inside = now.inside(u, _turning(now, u) if v is None else _turning(now, u) + v)
+        r = now.F - np.concatenate([x.f for x in inside]) + more(u, inside) - bodies.inertia(u)
+        try:
+            change = Balance(of, *bodies.held(inside), _asked(now, u, z1)).solved(r).x
+        except SolveError:
+            break
+        if settled:  # once more: what is left of stiff hubs would be large accelerations
+            return np.asarray(u + change)
+        u = u + mixing.step(change)
+        size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
+        if not np.isfinite(size):
+            break
+        settled = size <= CONVERGED * reached + of.c.floor
+    raise SolveError(
+        "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
+        'their weight, or a drive at a natural frequency; take initial = "rest", a slower drive or stiffer links'
+    )
+
+
+def _turning(now: Instant, u: Flat) -> Flat:
+    """Rates [ω]× u of a deflection that turns with the nominal motion."""
+    links = enumerate(zip(now.of.system.model.links, cross_matrix(now.omega), strict=True))
+    each = [turned_rate(W, rows(now.of, k, u[own(now.of, k)])) for k, (_, W) in links]
+    return as_coordinates(now.of, each)
+
+
+def _asked(now: Instant, u: Flat, z1: Flat | None) -> Asked:
+    """What constraints and laws ask of the change of a deflection."""
+    z = now.interface(u)
+    C, e = now.gradients(z), now.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))
+    hard, laws = now.hard(C), now.forces(e)
+    soft = laws[:, 1] > 0.0
+    compliance = np.where(soft, 1 / np.where(soft, laws[:, 1], 1.0), 0.0)
+    target = np.where(soft, laws[:, 0] * compliance, -e[0])
+    every = hard | soft
+    return Asked(C[every], target[every], compliance[every], C.T @ np.where(every, 0.0, laws[:, 0]))
+
+
+class _Held:
+    """Bodies with K0, the inertia of turning in it; those with nominal frames made once."""
+
+    def __init__(self, now: Instant, spins: Spins | None) -> None:
+        self.now, self.spins, self._made = now, spins, dict[int, HeldBody]()
+        of = now.of
+        self.K = [component_first(part.T, link.K0)
+                  for part, link in zip(of.parts, of.system.model.links, strict=True)]  # fmt: skip
+        self.least = SOFTER * min(
+            _lowest(K, link) for K, link in zip(self.K, of.system.model.links, strict=True)
+        )
+
+    def held(self, inside: Sequence[Inside]) -> tuple[list[HeldBody], Float[np.ndarray, "L 3 3"]]:
+        """All bodies in their mean frames, and these."""
+        links = self.now.of.system.model.links
+        for k, (each, link) in enumerate(zip(inside, links, strict=True)):
+            if k not in self._made or link.fit is not None:
+                A = self.K[k] + self.least * np.eye(len(self.K[k]))
+                if self.spins is not None:
+                    S = (each.R.T @ self.spins[k] @ each.R)[: link.d, : link.d]
+                    A = A + np.kron(S, np.eye(link.n))
+                self._made[k] = held_body(A, self.now.of.parts[k].W)
+        return [self._made[k] for k in range(len(links))], np.stack([x.R for x in inside])
+
+    def inertia(self, u: Flat) -> Flat:
+        """M ([α]× + [ω]×²) u."""
+        of, out = self.now.of, np.zeros_like(u)
+        for k, S in enumerate(self.spins if self.spins is not None else ()):
+            d = of.system.model.links[k].d
+            out[own(of, k)] = (S[:d, :d] @ u[own(of, k)].reshape(d, -1)).ravel()
+        return out
+
+
+def _lowest(K: Float[np.ndarray, "N N"], link: Link) -> float:
+    """The lowest eigenvalue of a free body that strains."""
+    return float(np.linalg.eigvalsh(K)[3 if link.planar else 6])

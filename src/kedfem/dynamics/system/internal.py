@@ -1,0 +1,98 @@
+"""What a body is inside where a march begins: internal force, frames and damped quantities from u and u'."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.dense import coordinates, rows_of, work_on
+from kedfem.dynamics.frames import Followed, frames_of, seen_from
+from kedfem.dynamics.segment import internal_force, mean_orientation, position
+from kedfem.dynamics.state import Nodal
+from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.layout import points_of
+from kedfem.dynamics.system.march import Ready
+from kedfem.links.record import Link, mass_times
+
+Flat = Float[np.ndarray, " N"]
+
+
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """A body at one time: internal force f (N,) on its coordinates, world components; R (3, 3) its mean orientation.
+
+    frames : what its frames see; damped : (3, n, d) damping force without its rate, and its rates, nominal frame
+    """
+
+    f: Flat
+    R: Float[np.ndarray, "3 3"]
+    frames: list[Followed]
+    damped: Float[np.ndarray, "3 n d"]
+
+
+def rows(of: Ready, k: int, x: Flat) -> Nodal:
+    """Nodal rows (n, d) of body k from its coordinates."""
+    link = of.system.model.links[k]
+    return np.asarray(rows_of(link, of.parts[k], x.reshape(1, link.d, link.n))[0])
+
+
+def own(of: Ready, k: int) -> slice:
+    """Where the coordinates of body k stand."""
+    return slice(int(of.bodies.at[k]), int(of.bodies.at[k + 1]))
+
+
+def drawn(link: Link) -> Nodal:
+    """Position of a body as drawn; ψ of a planar beam has none."""
+    return position(link, np.zeros((link.n, link.d)))
+
+
+def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
+    """[ω]× x of rows; of a planar beam ψ stays out of it."""
+    d = x.shape[1]
+    return np.asarray(x @ spin[:d, :d].T)
+
+
+def inside(
+    of: Ready, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
+) -> Inside:
+    """Body k at the displacement u with the rate v.
+
+    Parameters
+    ----------
+    R, spin : of the nominal motion, and its [ω]×
+    """
+    link, damping = of.system.model.links[k], of.system.model.damping
+    d = link.d
+    x, x1 = rows(of, k, u), rows(of, k, v)
+    g, g1 = x @ R[:d, :d], (x1 - turned_rate(spin, x)) @ R[:d, :d]
+    y = position(link, g)
+    damped = np.zeros((3, *g.shape))
+    for m, each in enumerate((g, g1)):
+        damped[m] = damping.alpha * mass_times(link.mass, each)
+        if link.fit is None and damping.beta:
+            damped[m] += damping.beta * (link.K0 @ each.ravel()).reshape(each.shape)
+    frames = [seen_from(link, frame, y, g1) for frame in frames_of(link)]
+    f, _ = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
+    mean = R.copy()
+    mean[:d, :d] = mean_orientation(link, x, R[:d, :d])
+    return Inside(work_on(of.parts[k], f).ravel(), mean, frames, damped)
+
+
+def remembered(of: Ready, k: int, found: Inside, state: State) -> None:
+    """What a step remembers of body k, put into the state."""
+    link, part, here = of.system.model.links[k], of.parts[k], own(of, k)
+    state.f[here] = found.f
+    N = here.stop - here.start
+    for m in range(3):
+        at = 3 * here.start + m * N
+        state.damped[at : at + N] = work_on(part, found.damped[m]).ravel()
+    points, b = points_of(link), of.bodies.beam[k]
+    for e, (point, seen) in enumerate(zip(points, found.frames, strict=False)):
+        state.strain[b, 0, 0, :, e] = point.strains @ seen.g.ravel()
+        state.strain[b, 1, 0, :, e] = point.strains @ seen.g1.ravel()
+        state.direction[b, :, e], state.turn[b, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
+    for seen in found.frames if not points else ():
+        state.Q[k, : link.d, : link.d], state.angle[k] = seen.Q, seen.angle
+        for m, x in enumerate((seen.g, seen.g1)):
+            at = 3 * here.start + m * N
+            state.seen[at : at + N] = coordinates(link, part, x).ravel()

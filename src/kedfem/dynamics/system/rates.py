@@ -1,0 +1,255 @@
+"""Coordinates of constraints with their rates, exact: the nominal motion and the interface as series in time.
+
+A series is an array (3, …): a value, its rate, and the rate of that. Of a coupling surface, A = Σ D_k ⊗ e_k = Q U:
+with B = Q₀ᵀ A and Q = Q₀ exp [w t + b t²/2]×, the skew parts of exp(−[…]×) B vanish at each order,
+
+    G w = axial(B'),   G b = axial(B'' − 2 [w]× B' + [w]×² B),   G = tr(U) 1 − U
+
+Constraints that are linear in z are derivatives by z: taken by a complex step, exact to rounding.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    DISTANCE,
+    FACE,
+    GAP,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RIGID,
+    TURN,
+    Constraint,
+    End,
+    System,
+    Term,
+)
+from kedfem.motion.newton import cross_matrix, rotation
+from kedfem.motion.rigid import RigidMotion
+
+STEP = 1e-150  # of complex steps: its square is nothing
+Series = Float[np.ndarray, "3 *_"] | Complex[np.ndarray, "3 *_"]
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Orientation and origin of all bodies of the linkage at one time, as series: R (3, M, 3, 3), p (3, M, 3)."""
+
+    R: Float[np.ndarray, "3 M 3 3"]
+    p: Float[np.ndarray, "3 M 3"]
+
+
+def places(motion: RigidMotion, k: int = 0) -> Places:
+    """The nominal motion at time point k."""
+    R = motion.R[k]
+    return Places(
+        np.stack([R, cross_matrix(motion.omega[k]) @ R, motion.R2[k]]),
+        np.stack([motion.p[k], motion.v[k], motion.p2[k]]),
+    )
+
+
+def coordinates(system: System, at: Places, z: Float[np.ndarray, "3 k"]) -> Float[np.ndarray, "3 r"]:
+    """All coordinates, their rates and the rates of these; of those linear in z what C(t) z is.
+
+    Parameters
+    ----------
+    z : interface unknowns as series
+    """
+    out = np.zeros((3, len(system.constraints)))
+    bent, small = _Poses(system, at, z), _Poses(system, at, 1j * STEP * z)
+    for n, each in enumerate(system.constraints):
+        if each.linear:
+            out[:, n] = _summed(system, each, small).imag / STEP
+        else:
+            out[:, n] = _summed(system, each, bent)
+    return out
+
+
+def travels(system: System, at: Places) -> Float[np.ndarray, "3 r"]:
+    """All coordinates in the nominal motion: of a drive its travel, but for turns."""
+    poses = _Poses(system, at, np.zeros((3, system.unknowns)))
+    return np.array([_summed(system, each, poses) for each in system.constraints]).reshape(-1, 3).T
+
+
+def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, " t"]:
+    """Values of all terms of all constraints, without their factors; of those linear in z at z = 0."""
+    none = np.zeros((3, len(z)))
+    rest, bent = _Poses(system, at, none), _Poses(system, at, np.stack([z, 0 * z, 0 * z]))
+    return np.array([
+        value(system, term, *(((rest if each.linear else bent)(n)) for n in (term.i, term.j)))[0]
+        for each in system.constraints for term in each.terms
+    ])  # fmt: skip
+
+
+def gradients(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, "r k"]:
+    """How all coordinates change with z, at rest in their nominal places where they are linear in it."""
+    C = np.zeros((len(system.constraints), system.unknowns))
+    still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
+    moving: dict[tuple[int, int, bool], tuple[Series, Series]] = {}
+
+    def moved(n: int, column: int, linear: bool) -> tuple[Series, Series]:
+        key = (n, column, linear)
+        if key not in moving:
+            along = np.zeros((3, len(z)))
+            along[0], along[1, column] = 0.0 if linear else z, 1.0
+            moving[key] = pose(system.ends[n], still, along)
+        return moving[key]
+
+    for a, each in enumerate(system.constraints):
+        rest = _Poses(system, still, np.stack([0.0 * z if each.linear else z, 0.0 * z, 0.0 * z]))
+        for term in each.terms:
+            columns = {
+                c for n in {term.i, term.j} for c in np.flatnonzero(system.ends[n].onto.any(axis=(0, 1)))
+            }
+            for c in columns:
+                i, j = (
+                    moved(n, c, each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
+                    for n in (term.i, term.j)
+                )
+                C[a, c] += term.factor * value(system, term, i, j)[1]
+    return C
+
+
+@dataclass
+class _Poses:
+    """Poses of ends, each found once."""
+
+    system: System
+    at: Places
+    z: Series
+
+    def __post_init__(self) -> None:
+        self._found: dict[int, tuple[Series, Series]] = {}
+
+    def __call__(self, n: int) -> tuple[Series, Series]:
+        if n not in self._found:
+            self._found[n] = pose(self.system.ends[n], self.at, self.z)
+        return self._found[n]
+
+
+def _summed(system: System, each: Constraint, poses: Callable[[int], tuple[Series, Series]]) -> Series:
+    found = (term.factor * value(system, term, poses(term.i), poses(term.j)) for term in each.terms)
+    return np.asarray(sum(found))
+
+
+def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
+    """Place x (3, 3) and orientation Q (3, 3, 3) of an end, as series."""
+    R, x = at.R[:, end.body], at.p[:, end.body] + at.R[:, end.body] @ end.origin
+    if end.form == RIGID:
+        return x, R
+    u = np.einsum("pdk,tk->tpd", end.onto, z)
+    flat = 2 if end.form == PLANAR_BEAM else end.onto.shape[1]
+    x = x + 0 * u[0, 0, 0]
+    x[:, :flat] += u[:, 0, :flat]
+    if end.form == POINT:
+        return x, R
+    if end.form == PLANAR_BEAM:
+        return x, product(np.matmul, _about_z(u[:, 0, 2]), R)
+    A = np.einsum("tka,kb->tab", _directions(end, R, u), end.directions)
+    return x, _rotation(A)
+
+
+def _about_z(psi: Series) -> Series:
+    """Turns by ψ about z."""
+    w = psi[1] * _skew(np.array([0, 0, 1.0]))
+    c, s, zero = np.cos(psi[0]), np.sin(psi[0]), 0 * psi[0]
+    Q = np.array([[c, -s, zero], [s, c, zero], [zero, zero, 1 + zero]])
+    return np.stack([Q, Q @ w, Q @ (w @ w + psi[2] * _skew(np.array([0, 0, 1.0])))])
+
+
+def _directions(end: End, R: Series, u: Series) -> Series:
+    """D (3, 3, 3) of a surface, row k direction k as it is now: known ones from its points, the others completed."""
+    d = end.onto.shape[1]
+    D = np.zeros((3, 3, 3), np.result_type(R, u))
+    for k in range(end.known):
+        D[:, k] = R @ end.directions[k]
+        D[:, k, :d] += (u[:, k + 1] - u[:, 0]) / end.lengths[k]
+    if end.form == PLANAR:
+        if end.known == 1:
+            D[:, 1, 0], D[:, 1, 1] = -D[:, 0, 1], D[:, 0, 0]
+        D[0, 2, 2] = 1.0
+    if end.form == FACE:
+        n = product(np.cross, D[:, 0], D[:, 1])
+        size = root(product(np.dot, n, n))
+        D[:, 2] = product(np.multiply, n, inverse(size))
+    return D
+
+
+def _rotation(A: Series) -> Series:
+    """Q of A = Q U: the value by singular values and Newton, then order by order."""
+    left, _, right = np.linalg.svd(A[0].real)
+    Q = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    for _ in range(2):
+        Q = Q @ rotation(_turn(Q.T @ A[0].real))
+    if np.iscomplexobj(A):  # one step more is exact to first order
+        Q = Q @ (np.eye(3) + _skew(_turn(Q.T @ A[0])))
+    B = Q.T @ A
+    w = _turn(B[0], B[1])
+    W = _skew(w)
+    b = _turn(B[0], B[2] - 2 * W @ B[1] + W @ W @ B[0])
+    return np.stack([Q, Q @ W, Q @ (W @ W + _skew(b))])
+
+
+def _skew(w: np.ndarray) -> np.ndarray:
+    """[w]×, of complex numbers too."""
+    return np.cross(np.eye(3), w)
+
+
+def _turn(U: np.ndarray, B: np.ndarray | None = None) -> np.ndarray:
+    """θ of G θ = axial(B), B = U if not given."""
+    B = U if B is None else B
+    axial = np.array([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])
+    return np.asarray(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial))
+
+
+def value(system: System, term: Term, one: tuple[Series, Series], other: tuple[Series, Series]) -> Series:
+    """A term of two ends' poses, as a series (3,)."""
+    (x_i, Q_i), (x_j, Q_j) = one, other
+    if term.kind in (GAP, DISTANCE):
+        gap = (
+            x_i
+            + Q_i @ (term.a - system.ends[term.i].origin)
+            - x_j
+            - Q_j @ (term.a_j - system.ends[term.j].origin)
+        )
+        return product(np.dot, gap, Q_j @ term.b) if term.kind == GAP else root(product(np.dot, gap, gap))
+    if term.kind == TURN:
+        return product(np.dot, Q_i @ term.a, Q_j @ term.b)
+    if term.kind != ANGLE:
+        raise ValueError(f"term: must be a gap, turn, angle or distance, got {term.kind}")
+    a, a_j = Q_i @ term.a, Q_j @ term.a_j
+    return _angle(product(np.dot, a, a_j), product(np.dot, a, product(np.cross, Q_j @ term.b, a_j)))
+
+
+def _angle(c: Series, s: Series) -> Series:
+    """arg(c + i s): its rates are those of the logarithm, c and s each their own kind of number."""
+    size = c[0] ** 2 + s[0] ** 2
+    turned = np.arctan2(s[0].real, c[0].real)
+    if np.iscomplexobj(c):
+        turned = turned + 1j * ((c[0] * s[0].imag - s[0] * c[0].imag) / size).real
+    p1, q1 = (c[0] * c[1] + s[0] * s[1]) / size, (c[0] * s[1] - s[0] * c[1]) / size
+    q2 = (c[0] * s[2] - s[0] * c[2]) / size
+    return np.array([turned, q1, q2 - 2 * p1 * q1])
+
+
+def product(of: Callable[..., np.ndarray], a: Series, b: Series) -> Series:
+    """A product of two series, linear in both."""
+    return np.stack([of(a[0], b[0]), of(a[1], b[0]) + of(a[0], b[1]),
+                     of(a[2], b[0]) + 2 * of(a[1], b[1]) + of(a[0], b[2])])  # fmt: skip
+
+
+def root(x: Series) -> Series:
+    """Square root of a series (3,)."""
+    r = np.sqrt(x[0])
+    first = x[1] / (2 * r)
+    return np.array([r, first, (x[2] / 2 - first**2) / r])
+
+
+def inverse(x: Series) -> Series:
+    """1/x of a series (3,)."""
+    return np.array([1 / x[0], -x[1] / x[0] ** 2, 2 * x[1] ** 2 / x[0] ** 3 - x[2] / x[0] ** 2])
