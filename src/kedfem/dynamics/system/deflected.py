@@ -10,18 +10,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import component_first
+from kedfem.dynamics.dense import work_on
 from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.system.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body
 from kedfem.dynamics.system.instant import Flat, Instant, Motion
-from kedfem.dynamics.system.internal import Inside, own, rows, turned_rate
+from kedfem.dynamics.system.internal import own, rows, turned_rate
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
 from kedfem.dynamics.system.start import as_coordinates, begun
 from kedfem.errors import SolveError
-from kedfem.links.record import Link
 from kedfem.motion.newton import cross_matrix
 
 SWEEPS = 60
@@ -30,6 +29,8 @@ SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a body that nothin
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
+
+AHEAD = {2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 Spins = Float[np.ndarray, "L 3 3"]
@@ -70,7 +71,7 @@ def static(of: Ready, motion_at: Motion, time: float = 0.0, forces: Rows | None 
     now = Instant(of, motion_at, time)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    u = _balanced(now, none, lambda u, inside: pull, None, None)
+    u = _balanced(now, none, lambda u, f: pull, None, None)
     return begun(now, u, none)
 
 
@@ -84,26 +85,27 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
         return static(of, motion_at, time, forces)
     u, v = _moving(of, motion_at, time)
     pull = as_work(of, forces)
-    return begun(now, _balanced(now, u, lambda u, inside: pull, _spins(now), now.interface(v)), v)
+    return begun(now, _balanced(now, u, lambda u, f: pull, _spins(now), now.interface(v)), v)
 
 
 def as_work(of: Ready, forces: Rows) -> Flat:
     """Nodal forces (n, d) of all bodies on their coordinates."""
-    from kedfem.dynamics.dense import work_on
-
     return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
 def _moving(of: Ready, motion_at: Motion, time: float) -> tuple[Flat, Flat]:
     """Deflection and rate with the nominal motion, from five instants within a step."""
     h = of.c.h / 4
-    instants = [Instant(of, motion_at, time + k * h) for k in range(5)]
+    instants = [Instant(of, motion_at, time)]
+    instants += [Instant(of, motion_at, time + k * h, instants[0]) for k in range(1, 5)]
     u = np.zeros((5, int(of.bodies.at[-1])))
     z1: list[Flat | None] = [None] * 5
-    for _ in range(2 if _feels_rates(of) else 1):
+    for again in range(2 if _feels_rates(of) else 1):
         for k, now in enumerate(instants):
-            guess = u[k] if u[k].any() or not k else u[k - 1]
-            u[k] = _balanced(now, guess, lambda u, inside: np.zeros_like(u), _spins(now), z1[k])
+            guess = u[k]
+            if again == 0 and k:  # as the last has turned, then as all before have gone
+                guess = u[0] + h * _turning(instants[0], u[0]) if k == 1 else AHEAD[k] @ u[:k]
+            u[k] = _balanced(now, guess, lambda u, f: np.zeros_like(u), _spins(now), z1[k])
         v = LATER @ u / h
         z1 = [now.interface(x) for now, x in zip(instants, v, strict=True)]
     return u[0], v[0]
@@ -130,39 +132,38 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
 
     def rate(u: Flat) -> Flat:
         turning = [turned_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
-        return v + as_coordinates(of, turning)
+        return np.asarray(v + as_coordinates(of, turning))
 
-    def inertia(u: Flat, inside: Sequence[Inside]) -> Flat:
+    def inertia(u: Flat, f: Flat) -> Flat:
         z, moving = now.interface(u), rate(u)
         C, e = now.gradients(z), now.coordinates(np.stack([z, now.interface(moving), 0 * z]))
         hard = now.hard(C)
         m = np.where(hard, 0.0, now.forces(e)[:, 0])
         asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
-        f = np.concatenate([x.f for x in inside])
         return -accelerations(now, now.F - f, u, moving, asked, [True] * len(links)).x
 
-    u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v), v)
+    u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v))
     return u, rate(u)
 
 
 def _balanced(
-    now: Instant, u: Flat, more: Callable[[Flat, Sequence[Inside]], Flat], spins: Spins | None,
-    z1: Flat | None, v: Flat | None = None,
+    now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
+    z1: Flat | None,
 ) -> Flat:  # fmt: skip
     """The deflection at which all forces balance, by Newton's method with the stiffness of the mean frames.
 
     Parameters
     ----------
-    more : forces beside applied and internal ones, at a deflection
+    more : forces beside applied and internal ones, at a deflection u with the internal force f
     spins : of the inertia that it has as it turns, if any
     z1 : rates of the interface unknowns
     """
     of, mixing, bodies, settled = now.of, Mixing(), _Held(now, spins), False
     for _ in range(SWEEPS):
-        inside = now.inside(u, _turning(now, u) if v is None else _turning(now, u) + v)
-        r = now.F - np.concatenate([x.f for x in inside]) + more(u, inside) - bodies.inertia(u)
+        f, R = bodies.still.forces(now.motion.R[0], u)
+        r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
-            change = Balance(of, *bodies.held(inside), _asked(now, u, z1)).solved(r).x
+            change = Balance(of, bodies.held(R), R, _asked(now, u, z1)).solved(r).x
         except SolveError:
             break
         if settled:  # once more: what is left of stiff hubs would be large accelerations
@@ -198,28 +199,23 @@ def _asked(now: Instant, u: Flat, z1: Flat | None) -> Asked:
 
 
 class _Held:
-    """Bodies with K0, the inertia of turning in it; those with nominal frames made once."""
+    """Bodies with K0 and the inertia of turning, held at their interface points."""
 
     def __init__(self, now: Instant, spins: Spins | None) -> None:
-        self.now, self.spins, self._made = now, spins, dict[int, HeldBody]()
-        of = now.of
-        self.K = [component_first(part.T, link.K0)
-                  for part, link in zip(of.parts, of.system.model.links, strict=True)]  # fmt: skip
-        self.least = SOFTER * min(
-            _lowest(K, link) for K, link in zip(self.K, of.system.model.links, strict=True)
-        )
+        self.now, self.spins, self._made = now, spins, list[HeldBody]()
+        self.still = now.always.still
+        self.least = SOFTER * now.always.lowest
 
-    def held(self, inside: Sequence[Inside]) -> tuple[list[HeldBody], Float[np.ndarray, "L 3 3"]]:
-        """All bodies in their mean frames, and these."""
-        links = self.now.of.system.model.links
-        for k, (each, link) in enumerate(zip(inside, links, strict=True)):
-            if k not in self._made or link.fit is not None:
-                A = self.K[k] + self.least * np.eye(len(self.K[k]))
-                if self.spins is not None:
-                    S = (each.R.T @ self.spins[k] @ each.R)[: link.d, : link.d]
-                    A = A + np.kron(S, np.eye(link.n))
-                self._made[k] = held_body(A, self.now.of.parts[k].W)
-        return [self._made[k] for k in range(len(links))], np.stack([x.R for x in inside])
+    def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
+        """All bodies, the inertia of those that turn as their frames first were: sweeps take out the rest."""
+        for k in range(len(self._made), len(R)):
+            link = self.now.of.system.model.links[k]
+            A = self.still.K[k] + self.least * np.eye(len(self.still.K[k]))
+            if self.spins is not None:
+                S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
+                A = A + np.kron(S, np.eye(link.n))
+            self._made.append(held_body(A, self.now.of.parts[k].W))
+        return self._made
 
     def inertia(self, u: Flat) -> Flat:
         """M ([α]× + [ω]×²) u."""
@@ -228,8 +224,3 @@ class _Held:
             d = of.system.model.links[k].d
             out[own(of, k)] = (S[:d, :d] @ u[own(of, k)].reshape(d, -1)).ravel()
         return out
-
-
-def _lowest(K: Float[np.ndarray, "N N"], link: Link) -> float:
-    """The lowest eigenvalue of a free body that strains."""
-    return float(np.linalg.eigvalsh(K)[3 if link.planar else 6])

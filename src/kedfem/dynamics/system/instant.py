@@ -1,14 +1,28 @@
 """A system at one time of its nominal motion: all that starts ask of bodies, coordinates and laws there."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+from scipy.sparse.linalg import splu
 
-from kedfem.dynamics.system.internal import Inside, inside, own
+from kedfem.dynamics.system.internal import Inside, Still, inside, own
 from kedfem.dynamics.system.march import Ready, driving
 from kedfem.dynamics.system.rates import coordinates, gradients, places, term_values, travels
-from kedfem.dynamics.system.record import ANGLE, Driven, Held
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    COORDINATE,
+    RATE,
+    TIME,
+    Curve,
+    Driven,
+    Held,
+    Law,
+    Spring,
+    Stop,
+)
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
@@ -19,17 +33,37 @@ Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
 Flat = Float[np.ndarray, " _"]
 
 
-class Instant:
-    """A system at one time of its nominal motion."""
+@dataclass(frozen=True, slots=True)
+class Always:
+    """What does not depend on time.
 
-    def __init__(self, of: Ready, motion_at: Motion, time: float) -> None:
+    number : (k,) where each interface unknown of the system stands in a state
+    closed : z from displacements at all interface points, w = B z as nearly as can be
+    still : internal forces of bodies
+    lowest : eigenvalue of a free body that strains [1/s²]
+    """
+
+    number: Int[np.ndarray, " k"]
+    closed: Callable[[Flat], Flat]
+    still: Still
+    lowest: float
+
+
+class Instant:
+    """A system at one time of its nominal motion.
+
+    Parameters
+    ----------
+    like : another of the same system: what does not depend on time is taken from there
+    """
+
+    def __init__(self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None) -> None:
         motion = motion_at(np.array([time]))
         self.of, self.time, self.motion = of, time, motion
         self.F, self.at = driving(of, motion).F[0], places(motion)
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
-        self.number = renumbered(of)
-        self.B = np.concatenate([joint.B for joint in of.system.model.joints])
+        self.always: Always = always(of) if like is None else like.always
 
     def inside(self, u: Flat, v: Flat) -> list[Inside]:
         """All bodies at a displacement and rate."""
@@ -40,9 +74,7 @@ class Instant:
     def interface(self, x: Flat) -> Flat:
         """Interface unknowns from coordinates whose joints are closed: B z = W x."""
         w = [part.W @ x[own(self.of, k)] for k, part in enumerate(self.of.parts)]
-        if not self.B.shape[1]:
-            return np.zeros(0)
-        return np.asarray(np.linalg.lstsq(self.B, np.concatenate(w), rcond=None)[0])
+        return self.always.closed(np.concatenate(w))
 
     def coordinates(self, z: Float[np.ndarray, "3 k"]) -> Float[np.ndarray, "3 r"]:
         """Coordinates of all constraints less what drives ask, with their rates."""
@@ -61,22 +93,54 @@ class Instant:
 
     def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
-        from kedfem.dynamics.system.constraints_kernel import law
-
-        out = np.zeros((e.shape[1], 3))
-        for n, each in enumerate(self.of.system.constraints):
-            if not isinstance(each.law, Held | Driven):
-                law(self.of.constraints, n, self.time, e[0, n], e[1, n], out[n])
-        out[:, 0] *= -1
-        return out
+        every = enumerate(self.of.system.constraints)
+        return np.array([push(each.law, self.time, e[0, n], e[1, n]) for n, each in every]).reshape(-1, 3)
 
     def hard(self, C: Float[np.ndarray, "r k"]) -> Bool[np.ndarray, " r"]:
         """Which are constraints that say something of z."""
         fixed = [isinstance(each.law, Held | Driven) for each in self.of.system.constraints]
-        return np.array(fixed, bool) & (np.abs(C).max(axis=1, initial=0.0) > NOTHING)
+        return np.asarray(np.array(fixed, bool) & (np.abs(C).max(axis=1, initial=0.0) > NOTHING))
 
 
-def renumbered(of: Ready) -> np.ndarray:
+def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float]:
+    """Force of a law along its coordinate, and how it falls with the coordinate and with its rate."""
+    match law:
+        case Spring(stiffness=k, damping=c, free=free):
+            return -k * (e - free) - c * rate, k, c
+        case Curve(over=over, at=at, value=value):
+            x = {TIME: t, RATE: rate, COORDINATE: e}[over]
+            n = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
+            inside = at[0] < x < at[-1]
+            slope = (value[n] - value[n - 1]) / (at[n] - at[n - 1]) if inside else 0.0
+            falls = {TIME: (0.0, 0.0), RATE: (0.0, -slope), COORDINATE: (-slope, 0.0)}[over]
+            return float(np.interp(x, at, value)), *falls
+        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
+            beyond = max(e - upper, 0.0) + min(e - lower, 0.0)
+            force = -k * beyond - c * rate
+            return (force, k, c) if force * beyond < 0 else (0.0, 0.0, 0.0)
+        case _:
+            return 0.0, 0.0, 0.0
+
+
+def always(of: Ready) -> Always:
+    """What starts of a system ask at every time."""
+    still, links = Still(of), of.system.model.links
+    least = min(
+        np.linalg.eigvalsh(K)[3 if link.planar else 6] for K, link in zip(still.K, links, strict=True)
+    )
+    return Always(renumbered(of), closure(of), still, float(least))
+
+
+def closure(of: Ready) -> Callable[[Flat], Flat]:
+    """z from displacements at all interface points, w = B z as nearly as can be."""
+    B = sp.vstack([sp.csr_array(joint.B) for joint in of.system.model.joints], format="csc")
+    if not B.shape[1]:
+        return lambda w: np.zeros(0)
+    factor = splu(sp.csc_array(B.T @ B))
+    return lambda w: np.asarray(factor.solve(B.T @ w))
+
+
+def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
     """Where each interface unknown of the system stands in a state."""
     number, bodies = np.zeros(of.system.unknowns, int), of.bodies
     for k, joint in enumerate(of.system.model.joints):

@@ -6,12 +6,11 @@
 is put into the matrix, as in `dynamics.interface`. Constraints that repeat others get no force.
 """
 
-from kedfem.compiled import compiled, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.mixing_kernel import factored, partly_factored
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
-from kedfem.dynamics.system.reference import reference
 
 REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknowns satisfy by themselves
 
@@ -76,14 +75,6 @@ def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
         for r in range(q):
             x += RB[at + r * c + m] * reaction[first + r] - SRB[at + r * c + m] * w[first + r]
         right[columns[m]] += x
-
-
-@compiled
-def evaluated_at(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
-    """`evaluated` at trial.z, all ends placed in the nominal motion first."""
-    ends, along, work = reference(ends), reference(driving), reference(work)
-    placed(ends, along.R[t], along.p[t], trial.part, trial.fixed, work.end, work.vectors)
-    evaluated(reference(c), ends, reference(of), along, t, reference(state), reference(trial), work)
 
 
 @inner

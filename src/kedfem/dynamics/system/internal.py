@@ -5,16 +5,60 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import coordinates, rows_of, work_on
+from kedfem.dynamics.dense import component_first, coordinates, rows_of, work_on
 from kedfem.dynamics.frames import Followed, frames_of, seen_from
 from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.state import Nodal
 from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.record import NOMINAL
 from kedfem.links.record import Link, mass_times
 
 Flat = Float[np.ndarray, " N"]
+
+
+class Still:
+    """Internal forces of all bodies where they do not move in their frames: what balances of deflections ask for.
+
+    K : per body its stiffness on coordinates, in its frame
+    """
+
+    def __init__(self, of: Ready) -> None:
+        self.of = of
+        self.K = [
+            component_first(part.T, link.K0)
+            for part, link in zip(of.parts, of.system.model.links, strict=True)
+        ]
+        none = (
+            np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
+        )
+        self._c = of.c._replace(acceleration=none, rate=none, late=0.0, early=0.0, alpha=0.0, beta=0.0)
+        self._state, self._work = empty_state(of.bodies, of.constraints), room(of.bodies)
+        self._trial = empty_trial(of.bodies, of.ends, of.constraints, self._state)
+
+    def forces(self, R: Float[np.ndarray, "M 3 3"], u: Flat) -> tuple[Flat, Float[np.ndarray, "L 3 3"]]:
+        """f (N,), world components, and the bodies' orientations, at a displacement u.
+
+        Parameters
+        ----------
+        R : of all bodies of the linkage in the nominal motion
+        """
+        from kedfem.dynamics.system.still_kernel import still_forces
+
+        bodies, trial = self.of.bodies, self._trial
+        trial.u[:] = u
+        still_forces(self._c, bodies, R, self._state, trial, self._work)
+        f, mean = trial.f.copy(), R[bodies.motion].copy()
+        for k, (K, frame) in enumerate(zip(self.K, bodies.frame, strict=True)):
+            if frame != NOMINAL:
+                mean[k] = trial.Rp[k]
+                continue
+            d = int(bodies.components[k])
+            turn, here = mean[k, :d, :d], own(self.of, k)
+            f[here] = (turn @ (K @ (turn.T @ u[here].reshape(d, -1)).ravel()).reshape(d, -1)).ravel()
+        return f, mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +130,10 @@ def remembered(of: Ready, k: int, found: Inside, state: State) -> None:
     for m in range(3):
         at = 3 * here.start + m * N
         state.damped[at : at + N] = work_on(part, found.damped[m]).ravel()
-    points, b = points_of(link), of.bodies.beam[k]
+    points, b = points_of(link), np.searchsorted(of.bodies.beams.segment, k)
     for e, (point, seen) in enumerate(zip(points, found.frames, strict=False)):
-        state.strain[b, 0, 0, :, e] = point.strains @ seen.g.ravel()
-        state.strain[b, 1, 0, :, e] = point.strains @ seen.g1.ravel()
+        state.strain[0, b, :, e] = point.strains @ seen.g.ravel()
+        state.strain[1, b, :, e] = point.strains @ seen.g1.ravel()
         state.direction[b, :, e], state.turn[b, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
     for seen in found.frames if not points else ():
         state.Q[k, : link.d, : link.d], state.angle[k] = seen.Q, seen.angle

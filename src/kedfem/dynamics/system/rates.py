@@ -108,7 +108,7 @@ def gradients(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[n
             }
             for c in columns:
                 i, j = (
-                    moved(n, c, each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
+                    moved(n, int(c), each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
                     for n in (term.i, term.j)
                 )
                 C[a, c] += term.factor * value(system, term, i, j)[1]

@@ -62,9 +62,9 @@ def begun(now: Instant, u: Flat, v: Flat) -> State:
     for k, each in enumerate(inside):
         remembered(of, k, each, state)
     state.time[0], state.F[:], state.u[:], state.v[:] = now.time, now.F, u, v
-    state.z[:, now.number] = np.stack([z, z1, found.z])
+    state.z[:, now.always.number] = np.stack([z, z1, found.z])
     state.a[:], state.port_force[:] = found.x, found.forces
-    state.e[:], state.multiplier[:], state.bearing[now.number] = e, m, C.T @ m
+    state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
     state.turned[:] = turned(now, z)
     return state
 
