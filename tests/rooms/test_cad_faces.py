@@ -16,6 +16,7 @@ from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.file import mesh_from_file
 from kedfem.mesh.hexahedra import Face, SolidMesh
+from kedfem.mesh.raw import from_meshio
 from kedfem.scene.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, written
 
@@ -141,9 +142,9 @@ class TestGroups:
         sets = {"above": [np.array([], dtype=int), np.array([0])], "both": [np.array([0]), np.array([0, 1])]}
         path = tmp_path / "cube.vtk"
         path.touch()
-        raw = meshio.Mesh(points, cells, cell_sets=sets)
+        raw = from_meshio(meshio.Mesh(points, cells, cell_sets=sets))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(meshio, "read", lambda _: raw)
+            patch.setattr("kedfem.mesh.file._read", lambda *_: raw)
             above, both = mesh_from_file("mesh", path, 2.0).faces
         assert (above.name, above.kind, both.name, both.kind) == ("above", "plane", "both", "other")
         assert_allclose([above.centre, above.direction], [[1, 1, 2], [0, 0, 1]], atol=1e-12)

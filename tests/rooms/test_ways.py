@@ -14,6 +14,7 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.offers import face_kind
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh, ways
+from kedfem.mesh.apart import LONGEST, PART, apart
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import Solid
 from kedfem.scene import LinkScene, Material, link_from, scene_from
@@ -119,28 +120,27 @@ def loud() -> int:
 class TestApart:
     """OpenCASCADE and gmsh break down and hang on some parts: neither may take kedfem with them."""
 
-    def test_what_hangs_is_given_up(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(ways, "LONGEST", 1)
+    def test_what_hangs_is_given_up(self) -> None:
         with pytest.raises(
             MeshError,
             match=r"^rod.step: must be a part .* work on, got none within 1 s of processor time; mend or",
         ):
-            ways.apart("rod.step", busy, 60)
+            apart("rod.step", PART, 1, busy, 60)
 
     def test_what_breaks_down_is_refused_and_the_next_works(self) -> None:
         with pytest.raises(
             MeshError, match=r"^rod.step: must be a part .* work on, got one at which they broke down"
         ):
-            ways.apart("rod.step", os._exit, 3)
-        assert ways.apart("rod.step", math.sqrt, 4.0) == 2.0
+            apart("rod.step", PART, LONGEST, os._exit, 3)
+        assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
     def test_what_it_writes_stays_there(self, capfd: pytest.CaptureFixture[str]) -> None:
-        assert ways.apart("rod.step", loud) == 36
+        assert apart("rod.step", PART, LONGEST, loud) == 36
         assert capfd.readouterr() == ("", "")
 
     def test_errors_come_through(self) -> None:
         with pytest.raises(ValueError, match="math domain"):
-            ways.apart("rod.step", math.sqrt, -1.0)
+            apart("rod.step", PART, LONGEST, math.sqrt, -1.0)
 
 
 class TestStiffness:

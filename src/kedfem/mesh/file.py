@@ -1,10 +1,7 @@
-"""Meshes of hexahedra or tetrahedra from files, through meshio."""
+"""Meshes of tetrahedra and hexahedra from files."""
 
-import contextlib
-import io
-import warnings
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,49 +9,46 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
+from kedfem.mesh.apart import MESH_FILE, READING, apart
 from kedfem.mesh.groups import named_faces
 from kedfem.mesh.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
+from kedfem.mesh.mixed import one_kind
+from kedfem.mesh.raw import CORNERS, ENDINGS, RawMesh, read_mesh
+from kedfem.store import contents, itself, kept
 
-_ACCEPTED = tuple(CELL_TYPES.values())
+#: Nodes of the solid cells that are taken.
+_ACCEPTED = {name: nodes for nodes, name in CELL_TYPES.items()} | {
+    "wedge": 6, "wedge15": 15, "wedge18": 18, "pyramid": 5, "pyramid13": 13, "pyramid14": 14,
+}  # fmt: skip
 
 
 def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
-    """The hexahedra or tetrahedra of a mesh file, nodes that none of them uses left out.
+    """The tetrahedra or hexahedra of a mesh file, nodes that none of them uses left out.
 
     Parameters
     ----------
     where : str
         What the file is for, for messages.
     path : Path
-        Any format that meshio reads. Points and lines in it are passed over; groups of quadrilaterals or triangles on
-        the outside (physical groups of gmsh, sets of cells) become the mesh's `faces`.
+        Of one of ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical groups, sets
+        of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds become tetrahedra
+        of 10 nodes, hexahedra of several orders those of 20.
     scale : float [m]
         Length of the file's unit.
 
     Raises
     ------
     MeshError
-        No such file, not readable, other cells than hexahedra or tetrahedra of one kind, coordinates that are not finite,
-        nodes that do not exist, several pieces that share no nodes.
+        No such file, not readable, other cells, coordinates that are not finite, nodes that do not exist, several
+        pieces that share no nodes.
     """
     raw = _read(where, path)
-    cells = _solid_cells(where, path, raw)
     points = np.asarray(raw.points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"{where}: nodes must have three coordinates, got shape {points.shape} in {path}")
-    if cells.size and (cells.min() < 0 or cells.max() >= len(points)):
-        raise MeshError(
-            f"{where}: elements must use nodes 0 to {len(points) - 1}, got node "
-            f"{cells.min() if cells.min() < 0 else cells.max()} in {path}"
-        )
-    used = np.unique(cells)
-    if not np.isfinite(points[used]).all():
-        bad = used[~np.isfinite(points[used]).all(axis=1)][0]
-        raise MeshError(
-            f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
-        )
-    faces = named_faces(raw, scale * points, cells)
-    mesh = without_spare_nodes(SolidMesh(scale * points, cells, faces))
+        raise MeshError(f"{where}: must have nodes of three coordinates, got shape {points.shape} in {path}")
+    _check_cells(where, path, raw, points)
+    points, cells = _cells(where, path, raw, scale * points)
+    mesh = without_spare_nodes(SolidMesh(points, cells, named_faces(raw, points, cells)))
     pieces = _pieces(mesh)
     if pieces > 1:
         raise MeshError(
@@ -64,44 +58,64 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
     return mesh
 
 
-def _read(where: str, path: Path) -> Any:
-    """What meshio makes of the file; whatever it raises, prints or exits with becomes a MeshError."""
+def _read(where: str, path: Path) -> RawMesh:
+    """What the file holds, read in a process of its own and kept between runs."""
+    wanted = f"must be a mesh file ({', '.join(ENDINGS)})"
     if not path.is_file():
-        raise MeshError(
-            f"{where}: must be a mesh file, got {'a folder' if path.is_dir() else 'nothing'} at {path}"
-        )
-    import meshio
+        raise MeshError(f"{where}: {wanted}, got {'a folder' if path.is_dir() else 'nothing'} at {path}")
+    if path.suffix.lower() not in ENDINGS:
+        raise MeshError(f"{where}: {wanted}, got {path}")
+    key = sha256(path.suffix.lower().encode() + contents([path])).hexdigest()
 
-    spoken = io.StringIO()
-    try:
-        with (
-            warnings.catch_warnings(),
-            contextlib.redirect_stdout(spoken),
-            contextlib.redirect_stderr(spoken),
-        ):
-            warnings.simplefilter("ignore")
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:  # each of its readers fails in its own way
-        reason = " ".join((str(error) if not isinstance(error, SystemExit) else spoken.getvalue()).split())
-        raise MeshError(
-            f"{where}: must be a mesh file that meshio can read, got {path}: {reason or type(error).__name__}"
-        ) from error
-
-
-def _solid_cells(where: str, path: Path, raw: Any) -> Int[np.ndarray, "e k"]:
-    """The cells of the one kind of hexahedra or tetrahedra in a file."""
-    found: dict[str, int] = {}
-    for block in raw.cells:
-        if block.dim == 3:
-            found[block.type] = found.get(block.type, 0) + len(block.data)
-    if len(found) == 1 and (kind := next(iter(found))) in _ACCEPTED and found[kind]:
+    def read() -> RawMesh:
         try:
-            return np.concatenate([block.data for block in raw.cells if block.type == kind]).astype(np.int64)
-        except (OverflowError, ValueError, TypeError):
-            wanted = "must number its nodes with whole numbers of at most 18 digits"
-            raise MeshError(f"{where}: {wanted}, got others in {path}") from None
-    got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
-    raise MeshError(f"{where}: must hold elements of one kind ({', '.join(_ACCEPTED)}), got {got} in {path}")
+            return apart(f"{where}: {path}", MESH_FILE, READING, read_mesh, path)
+        except MeshError as error:
+            if str(error).startswith(where):
+                raise
+            raise MeshError(f"{where}: must be a mesh file that can be read, got {path}: {error}") from None
+
+    raw: RawMesh = kept("mesh file", key, read, itself, itself)
+    return raw
+
+
+def _check_cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> None:
+    """Refuse what is no solid element, nodes that are not there, coordinates that are no numbers."""
+    found = {kind: len(cells) for kind, cells in raw.cells.items() if len(cells)} | raw.others
+    wrong = [kind for kind in found if kind not in _ACCEPTED or raw.cells[kind].shape[1] != _ACCEPTED[kind]]
+    if wrong or not found:
+        got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
+        raise MeshError(
+            f"{where}: must hold tetrahedra, hexahedra, wedges or pyramids of order 1 or 2, got {got} in {path}"
+        )
+    for cells in raw.cells.values():
+        if cells.size and (cells.min() < 0 or cells.max() >= len(points)):
+            node = cells.min() if cells.min() < 0 else cells.max()
+            raise MeshError(
+                f"{where}: elements must use nodes 0 to {len(points) - 1}, got node {node} in {path}"
+            )
+        used = np.unique(cells)
+        if not np.isfinite(points[used]).all():
+            bad = used[~np.isfinite(points[used]).all(axis=1)][0]
+            raise MeshError(
+                f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
+            )
+
+
+def _cells(
+    where: str, path: Path, raw: RawMesh, points: np.ndarray
+) -> tuple[np.ndarray, Int[np.ndarray, "e k"]]:
+    """The cells, all of one kind, and the nodes."""
+    blocks = {kind: cells for kind, cells in raw.cells.items() if len(cells)}
+    if len(blocks) == 1 and (kind := next(iter(blocks))) in CELL_TYPES.values():
+        return points, blocks[kind]
+    by_corners: dict[int, list[np.ndarray]] = {}
+    for kind, cells in blocks.items():
+        by_corners.setdefault(CORNERS[kind.rstrip("0123456789")], []).append(cells)
+    try:
+        return one_kind(points, by_corners)
+    except MeshError as error:
+        raise MeshError(f"{where}: {error}, in {path}") from None
 
 
 def _pieces(mesh: SolidMesh) -> int:

@@ -1,7 +1,6 @@
-"""Named groups of faces in mesh files: what meshio reads as physical groups or sets of sides."""
+"""Named sets of sides and of nodes in mesh files, as faces of a mesh."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -9,38 +8,39 @@ from jaxtyping import Float, Int
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
 from kedfem.mesh.hexahedra import Face
+from kedfem.mesh.mixed import triangles
+from kedfem.mesh.raw import RawMesh
 
 _ACCURACY = (
     2e-3  # of nodes, in sizes of the group: numbers in a file may be few, a circle of chords is not round
 )
 _SKEW = 0.05  # of the sides' normals: a sine
-_PHYSICAL = "gmsh:physical"
 
 
 def named_faces(
-    raw: Any, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
+    raw: RawMesh, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
 ) -> tuple[Face, ...]:
-    """The groups of quadrilaterals or triangles in a mesh file that lie on the outside of its elements.
+    """The sets of sides and nodes in a mesh file that lie on the outside of its elements, in the order of their names.
 
     Parameters
     ----------
-    raw : meshio.Mesh
+    raw : RawMesh
         As it was read.
     points : (n, 3) [m]
-        All nodes of the file.
+        All nodes, the file's first.
     cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10)
-        The elements, with the file's numbers of nodes.
+        The elements; their corners have the file's numbers.
 
     Returns
     -------
     tuple of Face
-        With the file's numbers of nodes; groups without a side on the outside are left out.
+        Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it.
     """
     sides = boundary_sides(cells)
-    corners = side_corners(sides.shape[1])
-    keys = {tuple(each): i for i, each in enumerate(np.sort(sides[:, :corners], axis=1).tolist())}
+    corners = np.sort(sides[:, : side_corners(sides.shape[1])], axis=1)
+    keys = {tuple(each): i for i, each in enumerate(corners.tolist())}
     faces = []
-    for name, found in _groups(raw, corners):
+    for name, found in _sets(raw, corners):
         on = {keys.get(tuple(each), -1) for each in np.sort(found, axis=1).tolist()} - {-1}
         if on:
             faces.append(group_face(name, points, sides[sorted(on)]))
@@ -74,21 +74,14 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
     )
 
 
-def _groups(raw: Any, count: int) -> Iterator[tuple[str, Int[np.ndarray, "q c"]]]:
-    """Each group's name and the corners of its sides of so many, in the order of the names."""
-    found: dict[str, list[Int[np.ndarray, "q c"]]] = {}
-    names = {int(number): name for name, (number, dim) in raw.field_data.items() if dim == 2}
-    for i, block in enumerate(raw.cells):
-        if not block.type.startswith("quad" if count == 4 else "triangle"):
-            continue
-        corners = np.asarray(block.data)[:, :count].astype(np.int64)
-        if _PHYSICAL in raw.cell_data:
-            numbers = np.asarray(raw.cell_data[_PHYSICAL][i]).astype(int)
-            for number in np.unique(numbers[numbers > 0]).tolist():
-                name = names.get(number, f"group {number}")
-                found.setdefault(name, []).append(corners[numbers == number])
-        for name, members in raw.cell_sets.items():
-            on = members[i] if i < len(members) else None
-            if on is not None and len(on) and not name.startswith("gmsh:") and name not in names.values():
-                found.setdefault(name, []).append(corners[np.asarray(on).astype(np.int64)])
-    return ((name, np.concatenate(found[name])) for name in sorted(found))
+def _sets(raw: RawMesh, corners: Int[np.ndarray, "f c"]) -> Iterator[tuple[str, Int[np.ndarray, "q c"]]]:
+    """Each set's name and corners of its sides, divided into triangles where the elements' are."""
+    count = corners.shape[1]
+    for name in sorted(raw.sides.keys() | raw.nodes.keys()):
+        if name in raw.sides:
+            each = [triangles(x) if (count, x.shape[1]) == (3, 4) else x for x in raw.sides[name]]
+            fitting = [x for x in each if x.shape[1] == count]
+            if fitting:
+                yield name, np.concatenate(fitting)
+        else:
+            yield name, corners[np.isin(corners, raw.nodes[name]).all(axis=1)]

@@ -5,18 +5,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from time import process_time
 from types import ModuleType
-from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
+from kedfem.mesh.apart import LONGEST, PART, apart
 from kedfem.mesh.blends import points_in_file, swept_without_blends
 from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.faces import with_faces
-from kedfem.mesh.cad.file import silent
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
@@ -24,7 +22,6 @@ from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
 from kedfem.mesh.tetrahedra import FORMS
-from kedfem.processes import end_with_parent
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
@@ -34,10 +31,7 @@ FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some m
 MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
 NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
 TRIES = 6  # meshes made in search of a number of unknowns
-LONGEST = 180  # seconds of processor time after which a part is given up
-PATIENCE = 3600  # seconds after which it is given up though it takes no processor time
 
-T = TypeVar("T")
 Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 #: Places of the scene [m] and names of faces at which a part keeps its blends.
 KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
@@ -75,65 +69,11 @@ def cad_mesh(
     mesh: SolidMesh = kept(
         "mesh",
         key,
-        lambda: apart(keys.file, made_mesh, keys, name, link, shape, file, kept_whole),
+        lambda: apart(keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole),
         itself,
         itself,
     )
     return mesh
-
-
-def apart(where: str, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns in a process of its own: gmsh and OpenCASCADE break down or hang on some parts.
-
-    Nothing that they write reaches the terminal.
-
-    Raises
-    ------
-    MeshError
-        The process broke down, or took more than LONGEST seconds of processor time; or what the function raises.
-    """
-    from joblib.externals.loky import TimeoutError as LateError
-    from joblib.externals.loky import get_reusable_executor
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    reason = ""
-    for _ in range(2):  # a process that has served other parts may break down where a new one does not
-        executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
-        try:
-            found: T = executor.submit(limited, LONGEST, work, *given).result(timeout=PATIENCE)
-        except LateError:
-            executor.shutdown(kill_workers=True)
-            reason = f"got none within {PATIENCE} s"
-            break
-        except TerminatedWorkerError as error:
-            reason = "got one at which they broke down"
-            if "SIGXCPU" in str(error):
-                reason = f"got none within {LONGEST} s of processor time"
-                break
-        else:
-            return found
-    raise MeshError(
-        f"{where}: must be a part that gmsh and OpenCASCADE can work on, {reason}; "
-        "mend or simplify it in CAD (fillets that are thinner than an element first), or take another mesh.size"
-    )
-
-
-def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns, in silence; the process is ended if that takes more processor time than so much."""
-    end_with_parent()
-    try:
-        import resource
-    except ImportError:  # a system without such limits
-        with silent():
-            return work(*given)
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
-    resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(process_time() + seconds)), hard))
-    try:
-        with silent():
-            return work(*given)
-    finally:
-        resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
 
 
 def made_mesh(

@@ -172,11 +172,12 @@ class Polyline(Record):
 
 
 class MeshFile(Record):
-    """A mesh of hexahedra (8, 20 or 27 nodes) or tetrahedra (4, 10) in a file that meshio reads; solid."""
+    """A mesh of hexahedra or tetrahedra of order 1 or 2, or of several kinds, in a file of another program; solid."""
 
     kind: Literal["mesh"] = "mesh"
     file: FileName
-    """the mesh file, relative to the scene file"""
+    """the mesh file, relative to the scene file: .msh, .unv, .bdf, .nas, .med, .mesh, .inp, .vtu, .vtk, .xdmf, .xmf,
+    .e or .exo"""
     scale: Annotated[float, Quantity("1", above=0.0)] = 1.0
     """metres per unit of the file: 0.001 for a file in millimetres"""
     origin: Point = (0.0, 0.0, 0.0)

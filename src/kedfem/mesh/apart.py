@@ -1,0 +1,82 @@
+"""Work of libraries in a process of its own: what they write stays there, where they break down or hang is an error."""
+
+from collections.abc import Callable
+from time import process_time
+from typing import Any, TypeVar
+
+import numpy as np
+
+from kedfem.errors import MeshError
+from kedfem.mesh.cad.file import silent
+from kedfem.processes import end_with_parent
+
+LONGEST = 180  # seconds of processor time after which a part is given up
+READING = 60  # seconds of processor time after which a mesh file is given up
+PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
+PART = (
+    "must be a part that gmsh and OpenCASCADE can work on",
+    "mend or simplify it in CAD (fillets that are thinner than an element first), or take another mesh.size",
+)
+MESH_FILE = (
+    "must be a mesh file that can be read",
+    "it may be damaged: write it again, or in another format",
+)
+
+T = TypeVar("T")
+
+
+def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
+    """What a function returns in a process of its own: libraries break down or hang on some files.
+
+    Nothing that they write reaches the terminal.
+
+    Parameters
+    ----------
+    words : what is wanted, and what to do where it is not so
+    seconds : of processor time that it may take
+
+    Raises
+    ------
+    MeshError
+        The process broke down, or took longer; or what the function raises.
+    """
+    from joblib.externals.loky import TimeoutError as LateError
+    from joblib.externals.loky import get_reusable_executor
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    reason = ""
+    for _ in range(2):  # a process that has served others may break down where a new one does not
+        executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
+        try:
+            found: T = executor.submit(limited, seconds, work, *given).result(timeout=PATIENCE)
+        except LateError:
+            executor.shutdown(kill_workers=True)
+            reason = f"got none within {PATIENCE} s"
+            break
+        except TerminatedWorkerError as error:
+            reason = "got one at which they broke down"
+            if "SIGXCPU" in str(error):
+                reason = f"got none within {seconds:g} s of processor time"
+                break
+        else:
+            return found
+    wanted, advice = words
+    raise MeshError(f"{where}: {wanted}, {reason}; {advice}")
+
+
+def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
+    """What a function returns, in silence; the process is ended if that takes more processor time than so much."""
+    end_with_parent()
+    try:
+        import resource
+    except ImportError:  # a system without such limits
+        with silent():
+            return work(*given)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(process_time() + seconds)), hard))
+    try:
+        with silent():
+            return work(*given)
+    finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))

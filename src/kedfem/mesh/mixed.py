@@ -1,0 +1,159 @@
+"""Meshes of several kinds of cells as one kind: tetrahedra of 10 nodes, or hexahedra of 20 where all are hexahedra.
+
+Hexahedra, wedges and pyramids are divided from their corner of least number, their four-sided sides likewise, so that
+neighbours agree: J. Dompierre, P. Labbé, M.-G. Vallet, R. Camarero, How to subdivide pyramids, prisms and hexahedra
+into tetrahedra, Proc. 8th Int. Meshing Roundtable (1999) 195-204.
+"""
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import MeshError
+from kedfem.mesh.hexahedra import HEX20, HEX27, node_numbers, shape_functions
+from kedfem.mesh.simplices import EDGES
+
+#: Sides of each kind by the number of its corners, in VTK's order.
+_SIDES: dict[int, tuple[tuple[int, ...], ...]] = {
+    4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+    5: ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    6: ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
+#: Edges of each kind in the order of the nodes in their middles.
+EDGES_OF: dict[int, tuple[tuple[int, int], ...]] = {
+    4: tuple((int(i), int(j)) for i, j in EDGES),
+    5: ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
+    6: ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    8: ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
+}
+_DIAGONALS = ((0, 6), (1, 7), (2, 4), (3, 5))  # of a hexahedron, through its centre
+_CENTRE = shape_functions(HEX20, np.zeros((1, 3)))[0]
+
+Cells = Int[np.ndarray, "e k"]
+
+
+def one_kind(
+    points: Float[np.ndarray, "n 3"], blocks: Mapping[int, list[Cells]]
+) -> tuple[Float[np.ndarray, "m 3"], Int[np.ndarray, "q k"]]:
+    """All cells as hexahedra of 20 nodes, or as tetrahedra of 10 if not all are hexahedra.
+
+    Parameters
+    ----------
+    points : (n, 3) [m]
+    blocks : cells in VTK's order by their number of corners
+
+    Returns
+    -------
+    (m, 3) and (e, 20) or (e, 10)
+        The same nodes and new ones after them; an edge's middle is that of its quadratic elements where there are any.
+
+    Raises
+    ------
+    MeshError
+        A side of a hexahedron, wedge or pyramid lies on two triangles of tetrahedra that divide it the other way.
+    """
+    if set(blocks) == {8}:
+        corners = np.concatenate([cells[:, :8] for cells in blocks[8]])
+        pairs, middles = _middles(points, blocks)
+        edges = np.array(EDGES_OF[8])
+        return _with_middles(points, corners, corners[:, edges], pairs, middles)
+    fours = np.concatenate(
+        [_tetrahedra(cells[:, :count], count) for count, each in blocks.items() for cells in each]
+    )
+    _check_fit(fours, blocks)
+    pairs, middles = _middles(points, blocks)
+    return _with_middles(points, fours, fours[:, EDGES], pairs, middles)
+
+
+def triangles(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "t 3"]:
+    """Two triangles of each four-sided side, from its corner of least number."""
+    at = (quads.argmin(axis=1)[:, None] + np.arange(4)) % 4
+    turned = np.take_along_axis(quads, at, axis=1)
+    return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+def _tetrahedra(corners: Cells, count: int) -> Int[np.ndarray, "t 4"]:
+    """From the corner of least number of each cell to the triangles of the sides that it is not on."""
+    if count == 4:
+        return corners
+    first = corners.argmin(axis=1)
+    out = []
+    for side in _SIDES[count]:
+        opposite = corners[~np.isin(first, side)]
+        flat = opposite[:, side]
+        three = flat if len(side) == 3 else triangles(flat)
+        apex = np.tile(opposite.min(axis=1), len(three) // max(len(opposite), 1))
+        out.append(np.column_stack([three[:, ::-1], apex]))  # sides are listed as seen from outside
+    return np.concatenate(out)
+
+
+def _middles(
+    points: Float[np.ndarray, "n 3"], blocks: Mapping[int, list[Cells]]
+) -> tuple[Int[np.ndarray, "p 2"], Float[np.ndarray, "p 3"]]:
+    """Pairs of corners that an edge, or a diagonal, is between, and the place of its middle: of quadratic cells first."""
+    pairs, places = [], []
+    each = [(count, cells) for count, several in blocks.items() for cells in several]
+    for count, cells in sorted(each, key=lambda one: one[1].shape[1] == one[0]):
+        edges, corners = EDGES_OF[count], cells[:, :count]
+        X = points[corners]
+        M = X[:, np.array(edges)].mean(axis=2)
+        if cells.shape[1] > count:
+            M = points[cells[:, count : count + len(edges)]]
+        pairs += [corners[:, [i, j]] for i, j in edges]
+        places += list(np.swapaxes(M, 0, 1))
+        for side in (each for each in _SIDES[count] if len(each) == 4):
+            round_ = [
+                edges.index((i, j) if (i, j) in edges else (j, i)) for i, j in pairwise([*side, side[0]])
+            ]
+            centre = M[:, round_].sum(axis=1) / 2 - X[:, side].sum(axis=1) / 4  # of a serendipity side
+            if cells.shape[1] == len(HEX27):
+                middle = node_numbers(HEX27, HEX27[list(side)].mean(axis=0, keepdims=True))[0]
+                centre = points[cells[:, middle]]
+            pairs += [corners[:, [side[0], side[2]]], corners[:, [side[1], side[3]]]]
+            places += [centre, centre]
+        if count == 8:
+            body = np.einsum("a,eak->ek", _CENTRE, np.concatenate([X, M], axis=1))
+            if cells.shape[1] == len(HEX27):
+                body = points[cells[:, 26]]
+            pairs += [corners[:, list(ends)] for ends in _DIAGONALS]
+            places += [body] * len(_DIAGONALS)
+    known, first = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0, return_index=True)
+    return known, np.concatenate(places)[first]
+
+
+def _with_middles(
+    points: Float[np.ndarray, "n 3"],
+    corners: Cells,
+    ends: Int[np.ndarray, "e j 2"],
+    pairs: Int[np.ndarray, "p 2"],
+    middles: Float[np.ndarray, "p 3"],
+) -> tuple[Float[np.ndarray, "m 3"], Int[np.ndarray, "e q"]]:
+    """Cells with a node in the middle of each edge, all middles after the other nodes."""
+    n = len(points)
+    keys = pairs[:, 0] * n + pairs[:, 1]
+    wanted = np.sort(ends, axis=2)
+    number = np.searchsorted(keys, wanted[..., 0] * n + wanted[..., 1])
+    return np.concatenate([points, middles]), np.column_stack([corners, n + number])
+
+
+def _check_fit(fours: Int[np.ndarray, "t 4"], blocks: Mapping[int, list[Cells]]) -> None:
+    """Refuse sides that the tetrahedra beside them divide the other way: the parts would not hold together there."""
+    sides = np.sort(np.concatenate([fours[:, list(side)] for side in _SIDES[4]]), axis=1)
+    alone, often = np.unique(sides, axis=0, return_counts=True)
+    outer = {tuple(side) for side in alone[often == 1].tolist()}
+    wrong = 0
+    for count, several in blocks.items():
+        for side in (side for side in _SIDES[count] if len(side) == 4):
+            quads = np.concatenate([cells[:, list(side)] for cells in several])
+            at = (quads.argmin(axis=1)[:, None] + np.arange(4)) % 4
+            turned = np.take_along_axis(quads, at, axis=1)
+            other = np.sort(turned[:, [0, 1, 3]], axis=1).tolist()
+            wrong += sum(tuple(three) in outer for three in other)
+    if wrong:
+        raise MeshError(
+            f"hexahedra, wedges and pyramids must share whole sides with their neighbours, got {wrong} four-sided sides "
+            "that tetrahedra beside them divide the other way; put pyramids between them"
+        )
