@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of
+from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of, meaningless
 from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
 from kedfem.accuracy.histories import Histories
 from kedfem.accuracy.locking import Locking
@@ -49,7 +49,7 @@ from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
 from kedfem.results.undetermined import undetermined, undetermined_warning
-from kedfem.results.writer import add_peaks, drive_channel
+from kedfem.results.writer import add_peaks, drive_channel, mark_doubtful
 from kedfem.scene import Scene, time_grid, turn_steps
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
@@ -136,6 +136,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     notes = attributes(found) | step.notes
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
+    if why := meaningless(found, account.balance, efforts.unworked, bool(scene.analysis.stiffening)):
+        mark_doubtful(folder / "results.h5", why)
+        results = replace(results, status="doubtful", reason=why)
     peak = highest(results.peaks)
     _write_envelope(folder / ENVELOPE, envelope, doubts)
     _write_worst(folder / WORST, ready, recoveries, envelope)

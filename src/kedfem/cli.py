@@ -12,7 +12,7 @@ from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted
 from kedfem.terminal import terminal
 
-USER_ERROR, DEFECT, INTERRUPTED = 2, 3, 130
+USER_ERROR, DEFECT, DOUBTFUL, INTERRUPTED = 2, 3, 4, 130
 KINDS = ("four-bar", "slider-crank", "single-arm")
 
 app = typer.Typer(
@@ -71,6 +71,10 @@ def run(
         out.print(size_line(done.sizes), markup=False, soft_wrap=True)
     _show(run_tables(loaded, done), done.warnings)
     _say_where(done.folder)
+    if done.results.status == "doubtful":
+        said = f"doubtful: {done.results.reason}; these results mean nothing"
+        err.print(said, style="red", markup=False, soft_wrap=True)
+        raise typer.Exit(DOUBTFUL)
 
 
 @app.command()

@@ -15,7 +15,7 @@ import pytest
 
 import kedfem
 from kedfem.analysis import analyse
-from kedfem.cli import DEFECT, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
 from kedfem.mesh.file import mesh_from_file
 from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Results, read_results
@@ -24,6 +24,7 @@ from kedfem.scene import read_scene
 SOURCE = Path(kedfem.__file__).parents[1]
 ARM = """
 title = "Arm [bold]nose[/nose]"
+gravity = [0, -9.81]
 [points]
 A = [0, 0]
 B = [0.6, 0]
@@ -46,6 +47,7 @@ frequencies = [5, 200]
 turns = TURNS
 steps_per_turn = 360
 accuracy = "quick"
+initial = "quasi-static"
 [output]
 plots = false
 picture = false
@@ -390,6 +392,21 @@ def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
     arm.write_text(arm.read_text("utf-8").replace("frames_per_turn = 36", "frames_per_turn = 1"), "utf-8")
     analyse(read_scene(arm))
     assert set(seen) == {(True, True)}
+
+
+def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, arm: Path) -> None:
+    """A sudden start, and eight steps a turn that do not resolve what it excites."""
+    text = arm.read_text("utf-8").replace("= 360", "= 8").replace('initial = "quasi-static"', "")
+    text = text.replace("gravity = [0, -9.81]", "")
+    arm.write_text(text, encoding="utf-8")
+    said = run_kedfem("run", arm)
+    assert said.code == DOUBTFUL
+    last = said.err.partition("doubtful: ")[2].replace("\n", " ")
+    assert last.startswith("estimated error of displacement over 100 %; ")
+    assert "energy unaccounted for" in last
+    results = read_results(arm.with_name("arm-results") / "results.h5")
+    assert (results.status, len(results.time)) == ("doubtful", 9)
+    assert results.reason in last
 
 
 def test_a_killed_run_is_named_by_the_next_one(run_kedfem: Command, arm: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from kedfem.errors import OutputError
+from kedfem.errors import OutputError, SolveError
 from kedfem.results import (
     Channel,
     Peak,
@@ -96,6 +96,29 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
     read = read_results(tmp_path / "results.h5")
     with pytest.raises(ValueError, match="read-only"):
         read.channels[FORCE.name][1][0, 0] = 1.0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("row", [0, 3])
+def test_a_value_that_is_not_finite_stops_the_run_with_its_channel(
+    tmp_path: Path, value: float, row: int
+) -> None:
+    path = tmp_path / "results.h5"
+    time, angle, values = rows(4, 5)
+    values[FORCE.name][row:, 1] = value
+    with pytest.raises(
+        SolveError, match=f"joints/B/force: must be finite, got {value:g} at t = {time[row]:g} s"
+    ):
+        stopped(path, time, angle, values)
+    read = read_results(path)
+    assert (read.status, len(read.time)) == ("interrupted", 4 + row)
+    assert all(np.isfinite(values).all() for _, values in read.channels.values())
+
+
+def stopped(path: Path, time: np.ndarray, angle: np.ndarray, values: dict[str, np.ndarray]) -> None:
+    with writer(path) as results:
+        results.append(*rows(0, 4))
+        results.append(time, angle, values)
 
 
 def test_changed_bytes_are_noticed(tmp_path: Path) -> None:

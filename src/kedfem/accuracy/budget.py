@@ -4,11 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from kedfem.results import Channel
+from kedfem.results.audit import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "reduction", "frames")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
+MEANINGLESS = 1.0  # an error as large as the result
+UNACCOUNTED = 0.5  # of energy or momentum
 LEAST = 0.005  # what no run warns of
 
 
@@ -111,6 +114,25 @@ def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...
     said = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
     remedy = share.remedy or REMEDIES[share.source]
     return (f"estimated error: {said}; most of it from the {share.source}: {remedy}",)
+
+
+def meaningless(budget: Budget, balance: Balance, unworked: float, stiffened: bool = False) -> str:
+    """Why a run means nothing by its own account, in words; empty for one that may.
+
+    Parameters
+    ----------
+    unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
+    stiffened : the run has geometric stiffening, whose work is in the energy's residual too
+    """
+    worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
+    left = {"momentum": balance.linear, "angular momentum": balance.angular, "the drive's work": unworked}
+    if not stiffened:
+        left["energy"] = balance.energy
+    said = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
+    said += [
+        f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
+    ]
+    return "; ".join(said)
 
 
 REMEDIES = {

@@ -172,7 +172,7 @@ def _title(text: str, channel: Channel | None, results: Results) -> str:
     if channel and channel.frame:
         below.append(f"{channel.frame} axes")
     if results.status != "complete":
-        below.append(f"not a whole run: {results.status}")
+        below.append("doubtful" if results.status == "doubtful" else f"not a whole run: {results.status}")
     title = "\n".join(textwrap.wrap(text[:1].upper() + text[1:], 95))
     return _plain("\n".join([title, "  ·  ".join(below)] if below else [title]))
 

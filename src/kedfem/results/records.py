@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-Status = Literal["running", "complete", "interrupted", "abandoned"]
+Status = Literal["running", "complete", "doubtful", "interrupted", "abandoned"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +85,14 @@ class Results:
     channels
         Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
     status
-        ``complete``; ``interrupted``; ``running``: still being written; ``abandoned``: its process was killed.
+        ``complete``; ``doubtful``: whole, but meaningless by its own estimates; ``interrupted``; ``running``: still being
+        written; ``abandoned``: its process was killed.
     scene_json, scene_toml
         The scene that was analysed; the TOML text is None for a scene made in Python.
     notes
         What the run said about itself.
     reason
-        Why the run was interrupted, else empty.
+        Why the run was interrupted or is doubtful, else empty.
     version
         The kedfem that wrote the file.
     peaks

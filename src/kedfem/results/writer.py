@@ -1,6 +1,7 @@
 """Writing a results file while the analysis runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.errors import OutputError
+from kedfem.errors import OutputError, SolveError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
 from kedfem.results.layout import CHUNK_ROWS, FORMAT, PEAKS, new_rows, opened, seal
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
@@ -129,10 +130,17 @@ class ResultsWriter:
         ------
         OutputError
             The disk refused.
+        SolveError
+            A value is not finite: the rows before it are written.
         ValueError
             A channel is missing, unknown or of the wrong shape.
         """
         self._check(len(time), values)
+        if (fault := _not_finite(time, values)) is not None:
+            row, said = fault
+            if row:
+                self.append(time[:row], angle[:row], {name: block[:row] for name, block in values.items()})
+            raise SolveError(said)
         try:
             require_space(self.path.parent, self._block_space(len(time)))
             for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
@@ -244,6 +252,35 @@ class ResultsWriter:
         return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")
 
 
+def _not_finite(
+    time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]
+) -> tuple[int, str] | None:
+    """The first row that holds something that is not finite, and what to say of it."""
+    first = len(time)
+    said = ""
+    for name, block in values.items():
+        bad = ~np.isfinite(block).all(axis=1)
+        if bad.any() and (row := int(np.argmax(bad))) < first:
+            got = block[row][~np.isfinite(block[row])][0]
+            first, said = (
+                row,
+                f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step",
+            )
+    return (first, said) if said else None
+
+
+def mark_doubtful(path: Path, why: str) -> None:
+    """Say of a file that is whole that it means nothing, and why.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        file.attrs.update(status="doubtful", reason=why)
+
+
 def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
     """Store the highest stress of each link, ``peaks/LINK``, in a file that is whole.
 
@@ -252,13 +289,9 @@ def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
     OutputError
         The file cannot be written.
     """
-    try:
-        with opened(path, "r+") as file:
-            for name, peak in peaks.items():
-                _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
-            seal(file)
-    except (OSError, RuntimeError) as error:
-        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+    with _changed(path) as file:
+        for name, peak in peaks.items():
+            _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
 
 
 def _lay_peak(group: Any, peak: Peak) -> None:
@@ -280,9 +313,16 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
     OutputError
         The file cannot be written.
     """
+    with _changed(path) as file:
+        file["notes"].attrs.update(notes)
+
+
+@contextmanager
+def _changed(path: Path) -> Iterator[Any]:
+    """A file that is whole, opened to change its texts."""
     try:
         with opened(path, "r+") as file:
-            file["notes"].attrs.update(notes)
+            yield file
             seal(file)
     except (OSError, RuntimeError) as error:
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
