@@ -17,6 +17,7 @@ from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
+from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
@@ -125,7 +126,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
-    watched = _Watched(recorded, untold, efforts, recoveries, Locking(ready.model))
+    watched = _Watched(recorded, untold, efforts, recoveries, Locking(ready.model), SingularPasses(ready))
     envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
@@ -156,6 +157,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *undetermined_warning(untold),
         *peak_warning(peak),
         *watched.locking.warnings(),
+        *watched.passes.warnings(),
         *eased_warning(solvers),
         *coarse_steps(scene),
         *warnings,
@@ -280,6 +282,7 @@ class _Watched:
     efforts: CrossChecks
     recoveries: list[StressRecovery]
     locking: Locking
+    passes: SingularPasses
 
 
 def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
@@ -311,6 +314,7 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
                 watched.locking.add(block)
+                watched.passes.add(block)
                 seen.add(block)
                 errors.add(block, values)
                 for k in range(len(block)):
