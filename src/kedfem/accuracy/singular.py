@@ -92,6 +92,6 @@ class SingularPasses:
             return ()
         return (
             f"at {self.when:.4g} s the mechanism comes near a singular position, from where it could move in more ways "
-            "than one: rigid links, and links that hardly bend, get a kick there whose size depends on the step, and little "
+            "than one: rigid links, and links that hardly bend, get a kick there whose size depends on the step: little "
             "decides how they move on; compare with a shorter step, or take damping, or links that bend more",
         )
