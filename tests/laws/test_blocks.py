@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.accuracy.prepared import moving
+from kedfem.dynamics.inertias import inertias_of_links
 from kedfem.errors import MotionError
+from kedfem.kinematics import rigid_links
 from kedfem.motion import linkage as linkages
 from kedfem.motion.linkage import linkage
 from kedfem.motion.newton import BlockFactor, Factor
 from kedfem.motion.path import path
+from kedfem.motion.rigid import rigid_motion
 from kedfem.motion.values import features
-from kedfem.scene import Scene
+from kedfem.results.rigid import rigid_forces
+from kedfem.scene import Scene, path_parameter
 from tests.linkages import four_bar, linkage_scene, motion_at, slider_crank
 from tests.spatial_linkages import rssr
 
@@ -113,3 +118,23 @@ def test_dead_points_are_found_and_told_the_same(name: str, whole_up_to: Any) ->
 
     one, other = (whole_up_to(many, refusal) for many in (0, 1000))
     assert one == other
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_joints_of_rigid_links_bear_the_same(name: str, whole_up_to: Any) -> None:
+    """Forces, moments and efforts with the least multipliers; and which of them statics tell."""
+    scene = SCENES[name]()
+
+    def borne() -> dict[str, np.ndarray]:
+        linked, along = moving(scene)
+        forces = rigid_forces(scene, linked, inertias_of_links(scene, linked, rigid_links(scene)), along)
+        return forces.rows(rigid_motion(linked, along, T, path_parameter(scene, T)))
+
+    one, other = (whole_up_to(many, borne) for many in (0, 1000))
+    assert one.keys() == other.keys()
+    sizes: dict[str, float] = {}
+    for key, wanted in other.items():
+        unit = key.rsplit("_", 1)[-1]
+        sizes[unit] = max(sizes.get(unit, 0.0), float(np.abs(wanted).max()))
+    for key, wanted in other.items():
+        assert_allclose(one[key], wanted, atol=1e-9 * sizes[key.rsplit("_", 1)[-1]])

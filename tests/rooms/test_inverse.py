@@ -22,7 +22,7 @@ from kedfem.dynamics.transient import motions, steps_of, transient
 from kedfem.links.build import bare_links
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.reactions import Reactions, reactions
+from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
 from kedfem.results.rigid import RigidForces, rigid_forces, told
@@ -278,6 +278,7 @@ def test_forces_of_all_joints_on_a_link_balance_its_inertia_and_loads() -> None:
     _, motion, masses, forces = forces_of(spatial(), t)
     force, moment = acting(masses, motion)
     found, scene, linked = reactions(forces.linkage, motion), forces.scene, forces.linkage
+    assert isinstance(found, Reactions)
     wrench = np.concatenate([force, moment], axis=2)[:, 1:].reshape(len(t), -1, 1)
     for name in scene.links:
         body = linked.bodies.index(name)
@@ -302,7 +303,7 @@ def test_the_link_of_a_joint_and_the_other_bear_opposite_forces() -> None:
 # -- what statics leave open ----------------------------------------------------------------------------------
 
 
-def drawn(raw: Any) -> tuple[Scene, Linkage, Reactions, RigidForces]:
+def drawn(raw: Any) -> tuple[Scene, Linkage, Reactions | BlockReactions, RigidForces]:
     scene = raw if isinstance(raw, Scene) else scene_from(raw)
     linked, along = moving(scene)
     t = np.linspace(0.0, time_grid(scene).end, 4)

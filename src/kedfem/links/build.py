@@ -54,7 +54,10 @@ def bare_links(scene: Scene) -> dict[str, Link]:
     MeshError
         If a link cannot be meshed well enough.
     """
-    return {name: bare_link(scene, name) for name, link in scene.links.items() if link.shape is not None}
+    spatial = spatial_beams(scene)
+    return {
+        name: bare_link(scene, name, spatial) for name, link in scene.links.items() if link.shape is not None
+    }
 
 
 def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
@@ -72,8 +75,12 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
             return np.eye(3)
 
 
-def bare_link(scene: Scene, name: str) -> Link:
+def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None) -> Link:
     """The record of one link that has a shape, without attached bodies.
+
+    Parameters
+    ----------
+    spatial : the beams of the scene that move in space, where that is known already
 
     Raises
     ------
@@ -87,7 +94,7 @@ def bare_link(scene: Scene, name: str) -> Link:
         return with_chosen_faces(scene, solid_link(name, mesh, material, link_axes(link)))
     if link.family == "plane":
         return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
-    return _beam(scene, name)
+    return _beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
 
 
 def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]:
@@ -176,14 +183,14 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     return out
 
 
-def _beam(scene: Scene, name: str) -> Link:
+def _beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
     link = scene.links[name]
     shape, material = link.shape, scene.materials[str(link.material)]
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
     of_section = shape.of_section if isinstance(shape, Polyline) else _of_bar(shape)
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
-    if name in spatial_beams(scene):
+    if name in spatial:
         return spatial_beam_link(name, _axis(scene, name), section, material)
     points, elements = beam_points(scene, name, spatial=False), link.mesh.elements
     count = elements if isinstance(elements, int) else 1

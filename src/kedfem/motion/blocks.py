@@ -63,14 +63,41 @@ class Blocks:
         LinAlgError
             Where J has not the rank of its columns.
         """
+        x = self._solved(values, rhs)[0]
+        return np.moveaxis(x[:, :, self.place].reshape(*x.shape[:2], -1), 1, 2)
+
+    def left(
+        self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]
+    ) -> Float[np.ndarray, "T m c"]:
+        """What the least squares leave of J x = rhs: its part on the null space of Jᵀ."""
+        return np.swapaxes(self._solved(values, rhs)[1], 1, 2)
+
+    def _solved(self, values: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         from kedfem.motion.blocks_kernel import least_squares
 
         T, _, c = rhs.shape
-        x = np.empty((T, c, self.count, 6))
-        right = np.ascontiguousarray(np.swapaxes(rhs, 1, 2))
-        if least_squares(values, right, self.starts, self.body, *self._plan(), x) < T:
+        x, left = np.empty((T, c, self.count, 6)), np.array(np.swapaxes(rhs, 1, 2), order="C")
+        if least_squares(values, left, self.starts, self.body, *self._plan(), x) < T:
             raise np.linalg.LinAlgError("rows leave a motion free")
-        return np.moveaxis(x[:, :, self.place].reshape(T, c, -1), 1, 2)
+        return x, left
+
+    def least_norm(
+        self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T b 6"]
+    ) -> Float[np.ndarray, "T m"]:
+        """The least y with Jᵀ y = rhs.
+
+        Raises
+        ------
+        LinAlgError
+            Where J has not the rank of its columns.
+        """
+        from kedfem.motion.blocks_kernel import least_norm
+
+        y, right = np.empty((len(rhs), self.rows)), np.empty(rhs.shape)
+        right[:, self.place] = rhs
+        if least_norm(values, right, self.starts, self.body, *self._plan(), y) < len(rhs):
+            raise np.linalg.LinAlgError("rows leave a motion free")
+        return y
 
     def extremes(self, values: Float[np.ndarray, "T e 6"]) -> Float[np.ndarray, "T 2"]:
         """Greatest and least singular value of J, the latter 0 where J has not the rank of its columns."""

@@ -114,23 +114,55 @@ def onto_bodies(value, starts, body, rows, out):  # type: ignore[no-untyped-def]
                     z[i] += v[i] * y
 
 
+@inner
+def refined(value, right, starts, body, columns, below, L, x, left, change):  # type: ignore[no-untyped-def]
+    """x (b, 6) that leaves least of J x = right, and left (m,), what it leaves."""
+    x[:] = 0.0
+    for r in range(len(left)):
+        left[r] = right[r]
+    for _ in range(SWEEPS + 1):
+        onto_bodies(value, starts, body, left, change)
+        solved(L, columns, below, change)
+        for k in range(len(x)):
+            for i in range(6):
+                x[k, i] += change[k, i]
+        onto_rows(value, starts, body, x, left)
+        for r in range(len(left)):
+            left[r] = right[r] - left[r]
+
+
 @compiled
 def least_squares(values, rhs, starts, body, pairs, columns, below, updates, of_column, x):  # type: ignore[no-untyped-def]
-    """x (T, c, b, 6) that leaves least of J x = rhs, rhs (T, c, m); the number of times at which that is defined."""
+    """x (T, c, b, 6) that leaves least of J x = rhs (T, c, m), which becomes what is left; times where defined."""
     L = np.empty((len(below), 6, 6))
     left, change = np.empty(rhs.shape[2]), np.empty(x.shape[2:])
     for t in range(len(values)):
         if not factored(values[t], pairs, columns, updates, of_column, L):
             return t
         for c in range(rhs.shape[1]):
-            x[t, c] = 0.0
-            for _ in range(SWEEPS + 1):
-                onto_rows(values[t], starts, body, x[t, c], left)
-                for r in range(len(left)):
-                    left[r] = rhs[t, c, r] - left[r]
-                onto_bodies(values[t], starts, body, left, change)
-                solved(L, columns, below, change)
-                x[t, c] += change
+            refined(values[t], rhs[t, c], starts, body, columns, below, L, x[t, c], left, change)
+            rhs[t, c] = left
+    return len(values)
+
+
+@compiled
+def least_norm(values, rhs, starts, body, pairs, columns, below, updates, of_column, y):  # type: ignore[no-untyped-def]
+    """The least y (T, m) with Jᵀ y = rhs (T, b, 6); the number of times at which that is defined."""
+    L = np.empty((len(below), 6, 6))
+    more, left = np.empty(y.shape[1]), np.empty(rhs.shape[1:])
+    for t in range(len(values)):
+        if not factored(values[t], pairs, columns, updates, of_column, L):
+            return t
+        y[t] = 0.0
+        left[:] = rhs[t]
+        for _ in range(SWEEPS + 1):
+            solved(L, columns, below, left)
+            onto_rows(values[t], starts, body, left, more)
+            y[t] += more
+            onto_bodies(values[t], starts, body, y[t], left)
+            for k in range(len(left)):
+                for i in range(6):
+                    left[k, i] = rhs[t, k, i] - left[k, i]
     return len(values)
 
 

@@ -7,8 +7,9 @@ joint's force depends on that choice. All is linear in what acts, with factors t
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
+from kedfem.motion.blocks import Blocks
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
@@ -49,8 +50,7 @@ class Reactions:
 
     def effort(self, drive: int) -> Float[np.ndarray, "T m 1"]:
         """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
-        rows = self.linkage.rows
-        out = np.where(rows.drive == drive, rows.scale(self.linkage.size)[: rows.count], 0.0)
+        out = _effort(self.linkage, drive)
         return np.broadcast_to(out[:, None], (*self.Q.shape[:2], 1))
 
     def responses(self, A: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T c k"]:
@@ -74,17 +74,87 @@ class Reactions:
         return np.einsum("tmx,tmy->xy", D, D), np.einsum("tmx,tmy->xy", A, A)
 
 
+@dataclass(frozen=True, slots=True)
+class BlockReactions:
+    """The same of a large linkage, entry by entry.
+
+    values : (T, e, 6) entries of the scaled rows J
+    column : (6,) what those of each body have been multiplied by
+    """
+
+    linkage: Linkage
+    motion: RigidMotion
+    blocks: Blocks
+    values: Float[np.ndarray, "T e 6"]
+    column: Float[np.ndarray, "6"]
+
+    def on(self, joint: str, body: int, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 T m 3"]:
+        """Force and moment that a joint, with its drive, exerts on a body, from scaled λ."""
+        out = np.zeros((2, len(self.values), self.blocks.rows, 3))
+        rows, own = self._own(joint, body, at)
+        for k, row in enumerate(rows):
+            out[:, :, row] += own[:, :, k]
+        return out
+
+    def effort(self, drive: int) -> Float[np.ndarray, "T m 1"]:
+        """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
+        out = _effort(self.linkage, drive)
+        return np.broadcast_to(out[:, None], (len(self.values), len(out), 1))
+
+    def multipliers(self, wrench: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
+        """The least scaled λ that balance forces and moments on all bodies but the ground."""
+        return self.blocks.least_norm(self.values, -self.column * wrench)
+
+    def borne(
+        self, joint: str, body: int, at: Float[np.ndarray, "3"], multipliers: Float[np.ndarray, "T m"]
+    ) -> Float[np.ndarray, "2 T 3"]:
+        """Force and moment that a joint, with its drive, exerts on a body, from its multipliers."""
+        rows, own = self._own(joint, body, at)
+        return np.asarray(np.einsum("wtek,te->wtk", own, multipliers[:, rows]))
+
+    def open_directions(
+        self, A: Float[np.ndarray, "T m c"]
+    ) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
+        """Along which directions A λ is open, and along which there is any at all."""
+        D = self.blocks.left(self.values, A)
+        return np.einsum("tmx,tmy->xy", D, D), np.einsum("tmx,tmy->xy", A, A)
+
+    def _own(
+        self, joint: str, body: int, at: Float[np.ndarray, "3"]
+    ) -> tuple[Int[np.ndarray, " e"], Float[np.ndarray, "2 T e 3"]]:
+        """Rows of a joint with a share on a body, and force and moment there of their scaled λ."""
+        blocks = self.blocks
+        first, end = np.searchsorted(
+            blocks.row, np.flatnonzero(rows_of(self.linkage, joint))[[0, -1]] + [0, 1]
+        )
+        here = first + np.flatnonzero(blocks.body[first:end] == blocks.place[body - 1])
+        here = here[rows_of(self.linkage, joint)[blocks.row[here]]]
+        own = self.values[:, here] / self.column
+        arm = (self.motion.R[:, body] @ (at - self.linkage.centre))[:, None]
+        force = own[..., :3]
+        return blocks.row[here], np.stack([force, own[..., 3:] - cross(arm, force)])
+
+
+def _effort(linkage: Linkage, drive: int) -> Float[np.ndarray, " m"]:
+    rows = linkage.rows
+    return np.where(rows.drive == drive, rows.scale(linkage.size)[: rows.count], 0.0)
+
+
 def rows_of(linkage: Linkage, joint: str) -> Bool[np.ndarray, " m"]:
     """Which rows are a joint's."""
     return np.array([name == joint for name in linkage.joints], bool)
 
 
-def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions:
+def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions | BlockReactions:
     """How all joints and drives bear on the bodies at the times of a motion."""
     bodies, c = len(linkage.bodies), linkage.centre
     poses = (motion.R, motion.p + motion.R @ c - c)
     f = features(linkage.rows, poses, np.zeros((len(motion.t), len(linkage.rows.angles))))
+    each = np.repeat([linkage.size, 1.0], 3)
+    if linkage.blocks is not None:
+        values = linkage.blocks.values(linkage.rows, f, linkage.size)
+        return BlockReactions(linkage, motion, linkage.blocks, values, each)
     J = jacobian(linkage.rows, f, bodies, linkage.size)
-    column = np.tile(np.repeat([linkage.size, 1.0], 3), bodies - 1)
+    column = np.tile(each, bodies - 1)
     Q, U = np.linalg.qr(J)
     return Reactions(linkage, motion, (J / column).reshape(*J.shape[:2], -1, 6), Q, U, column)

@@ -1,5 +1,6 @@
 """Channels of rigid inverse dynamics: forces of joints and drive were all links rigid, beside those of elastic links."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +13,7 @@ from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.places import slider_axis
 from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path
-from kedfem.motion.reactions import Reactions, reactions
+from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
 from kedfem.results.acting import Measured
@@ -24,6 +25,7 @@ Responses = Float[np.ndarray, "T c k"]
 XYZ = ("x", "y", "z")
 OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
+FEW = 4  # poses of a linkage of many bodies at which it is seen what statics tell of its joints
 KEPT = 4000  # time points of a turn whose responses are kept, some kilobytes each
 
 
@@ -75,13 +77,34 @@ class RigidForces:
             for end, f, m in self.actions.wrenches(Block(step or 0, motion, [])):
                 force[:, end.body] += f
                 moment[:, end.body] += m - cross(centre[:, end.body], f)
-            wrench = np.concatenate([force, moment], axis=2)[:, 1:].reshape(len(motion.t), -1, 1)
-            values = (self._responses(motion, step) @ wrench)[..., 0]
-            ends = np.cumsum([len(each.channel.columns) for each in self.every])[:-1]
-            parts = np.split(values, ends, axis=1)
-            self._rows = {each.channel.name: x for each, x in zip(self.every, parts, strict=True)}
+            wrench = np.concatenate([force, moment], axis=2)[:, 1:]
+            self._rows = self._borne(motion, step, wrench)
             self._motion = motion
         return self._rows
+
+    def _borne(
+        self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]
+    ) -> dict[str, Rows]:
+        """All channels where forces and moments act on the bodies; of many bodies without a matrix of responses."""
+        names = [each.channel.name for each in self.every]
+        if self.linkage.blocks is not None:
+            return dict(zip(names, self._by_entries(motion, wrench), strict=True))
+        values = (self._responses(motion, step) @ wrench.reshape(len(motion.t), -1, 1))[..., 0]
+        ends = np.cumsum([len(each.channel.columns) for each in self.every])[:-1]
+        return dict(zip(names, np.split(values, ends, axis=1), strict=True))
+
+    def _by_entries(self, motion: RigidMotion, wrench: Float[np.ndarray, "T b 6"]) -> Iterator[Rows]:
+        found = reactions(self.linkage, motion)
+        if not isinstance(found, BlockReactions):
+            raise TypeError("a linkage of few bodies is solved as one matrix")
+        multipliers = found.multipliers(wrench)
+        for each in self.every:
+            if each.which < 2:
+                borne = found.borne(each.joint, each.body, each.at, multipliers)
+                yield borne[each.which] @ each.project.T
+            else:
+                drive = self.linkage.drives.joints.index(each.joint)
+                yield np.einsum("tmc,tm->tc", found.effort(drive), multipliers)
 
     def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
         """All channels from forces and moments; where poses return, those of the first turn again."""
@@ -99,6 +122,8 @@ class RigidForces:
 
     def _made(self, motion: RigidMotion) -> Responses:
         found = reactions(self.linkage, motion)
+        if not isinstance(found, Reactions):
+            raise TypeError("a linkage of many bodies is not solved as one matrix")
         return found.responses(np.concatenate([self._of(found, each) for each in self.every], axis=2))
 
     def _of(self, found: Reactions, each: Borne) -> Float[np.ndarray, "T m c"]:
@@ -145,7 +170,7 @@ def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
     return Borne(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
-def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[Borne]:
+def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, name: str) -> list[Borne]:
     joint = scene.joints[name]
     link = stated_link(scene, joint)
     other = next(each for each in joint.links if each != link)
@@ -189,11 +214,12 @@ def told(
 
 
 def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
-    """The linkage at the drive angles of its path, at rest."""
-    c, zero = linkage.centre, np.zeros_like(along.p)
-    p = along.p + c - along.R @ c
-    still = np.zeros_like(along.R)
-    T = len(along.phi)
+    """The linkage at the drive angles of its path, of many bodies at a few of them, at rest."""
+    few = FEW if linkage.blocks is not None else len(along.phi)
+    which = np.unique(np.linspace(0, len(along.phi) - 1, few).round().astype(int))
+    R, c, T = along.R[which], linkage.centre, len(which)
+    p = along.p[which] + c - R @ c
+    zero, still = np.zeros_like(p), np.zeros_like(R)
     return RigidMotion(
-        np.zeros(T), along.phi, along.R, p, zero, zero, zero, still, zero, np.zeros((T, 0)), zero, zero
+        np.zeros(T), along.phi[which], R, p, zero, zero, zero, still, zero, np.zeros((T, 0)), zero, zero
     )

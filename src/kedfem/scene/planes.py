@@ -49,10 +49,14 @@ def spatial_names(parts: Parts) -> frozenset[str]:
         link.name: link for link in parts.links.values() if fidelity(link) == "beam" or _rigid_line(link)
     }
     free = {name: link.word("beam") for name, link in beams.items()}
-    found = {
-        name for name, kind in free.items() if kind == "spatial" or (kind is None and any(obstacles(parts, name)))
-    }  # fmt: skip
-    while more := {n for n, kind in free.items() if kind is None and welded(parts, n) & found} - found:
+    open_ones = [name for name, kind in free.items() if kind is None]
+    found = {name for name, kind in free.items() if kind == "spatial"}
+    if any(common_obstacles(parts, "")):
+        found.update(open_ones)
+    around = by_link(parts)
+    found.update(name for name in open_ones if any(own_obstacles(parts, name, around[name])))
+    beside = {name: welded(parts, name) for name in open_ones} if _welds(parts) else {}
+    while more := {name for name, others in beside.items() if others & found} - found:
         found |= more
     return frozenset(found)
 
@@ -62,9 +66,13 @@ def _rigid_line(link: Entry) -> bool:
     return fidelity(link) == "rigid" and isinstance(getattr(link.record, "shape", None), Polyline)
 
 
+def _welds(parts: Parts) -> list[Entry]:
+    return [joint for joint in parts.joints.values() if joint.word("kind") == "weld"]
+
+
 def welded(parts: Parts, name: str) -> set[str]:
     """What is welded to a link."""
-    pairs = [link_names(joint) for joint in parts.joints.values() if joint.word("kind") == "weld"]
+    pairs = [link_names(joint) for joint in _welds(parts)]
     return {other for pair in pairs if name in pair for other in pair} - {name}
 
 
@@ -86,6 +94,23 @@ def beam_faults(parts: Parts) -> Iterator[str]:
 def obstacles(parts: Parts, name: str) -> Iterator[str]:
     """Why a beam cannot be planar, as fault lines."""
     whose = f"for the planar beam {name!r}"
+    yield from common_obstacles(parts, whose)
+    yield from own_obstacles(parts, name, touching(parts, name))
+
+
+def common_obstacles(parts: Parts, whose: str) -> Iterator[str]:
+    """What moves any beam of the scene out of the plane: axes of joints, gravity, loads."""
+    for joint in parts.joints.values():
+        yield from joint_obstacles(joint, whose)
+    if parts.gravity[2] != 0.0:
+        yield f"gravity: must lie in the xy plane {whose} [m/s^2], got {vector(parts.gravity)}"
+    for load in parts.loads.values():
+        yield from leaving(load, whose)
+
+
+def own_obstacles(parts: Parts, name: str, around: Iterable[Entry]) -> Iterator[str]:
+    """What moves one beam out of the plane: its shape, and what is around it."""
+    whose, around = f"for the planar beam {name!r}", list(around)
     shape = parts.links[name].record.shape if parts.links[name].record is not None else None
     if isinstance(shape, Polyline):
         for key in ("smooth", "up"):
@@ -93,18 +118,20 @@ def obstacles(parts: Parts, name: str) -> Iterator[str]:
                 yield parts.links[name].fault("shape", "must be left out for a planar beam, got one", key)
     if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
         yield parts.links[name].fault("shape", f"must be along z {whose}, got {vector(shape.upward)}", "up")
-    yield from joint_obstacles(parts, name, whose)
-    if parts.gravity[2] != 0.0:
-        yield f"gravity: must lie in the xy plane {whose} [m/s^2], got {vector(parts.gravity)}"
-    for load in parts.loads.values():
-        yield from leaving(load, whose)
-    for body in parts.bodies.values():
-        centre = getattr(body.record, "centre", None)
-        if centre is not None and body.record.link == name and math.dist(centre, body.record.at) > FLAT:
-            yield body.fault(
-                "centre", f"must be its point {vector(body.record.at)} {whose} [m], got {vector(centre)}"
+    for entry in around:
+        others = [
+            parts.links[x] for x in getattr(entry.record, "links", ()) if x in parts.links and x != name
+        ]
+        if getattr(entry.record, "kind", None) == "weld" and others:
+            other = fidelity(others[0])
+            if other not in {"beam", "rigid"}:
+                yield entry.fault("kind", f"must be a hinge {whose}, got a weld to a {other}")
+        centre = getattr(entry.record, "centre", None)
+        if centre is not None and math.dist(centre, entry.record.at) > FLAT:
+            yield entry.fault(
+                "centre", f"must be its point {vector(entry.record.at)} {whose} [m], got {vector(centre)}"
             )
-    yield from plane_obstacles(parts, name)
+    yield from off_plane(around, f"the planar beam {name!r}")
 
 
 def leaving(load: Entry, whose: str) -> Iterator[str]:
@@ -118,35 +145,23 @@ def leaving(load: Entry, whose: str) -> Iterator[str]:
         yield load.fault("vector", f"must lie in the xy plane {whose}, got {vector(given)}")
 
 
-def joint_obstacles(parts: Parts, name: str, whose: str) -> Iterator[str]:
-    """Joints that turn or move something out of the plane, and welds of the beam to what is no beam."""
-    for joint in parts.joints.values():
-        if joint.record is None:
-            continue
-        axis, kind = joint.record.axis, joint.record.kind
-        if kind == "revolute" and axis is not None and math.hypot(*axis[:2]) > FLAT:
-            yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
-        if kind in {"cylindrical", "screw", "planar"} and axis is not None and math.hypot(*axis[:2]) > FLAT:
-            yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
-        if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
-            yield joint.fault("axis", f"must lie in the xy plane {whose}, got {vector(axis)}")
-        if kind == "universal":
-            yield joint.fault("kind", f"must be one that turns about z only {whose}, got a universal joint")
-        others = [parts.links[x] for x in joint.record.links if x in parts.links and x != name]
-        if kind == "weld" and name in joint.record.links and others:
-            other = fidelity(others[0])
-            if other not in {"beam", "rigid"}:
-                yield joint.fault("kind", f"must be a hinge {whose}, got a weld to a {other}")
+def joint_obstacles(joint: Entry, whose: str) -> Iterator[str]:
+    """A joint that turns or moves something out of the plane."""
+    if joint.record is None:
+        return
+    axis, kind = joint.record.axis, joint.record.kind
+    upright = kind in {"revolute", "cylindrical", "screw", "planar"}
+    if upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
+        yield joint.fault("axis", f"must be along z {whose}, got {vector(axis)}")
+    if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
+        yield joint.fault("axis", f"must lie in the xy plane {whose}, got {vector(axis)}")
+    if kind == "universal":
+        yield joint.fault("kind", f"must be one that turns about z only {whose}, got a universal joint")
 
 
 def vector(parts: tuple[float, ...]) -> str:
     """A vector as text."""
     return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
-
-
-def plane_obstacles(parts: Parts, name: str) -> Iterator[str]:
-    """Points of a beam, and of what is on it, that are not in the z plane of its first."""
-    yield from off_plane(touching(parts, name), f"the planar beam {name!r}")
 
 
 def off_plane(entries: Iterable[Entry], of: str) -> Iterator[str]:
@@ -167,15 +182,25 @@ def off_plane(entries: Iterable[Entry], of: str) -> Iterator[str]:
             yield entry.fault(key[0], f"{wanted}, got z = {point[2]:.6g}", *key[1:])
 
 
-def touching(parts: Parts, name: str) -> Iterator[Entry]:
+def touching(parts: Parts, name: str) -> list[Entry]:
     """A link, its joints and what acts on it or reads it, as far as they are good."""
-    here = [parts.links[name], *(joint for joint in parts.joints.values() if name in link_names(joint))]
+    return by_link(parts)[name]
+
+
+def by_link(parts: Parts) -> dict[str, list[Entry]]:
+    """The same of every link."""
+    out: dict[str, list[Entry]] = {name: [link] for name, link in parts.links.items()}
+    for joint in parts.joints.values():
+        for name in dict.fromkeys(link_names(joint)):
+            out.get(name, []).append(joint)
     for section in (parts.loads, parts.bodies, parts.probes):
-        here += [entry for entry in section.values() if entry.word("link") == name]
+        for entry in section.values():
+            out.get(str(entry.word("link")), []).append(entry)
     for spring in parts.springs.values():
         ends = spring_ends(spring)
-        here += ends if any(end.record is not None and end.record.link == name for end in ends) else []
-    yield from (entry for entry in here if entry.record is not None)
+        for name in dict.fromkeys(end.record.link for end in ends if end.record is not None):
+            out.get(name, []).extend(ends)
+    return {name: [entry for entry in here if entry.record is not None] for name, here in out.items()}
 
 
 def spring_ends(spring: Entry) -> list[Entry]:
