@@ -12,6 +12,7 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import initial_rates
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.layout import groups, near_diagonal
 from kedfem.dynamics.system.literal import Literal, Now
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.start import rest
@@ -66,6 +67,11 @@ def rows(of: Ready, x: np.ndarray) -> np.ndarray:
     return np.concatenate(every, axis=1)
 
 
+def in_order(of: Ready, z: np.ndarray) -> np.ndarray:
+    """Interface unknowns and their rates (3, k) of a state, in the order of the record."""
+    return z[:, near_diagonal(groups(of.system), of.system.unknowns)[0]]
+
+
 def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start."""
     solver, start = Literal(of.ready.system, of.ready.scheme), of.state
@@ -78,7 +84,7 @@ def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
     C = solver._coordinates(z, start.turned.copy(), at)[1]
     now = Now(
         u, v, a, np.zeros_like(u), solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
-        C.T @ start.multiplier, none,
+        C.T @ start.multiplier, none, in_order(of.ready, start.z),
     )  # fmt: skip
     along, out = of.steps(count), []
     for k in range(count):

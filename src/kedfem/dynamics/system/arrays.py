@@ -205,13 +205,16 @@ class History(NamedTuple):
 class Driving(NamedTuple):
     """The nominal motion and loads over T times.
 
-    t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; drives : (T, D)
+    t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
+    drives : (T, D)
     F : (T, N) P − M R0'' on the coordinates, world components
     """
 
     t: Any
     R: Any
     p: Any
+    v: Any
+    omega: Any
     drives: Any
     F: Any
 

@@ -11,15 +11,16 @@ from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RA
 
 
 @inner
-def coordinate(ends, of, r, place, turned, row, y, w):  # type: ignore[no-untyped-def]
-    """Value of coordinate r, its gradient added to a row on z.
+def coordinate(ends, of, r, nominal, place, turned, row, y, w):  # type: ignore[no-untyped-def]
+    """Value of coordinate r, its gradient added to a row on z; and its rate in the nominal motion, z constant.
 
     Parameters
     ----------
+    nominal : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
     turned : (terms,) angles as they were, replaced by those they are
     y, w : (16,), (12, 3) room
     """
-    total = 0.0
+    total, rate = 0.0, 0.0
     x, Q, _, _ = place
     for t in range(of.term_at[r], of.term_at[r + 1]):
         i, j, kind, factor = of.i[t], of.j[t], of.kind[t], of.factor[t]
@@ -36,9 +37,9 @@ def coordinate(ends, of, r, place, turned, row, y, w):  # type: ignore[no-untype
             value = angle(of, t, Q, turned[t], w)
             turned[t] = value
         total += factor * value
-        borne(ends, i, w[6], w[7], factor, place, row, y, w)
-        borne(ends, j, w[8], w[9], factor, place, row, y, w)
-    return total
+        rate += borne(ends, i, w[6], w[7], factor, nominal, place, row, y, w)
+        rate += borne(ends, j, w[8], w[9], factor, nominal, place, row, y, w)
+    return total, rate
 
 
 @inner

@@ -31,6 +31,16 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @inner
+def triple(a, b, c):  # type: ignore[no-untyped-def]
+    """a · (b × c)."""
+    return (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )
+
+
+@inner
 def times(R, x, out):  # type: ignore[no-untyped-def]
     """out becomes R x."""
     for m in range(3):
@@ -137,12 +147,27 @@ def stretched(e, D, Q, U, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def borne(ends, e, force, moment, factor, place, row, y, w):  # type: ignore[no-untyped-def]
-    """Add to a row on z a force and a moment on an end, both times a factor."""
+def borne(ends, e, force, moment, factor, nominal, place, row, y, w):  # type: ignore[no-untyped-def]
+    """Add to a row on z a force and a moment on an end, both times a factor.
+
+    Parameters
+    ----------
+    nominal : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
+
+    Returns
+    -------
+    Their power in the nominal motion, z constant
+    """
     _, Q, D, U = place
-    form, d = ends.form[e], ends.components[e]
+    R, v, omega = nominal
+    form, d, body = ends.form[e], ends.components[e], ends.body[e]
+    times(R[body], ends.origin[e], w[0])
+    cross(omega[body], w[0], w[1])
+    power = dot(force, w[1]) + dot(force, v[body])
+    if form in (RIGID, POINT, PLANAR_BEAM):
+        power += dot(moment, omega[body])
     if form == RIGID:
-        return
+        return factor * power
     first, c = ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]
     at = ends.onto_at[e]
     rows = (ends.onto_at[e + 1] - at) // max(c, 1)
@@ -153,16 +178,17 @@ def borne(ends, e, force, moment, factor, place, row, y, w):  # type: ignore[no-
     if form == PLANAR_BEAM:
         y[2] = moment[2]
     elif form != POINT:
-        turning(ends, e, moment, Q[e], D[e], U[e], y, w)
+        power += turning(ends, e, moment, R[body], omega[body], Q[e], D[e], U[e], y, w)
     for r in range(rows):
         if y[r] != 0.0:
             for m in range(c):
                 row[ends.columns[first + m]] += factor * y[r] * ends.onto[at + r * c + m]
+    return factor * power
 
 
 @inner
-def turning(ends, e, moment, Q, D, U, y, w):  # type: ignore[no-untyped-def]
-    """Add to forces y at an end's points those that a moment on its orientation is."""
+def turning(ends, e, moment, R, omega, Q, D, U, y, w):  # type: ignore[no-untyped-def]
+    """Add to forces y at an end's points those that a moment on its orientation is; its power in the nominal motion."""
     form, d, known = ends.form[e], ends.components[e], ends.known[e]
     times_transposed(Q, moment, w[0])
     turn_of(U, w[0])
@@ -185,9 +211,13 @@ def turning(ends, e, moment, Q, D, U, y, w):  # type: ignore[no-untyped-def]
         share = dot(q3, w[3]) / size
         for m in range(3):
             q2[m] -= share * n[m]
+    power = 0.0
     for k in range(known):
         q = q1 if k == 0 else (q2 if k == 1 else q3)
+        times(R, ends.directions[e, k], w[3])
+        power += triple(q, omega, w[3])
         for m in range(d):
             x = q[m] / ends.lengths[e, k]
             y[(k + 1) * d + m] += x
             y[m] -= x
+    return power

@@ -85,19 +85,30 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
         return
     if not of.linear.all():
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
+    nominal = (driving.R[t], driving.v[t], driving.omega[t])
     for a in range(r):
         trial.C[a] = 0.0
         if of.linear[a]:
-            coordinate(ends, of, a, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors)
-            e = 0.0
+            coordinate(ends, of, a, nominal, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors)
+            e, moving = 0.0, 0.0
             for m in range(len(trial.z)):
                 e += trial.C[a, m] * trial.z[m]
         else:
-            e = coordinate(ends, of, a, trial.moving, trial.turned, trial.C[a], work.end, work.vectors)
+            e, moving = coordinate(
+                ends, of, a, nominal, trial.moving, trial.turned, trial.C[a], work.end, work.vectors
+            )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]
         trial.e[a] = e
-        rate = c.rate[0] * (e - state.e[0, a]) - c.rate[1] * state.e[1, a] - c.rate[2] * state.e[2, a]
+        if of.linear[a] or of.drive[a] >= 0:
+            rate = newmark_rate(c, e, state.e[0, a], state.e[1, a], state.e[2, a])
+        else:
+            rate = moving
+            for m in range(len(trial.z)):
+                if trial.C[a, m] != 0.0:
+                    rate += trial.C[a, m] * newmark_rate(
+                        c, trial.z[m], state.z[0, m], state.z[1, m], state.z[2, m]
+                    )
         held = law(of, a, driving.t[t], e, rate, work.law)
         kappa = share * (work.law[1] + c.rate[0] * work.law[2])
         trial.m[a] = 0.0
@@ -111,6 +122,12 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
             trial.compliance[a], trial.m[a] = -1.0, -share * work.law[0]
             for m in range(len(trial.z)):
                 trial.right[m] += trial.m[a] * trial.C[a, m]
+
+
+@inner
+def newmark_rate(c, x, x0, x1, x2):  # type: ignore[no-untyped-def]
+    """Rate at the end of a step of what has moved from x0 to x."""
+    return c.rate[0] * (x - x0) - c.rate[1] * x1 - c.rate[2] * x2
 
 
 @inner

@@ -236,14 +236,19 @@ def factored(
     return [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
 
 
-def as_arrays(system: Any, parts: Sequence[DensePart]) -> tuple[Bodies, Ends, Constraints]:
-    """A system's flat arrays, its bodies factored."""
-    model, k = system.model, system.unknowns
-    groups = [np.flatnonzero(joint.B.any(axis=0)) for joint in model.joints]
+def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
+    """Interface unknowns that a body, or a constraint, couples with each other."""
+    out = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
     for each in system.constraints:
         used = {n for term in each.terms for n in (term.i, term.j)}
         columns = [np.flatnonzero(system.ends[n].onto.any(axis=(0, 1))) for n in used]
-        groups.append(np.unique(np.concatenate(columns)))
-    number, first = near_diagonal(groups, k)
+        out.append(np.unique(np.concatenate(columns)))
+    return out
+
+
+def as_arrays(system: Any, parts: Sequence[DensePart]) -> tuple[Bodies, Ends, Constraints]:
+    """A system's flat arrays, its bodies factored."""
+    model = system.model
+    number, first = near_diagonal(groups(system), system.unknowns)
     bodies = body_arrays(model.links, model.joints, model.bodies, parts, number, first)
     return bodies, end_arrays(system.ends, number), constraint_arrays(system.constraints)

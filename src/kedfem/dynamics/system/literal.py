@@ -11,11 +11,12 @@ coordinates those of `motion.values`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
 from kedfem.dynamics.loads import applied
@@ -33,6 +34,7 @@ from kedfem.motion.rigid import RigidMotion
 
 ITERATIONS = 40
 DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
+RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 SINGULAR = 1e-13  # singular values that redundant constraints leave
 Matrix = Float[np.ndarray, "_ _"]
@@ -56,6 +58,7 @@ class Now:
     turned: Column
     bearing: Column
     damped: list[np.ndarray]
+    z_rates: Float[np.ndarray, "3 k"]
     multiplier: Column = field(default_factory=lambda: np.zeros(0))
 
 
@@ -109,9 +112,10 @@ class Literal:
             e, C = self._coordinates(now.z, now.turned, at)
             now.e[0] = e
             now.e[1], now.e[2] = self.rates(e, *old.e)
+            own = self._own_rates(now, old, at)
             for n, each in enumerate(self.system.constraints):
                 if n not in hard:
-                    m[n] = -(1 - scheme.alpha_f) * force(each, float(at.t[0]), now.e[0, n], now.e[1, n])[0]
+                    m[n] = -(1 - scheme.alpha_f) * force(each, float(at.t[0]), now.e[0, n], own[n])[0]
             left = [
                 self._unbalanced(now, old) - self.W.T @ lam,
                 self.W @ now.u - self.B @ now.z,
@@ -137,7 +141,8 @@ class Literal:
         F = self.applied(at)
         zero = np.zeros_like(old.u)
         z = np.linalg.lstsq(self.B, self.W @ u, rcond=None)[0] if self.k else old.z
-        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [])
+        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [],
+                   old.z_rates)  # fmt: skip
 
     def applied(self, at: RigidMotion) -> Column:
         """P − M R0'' of all bodies, world components."""
@@ -238,10 +243,29 @@ class Literal:
                 e[n] = C[n] @ z
         return e, C
 
+    def _own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
+        """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
+
+        Of others by differences: the mechanism and z move on, and back, as their rates tell.
+        """
+        out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
+        ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)
+        values = []
+        for dt in ahead:
+            turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
+            moved = replace(at, R=turn[None], p=at.p + dt * at.v)
+            values.append(self._coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
+        rates = np.array([1, -8, 8, -1]) @ np.array(values) / (12 * RATES * self.scheme.h)
+        for n, each in enumerate(self.system.constraints):
+            if not each.linear and getattr(each.law, "drive", -1) < 0:
+                out[n] = rates[n]
+        return np.asarray(out)
+
     def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column) -> Now:
         self._evaluated(now, old, at)
         e, C = self._coordinates(now.z, now.turned, at)
         now.e = np.stack([e, *self.rates(e, *old.e)])
+        now.z_rates = np.stack([now.z, *self.rates(now.z, *old.z_rates)])
         now.multiplier = m / (1 - self.scheme.alpha_f)
         now.bearing = C.T @ now.multiplier
         return now

@@ -61,7 +61,8 @@ def driving(of: Ready, motion: RigidMotion) -> Driving:
         for part, link, loads, body in zip(of.parts, model.links, model.loads, model.bodies, strict=True)
     ]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
-    return Driving(motion.t, motion.R, motion.p, np.ascontiguousarray(drives), np.concatenate(F, axis=1))
+    drives = np.ascontiguousarray(drives)
+    return Driving(motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1))
 
 
 def march(

@@ -255,7 +255,10 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
                 e += trial.C[a, m] * trial.z[m]
         else:
             trial.part[:] = 0.0
-            e = coordinate(ends, of, a, trial.moving, trial.turned, trial.part, work.end, work.vectors)
+            nominal = (driving.R[t], driving.v[t], driving.omega[t])
+            e, _ = coordinate(
+                ends, of, a, nominal, trial.moving, trial.turned, trial.part, work.end, work.vectors
+            )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]
         second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]
