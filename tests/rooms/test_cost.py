@@ -6,7 +6,7 @@ import pytest
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics import cost
-from kedfem.dynamics.acted import ActedSteps
+from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.dynamics.transient import steps_of
 from kedfem.report.check import forecast
 from kedfem.scene import scene_from
@@ -22,7 +22,7 @@ def sprung(**analysis: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("frames", ["nominal", "following"])
 def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str) -> None:
-    """The slow solver of force elements was forecast 200 times too low by sizes: now its own steps are taken."""
+    """By steps of their own solver, whatever sizes would say."""
     raw = sprung(frames=frames, steps_per_turn=120)
     for link in raw["links"].values():
         link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
@@ -31,7 +31,7 @@ def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str)
     assert 24 <= said.tried <= 120
     assert said.steps > 0.0
     solver = steps_of(ready.scene, ready.model)
-    assert isinstance(solver, ActedSteps) == (frames == "nominal")
+    assert isinstance(solver, SystemSteps) == (frames == "nominal")
 
 
 def test_what_is_too_large_to_be_tried_is_forecast_by_its_sizes(monkeypatch: pytest.MonkeyPatch) -> None:

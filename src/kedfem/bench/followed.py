@@ -77,7 +77,7 @@ def run(scene: Scene, repeats: int) -> Ran:
     )
 
 
-def stepping(ready: Prepared, solver: Steps, steps: int) -> float:
+def stepping(ready: Prepared, solver: Any, steps: int) -> float:
     """Processor time of the solver's first steps alone [s]."""
     scene, model, total = ready.scene, ready.model, 0.0
     state: Any = solver.begin(first_states(scene, ready.linkage, ready.path, model))
@@ -92,7 +92,8 @@ def stepping(ready: Prepared, solver: Steps, steps: int) -> float:
 def cost(scene: Scene) -> tuple[float, Steps]:
     """Processor time of a step [s], the least of some blocks; the solver."""
     ready = meshed(scene)
-    solver, times = steps_of(scene, ready.model), []
+    solver: Any = steps_of(scene, ready.model)
+    times = []
     states = first_states(scene, ready.linkage, ready.path, ready.model)
     state: Any = solver.begin(states)
     _, motion = next(motions(scene, ready.linkage, ready.path))

@@ -194,11 +194,10 @@ def dense_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> DensePa
     """A link in mass-orthonormal coordinates; its ports are held by a null-space basis, so that a long step, where A
     nearly lets a free link go, does no harm."""
     T = tuple(_mass_orthonormal(_dense(m)) for m in link.mass)
-    n, d, unit = link.n, link.d, all(np.array_equal(t, np.eye(link.n)) for t in T)
+    n, unit = link.n, all(np.array_equal(t, np.eye(link.n)) for t in T)
     A = c_K * _symmetric(component_first(T, link.K0))
     A[np.diag_indices(len(A))] += c_M
-    W = port_columns(joint, n).T.reshape(-1, n, d).transpose(0, 2, 1)
-    W = np.concatenate([W[:, c] @ T[c] for c in range(d)], axis=1)
+    W = port_rows(T, joint, n)
     if not len(W):
         return DensePart(T, _symmetric(np.linalg.inv(A)), W.T, np.zeros((0, 0)), W, unit)
     V, L = scipy.linalg.qr(W.T)
@@ -208,6 +207,12 @@ def dense_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> DensePa
     moved = V1 @ np.linalg.inv(L[: len(W)]).T  # W moved = 1
     Y = moved - G @ (A @ moved)
     return DensePart(T, _symmetric(G), Y, _symmetric(Y.T @ A @ Y), W, unit)
+
+
+def port_rows(T: Sequence[Float[np.ndarray, "n n"]], joint: Attachment, n: int) -> Float[np.ndarray, "q N"]:
+    """What held components of ports have of coordinates x."""
+    W = port_columns(joint, n).T.reshape(-1, n, len(T)).transpose(0, 2, 1)
+    return np.concatenate([W[:, c] @ t for c, t in enumerate(T)], axis=1)
 
 
 def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:

@@ -28,6 +28,7 @@ from kedfem.dynamics.segment import CONVERGED, EASIER, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nodal
 from kedfem.dynamics.stiffening import Stiffening, stiffening
+from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
@@ -42,7 +43,9 @@ BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-Steps = CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | FollowingSteps | FollowingDense
+Steps = (
+    CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | SystemSteps | FollowingSteps | FollowingDense
+)
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
     'take a smaller step, or frames = "following"'
@@ -65,7 +68,12 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         every = (*actions(scene, model), *followers(model))
         return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
     every = actions(scene, model)
-    small = all(map(_is_small, model.links)) and not every
+    small = all(map(_is_small, model.links))
+    if every and small and scene.analysis.solver != "literal":
+        system = nominal_system(scene, model)
+        if system is not None:
+            return SystemSteps(system, model, scheme, every)
+    small = small and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
         solver = LiteralSteps
@@ -112,11 +120,13 @@ def transient(
                         yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
                     raise SolveError(_stuck(model, first + k + stuck.taken, part, stuck)) from None
             else:
-                rows, forcing = joint_rows(model.rows, part), forcings(model, part)
-                if isinstance(solver, ActedSteps):
-                    links, state = solver.advance(state, forcing, part, rows)
+                forcing = forcings(model, part)
+                if isinstance(solver, SystemSteps):
+                    links, state = solver.advance(state, forcing, part)
+                elif isinstance(solver, ActedSteps):
+                    links, state = solver.advance(state, forcing, part, joint_rows(model.rows, part))
                 else:
-                    links, state = solver.advance(state, forcing, rows)
+                    links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
 
 
@@ -129,6 +139,9 @@ def begun(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: list[LinkState]
 ) -> Any:
     """A solver's state at the first time point."""
+    if isinstance(solver, SystemSteps):
+        none = np.zeros(1)
+        return solver.begin(states, rigid_motion(linkage, along, none, path_parameter(scene, none)))
     if not model.rows or isinstance(solver, FollowingSteps | FollowingDense):
         return solver.begin(states)
     rows = rows_at_start(scene, linkage, along, model)

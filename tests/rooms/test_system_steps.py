@@ -1,0 +1,79 @@
+"""Springs and motors on links with nominal frames: the system's steps record what those of the condensed solver do."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.acted import ActedSteps
+from kedfem.dynamics.actions import actions
+from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.transient import Steps, steps_of, transient
+from kedfem.results.recording import recording
+from kedfem.scene import scene_from, time_grid
+from tests.rooms.test_acted import four_bar, line
+
+CURVE = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
+
+
+def slider_crank() -> dict[str, Any]:
+    """A spring along the slide of a slider, damped."""
+    spring = {"kind": "spring", "joint": "S", "stiffness": 1000.0, "damping": 5.0, "preload": 20.0}
+    raw = four_bar("nominal", springs={"p": spring}, steps=72)
+    bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "fidelity": "beam"}
+    raw["links"] = {
+        "crank": {**rod, "shape": {**bar, "between": [[0, 0], [0.1, 0]]}},
+        "rod": {**rod, "shape": {**bar, "between": [[0.1, 0], [0.4, 0]]}},
+        "shoe": {"fidelity": "rigid", "mass": 0.2},
+    }
+    raw["joints"] = {
+        "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
+        "B": {"kind": "revolute", "links": ["crank", "rod"], "at": [0.1, 0]},
+        "C": {"kind": "spherical", "links": ["rod", "shoe"], "at": [0.4, 0]},
+        "S": {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.4, 0], "axis": "x"},
+    }
+    return raw
+
+
+SCENES = {
+    "springs with dampers": lambda: four_bar("nominal", springs=line(200.0), steps=72),
+    "from rest, damped links, rho_inf 0.8": lambda: four_bar(
+        "nominal", springs=line(50.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0},
+        analysis={"initial": "rest", "rho_inf": 0.8},
+    ),
+    "motor over speed": lambda: four_bar("nominal", motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
+    "spring along a slide": slider_crank,
+}  # fmt: skip
+
+
+def channels(raw: dict[str, Any], solver_of: Any) -> tuple[Steps, dict[str, np.ndarray]]:
+    """All that a run records, over time."""
+    ready, _ = prepared(scene_from(raw))
+    solver = solver_of(ready.scene, ready.model)
+    blocks: list[Block] = list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver))
+    every = recording(ready.scene, ready.model)
+    return solver, {x.channel.name: np.concatenate([x.rows(block) for block in blocks]) for x in every}
+
+
+def condensed(scene: Any, model: Any) -> ActedSteps:
+    """The solver that the system's steps replace."""
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    inner = CondensedSteps(model.links, model.joints, scheme, model.damping, None)
+    return ActedSteps(inner, actions(scene, model))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_all_that_is_recorded_is_as_by_the_condensed_solver(name: str) -> None:
+    """To the tolerances of both, of the largest value of each channel's quantity."""
+    solver, found = channels(SCENES[name](), steps_of)
+    _, wanted = channels(SCENES[name](), condensed)
+    assert isinstance(solver, SystemSteps)
+    assert found.keys() == wanted.keys()
+    assert any(key.startswith(("springs/", "motors/")) for key in found)
+    for key, x in wanted.items():
+        size = max(float(np.abs(x).max()), 1e-9)
+        assert np.abs(found[key] - x).max() < 1e-7 * size, key
