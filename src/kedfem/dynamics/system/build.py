@@ -65,6 +65,7 @@ def system_of(
     found = _Builder(scene, linkage, model)
     for joint in model.rows:
         found.joint(joint)
+    found.between_prescribed({joint.name for joint in model.rows})
     names = tuple(link.name for link in model.links)
     k = int(model.joints[0].B.shape[1])
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
@@ -95,6 +96,34 @@ class _Builder:
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)
+
+    def between_prescribed(self, known: set[str]) -> None:
+        """Springs and motors between the ground and what drives carry: no unknowns, but hubs bear them."""
+        for kind in ("springs", "motors"):
+            for name, element in getattr(self.scene, kind).items():
+                if f"{kind}.{name}" in known:
+                    continue
+                points = getattr(element, "between", None)
+                links = (
+                    [end.link for end in points] if points else ordered(self.scene.joints[str(element.joint)])
+                )
+                i, j = (self.linkage.bodies.index(link) for link in links)
+                none, zero = np.zeros((0, 3)), np.zeros(3)
+                self.element(
+                    RowJoint(
+                        f"{kind}.{name}",
+                        zero,
+                        (i, j),
+                        (None, None),
+                        none,
+                        none,
+                        None,
+                        zero[:0],
+                        zero[:0],
+                        zero,
+                    ),
+                    element,
+                )
 
     def element(self, joint: RowJoint, element: object) -> None:
         """The law of a spring or motor on its coordinate, which its links' own motion tells."""
@@ -194,11 +223,9 @@ class _Builder:
     def end(self, joint: RowJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
-        end = _rigid_end(joint.bodies[side], at, self.unknowns) if found is None else _end(found)
+        end = _rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found)
         for n, other in enumerate(self.ends):
-            if other.body == end.body and np.array_equal(other.origin, end.origin) and (
-                other.onto.shape == end.onto.shape and np.array_equal(other.onto, end.onto)
-            ):  # fmt: skip
+            if same_end(other, end):
                 return n
         self.ends.append(end)
         return len(self.ends) - 1
@@ -209,12 +236,20 @@ class _Builder:
         return int(self.model.joints[0].B.shape[1])
 
 
+def same_end(one: End, other: End) -> bool:
+    """Whether two ends are one: on the same points of the same body."""
+    return one.body == other.body and all(
+        x.shape == y.shape and np.array_equal(x, y)
+        for x, y in ((one.origin, other.origin), (one.onto, other.onto))
+    )
+
+
 def _rigid_end(body: int, at: Vector, k: int) -> End:
     """An end on the ground or on a prescribed body."""
     return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
 
 
-def _end(side: Side) -> End:
+def end_of(side: Side) -> End:
     """An end on a body, or on a slider that rides on one."""
     onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
     p, d, _ = onto.shape

@@ -21,7 +21,7 @@ from kedfem.dynamics.system.arrays import (
 )
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
-from kedfem.dynamics.system.record import Driven, Held, Spring, System
+from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
@@ -46,7 +46,10 @@ class Ready:
 def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
     """Factor all bodies of a system for a scheme."""
     model = system.model
-    linear = all(each.linear and isinstance(each.law, Held | Driven | Spring) for each in system.constraints)
+    linear = all(
+        without_unknowns(system, each) or (each.linear and isinstance(each.law, Held | Driven | Spring))
+        for each in system.constraints
+    )
     single = linear and all(link.fit is None for link in model.links)
     c = coefficients(scheme, model.damping, model.links, single, tolerance)
     parts = factored(model.links, model.joints, c)

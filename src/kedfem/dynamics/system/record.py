@@ -132,3 +132,8 @@ class System:
     constraints: tuple[Constraint, ...]
     unknowns: int
     model: Any
+
+
+def without_unknowns(system: System, each: Constraint) -> bool:
+    """Whether both ends move as prescribed: what a law exerts then bears on hubs alone."""
+    return all(system.ends[n].form == RIGID for term in each.terms for n in (term.i, term.j))
