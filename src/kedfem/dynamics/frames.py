@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.state import Nodal
+from kedfem.links.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential
 
@@ -90,7 +91,12 @@ def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
 
 
 def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:
-    """g = Qᵀ y − X without its mean, which strains nothing; of a planar beam ψ less the frame's angle."""
+    """g = Qᵀ y − X without its mean, which strains nothing; of a planar beam ψ less the frame's angle.
+
+    Of a beam in space a displacement that has its strains, which no frame needs to tell.
+    """
+    if link.element is not None:
+        return np.asarray(link.element.share @ strains_of(link.element, y)).reshape(y.shape)
     g = y @ Q - link.X[:, : link.d]
     if link.kind == "beam":
         g[:, 2] = y[:, 2] - angle * link.one
@@ -123,6 +129,9 @@ def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) 
     Kg = _times(frame.K0, now.g)
     energy = 0.5 * float(np.vdot(now.g, Kg))
     f = Kg + beta * _times(frame.K0, now.g1) if beta else Kg
+    if link.element is not None:
+        strains = link.element.rows @ (now.g + beta * now.g1).ravel()
+        return pulled_back(link.element, y, link.element.stiffness * strains), energy
     k = 2 if link.planar else 3
     A = y[:, :k].T @ frame.fit[:, :k]
     U = now.Q[:k, :k].T @ A

@@ -13,7 +13,8 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.frames import Followed, frames_of
 from kedfem.dynamics.segment import SegmentState
-from kedfem.links.record import Link
+from kedfem.links.metric import pulled_back, strains_of
+from kedfem.links.record import BeamElement, Link
 from kedfem.motion.newton import cross_matrix, rotation
 
 Rows = Float[np.ndarray, "N d"]
@@ -32,6 +33,7 @@ class Stack:
     planar, beam, follows, points : whether they turn about z only, have rows (u, v, ψ), frames that follow, many of them
     lumped : (N, d) the mass's diagonal, scaled to the whole mass (Hinton, Rock, Zienkiewicz 1976), for norms
     fit : (N, 3) of the mean rotation; fits : per frame; stiffness : K0 times rows, per frame; mass : M times rows
+    elements : of beams in space, whose strains need no frame
     """
 
     members: tuple[int, ...]
@@ -48,6 +50,7 @@ class Stack:
     fits: tuple[Float[np.ndarray, "N 3"], ...]
     stiffness: tuple[Times, ...]
     mass: Times
+    elements: tuple[BeamElement, ...] = ()
 
     @property
     def k(self) -> int:
@@ -157,6 +160,7 @@ def stacks(links: Sequence[Link]) -> list[Stack]:
             link.d,
             link.fit is None,
             len(link.frames),
+            link.element is not None,
             sp.issparse(link.K0),
         )
         kinds.setdefault(key, []).append(k)
@@ -179,6 +183,7 @@ def _stack(members: tuple[int, ...], links: Sequence[Link]) -> Stack:
         np.concatenate([link.X if link.fit is None else link.fit for link in links]),
         tuple(np.concatenate([every[e].fit for every in frames]) for e in range(len(frames[0]))),
         tuple(_flat(_below(each), d) for each in stiffness), _by_component(links),
+        tuple(link.element for link in links if link.element is not None),
     )  # fmt: skip
 
 
@@ -243,6 +248,9 @@ def rotations(
 
 def deformations(stack: Stack, y: Rows, Q: Each, angle: Float[np.ndarray, " s"]) -> Rows:
     """`frames.deformation` of all segments."""
+    if stack.elements:
+        every = zip(stack.elements, stack.parts(y), strict=True)
+        return np.concatenate([(x.share @ strains_of(x, part)).reshape(part.shape) for x, part in every])
     g = stack.turned(y, Q)
     g -= stack.X
     if stack.beam:
@@ -255,6 +263,9 @@ def deformations(stack: Stack, y: Rows, Q: Each, angle: Float[np.ndarray, " s"])
 
 def frame_forces(stack: Stack, fit: Float[np.ndarray, "N 3"], now: StackFrame, f: Rows, y: Rows) -> Rows:
     """`frames.frame_force` of all segments from f = K0 (g + β g') in their frames; in the nominal frame."""
+    if stack.elements:
+        every = zip(stack.elements, stack.parts(y), stack.parts(f), strict=True)
+        return np.concatenate([pulled_back(x, part, x.share.T @ own.ravel()) for x, part, own in every])
     k = stack.k
     U = now.Q[:, :k, :k].transpose(0, 2, 1) @ stack.moments(y, fit)
     if stack.planar:

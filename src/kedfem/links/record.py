@@ -36,6 +36,34 @@ class BeamPoint:
 
 
 @dataclass(frozen=True, slots=True)
+class BeamElement:
+    """An element of a beam in space with E Gauss points, m nodes, K gradient functions and s strains: `links.metric`.
+
+    tangents : (E, n) x' at the Gauss points from the position; gradients : (K, n) the g_k of all nodes from it
+    node, drawn : (K,) whose they are, (K, 3) as drawn; directors : (m, 2, 3) n1, n2 as drawn
+    N, D : (E, m) interpolation and its derivative by arc length; bend : (E, 4) n1'·t, n2'·t, n1'·n2, n2'·n1 as drawn
+    pairs : (P, 2) which gradient functions the strains within sections pair
+    stiffness : (s,) of the strains, with the length that belongs to a Gauss point; s = 6 E + P
+    drawn_strains : (s,) what the formulas give as drawn
+    rows, share : (s, 3n) strains for small displacements; (3n, s) a displacement that has given strains
+    """
+
+    tangents: Float[np.ndarray, "E n"]
+    gradients: Float[np.ndarray, "K n"]
+    node: Int[np.ndarray, " K"]
+    drawn: Float[np.ndarray, "K 3"]
+    directors: Float[np.ndarray, "m 2 3"]
+    N: Float[np.ndarray, "E m"]
+    D: Float[np.ndarray, "E m"]
+    bend: Float[np.ndarray, "E 4"]
+    pairs: Int[np.ndarray, "P 2"]
+    stiffness: Float[np.ndarray, " s"]
+    drawn_strains: Float[np.ndarray, " s"]
+    rows: Float[np.ndarray, "s k"]
+    share: Float[np.ndarray, "k s"]
+
+
+@dataclass(frozen=True, slots=True)
 class Frame:
     """A part of a segment's strain energy, ½ gᵀ K0 g, seen from a frame that follows a part of the segment's shape.
 
@@ -87,6 +115,7 @@ class Link:
     rigid : whether the link only moves rigidly; then it has no stress
     fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
+    element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
     faces : those with names, of a solid from CAD or from a mesh file with groups
     way : how the mesh of a part from CAD was made, in words; else empty
     """
@@ -114,6 +143,7 @@ class Link:
     rigid: bool = False
     fit: Float[np.ndarray, "n 3"] | None = None
     frames: tuple[Frame, ...] = ()
+    element: BeamElement | None = None
     faces: tuple[LinkFace, ...] = ()
     way: str = ""
 

@@ -43,7 +43,7 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     read_only(Q, one, X, m1, mX)
     made = replace(
         link, X=X, one=one, mass=mass, K0=K0, m1=m1, mX=mX, volume=volume, full=link, Q=Q,
-        fit=None if link.fit is None else Q.T @ link.fit, frames=(),
+        fit=None if link.fit is None else Q.T @ link.fit, frames=(), element=None,
     )  # fmt: skip
     return replace(made, K0=_unstrained(K0, rigid_modes(made)))
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
@@ -17,17 +18,15 @@ from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beam_axis import Axis
 from kedfem.links.plane import plane_link
+from kedfem.links.metric import beam_element
 from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
-from kedfem.links.spatial_beam import spatial_beam_link
+from kedfem.links.spatial_beam import rigidities, spatial_beam_link
 from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.hexahedra import Face
 from kedfem.scene import Material
 
-HUBS_STIFF = (
-    3.0  # of E A L of an element: stiffer ones resist being turned against their segment, softer ones bend
-)
 SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
 Interval = tuple[float, float]
@@ -268,9 +267,11 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
     if section is None:
         raise TypeError(f"links.{link.name}: has no section")  # a beam has
     own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
-    return replace(
-        following(spatial_beam_link(link.name, own, section, material, HUBS_STIFF)), axes=link.axes
-    )
+    part = spatial_beam_link(link.name, own, section, material)
+    x, order = own.frame[own.cells[0]][:, [0, 2, 3]], own.node[own.cells[0]]
+    element = beam_element(x, part.X, part.one, order, rigidities(section, material))
+    K0 = sp.csr_array((element.rows.T * element.stiffness) @ element.rows)
+    return replace(following(part), axes=link.axes, K0=K0, element=element)
 
 
 def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:

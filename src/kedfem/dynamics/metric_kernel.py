@@ -1,0 +1,244 @@
+"""Elements of beams in space by the change of their metric, compiled by numba: as `links.metric` has it.
+
+    element : (L,) number of a segment's element among these, -1 of others
+    sizes (b, 4) : Gauss points, nodes, gradient functions, pairs
+    tangents (b, E, S), gradients (b, K, S) : from coordinates
+    node (b, K), drawn (b, K, 3), directors (b, m, 2, 3), N, D (b, E, m), bend (b, E, 4)
+    stiffness, drawn_strains (b, s); rows (b, s, D S), share (b, D S, s) : strains of coordinates, and back
+    pairs (b, P, 2)
+"""
+
+import numpy as np
+
+from kedfem.compiled import compiled
+from kedfem.dynamics.frames_kernel import SPACE, rodrigues, rotation, turn_of
+
+TURNS = 50
+
+
+@compiled
+def metric_force(rates, i, elements, shapes, fit, R, u, before, now, Q, angle, turned, f, work, room):  # type: ignore[no-untyped-def]
+    """Internal force of segment i at the displacement u, added to f, world components.
+
+    Parameters
+    ----------
+    before, now, Q : as in `frames_kernel.held_together`; g is a displacement that has the strains
+    turned : (m, 3, 3) rotations of the nodes in the nominal frame; before the call earlier ones
+    work : of `held_together`; room : x' (E, 3), d (m, 2, 3), g (K, 3), forces on d, on g, on x', strains, stresses
+    """
+    n0, n1, n2, h1, h0, beta = rates
+    X = shapes[0]
+    y, forces, strained, A, U, change = work
+    numbers, sizes, tangents, gradients = elements[:4]
+    stiffness, rows, share = elements[10], elements[12], elements[13]
+    e = numbers[i]
+    E, _, K, P = sizes[e]
+    s, stress = room[6], room[7]
+    n = u.shape[2]
+    S = 6 * E + P
+    for b in range(3):
+        for j in range(n):
+            x = X[i, b, j]
+            for m in range(3):
+                x += R[i, m, b] * u[i, m, j]
+            y[b, j] = x
+            forces[b, j] = 0.0
+    rotation(i, SPACE, fit, y, Q, angle, A, U, change)
+    strains(e, elements, y, turned, room, A, U, change)
+    for r in range(3 * n):
+        x = 0.0
+        for m in range(S):
+            x += share[e, r, m] * s[m]
+        now[0, i, r] = x
+        strained[r] = 0.0
+        if beta != 0.0:
+            x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
+            x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
+            now[1, i, r], now[2, i, r] = x1, x2
+            strained[r] = beta * x1
+    for m in range(S):
+        x = s[m]
+        if beta != 0.0:
+            for r in range(3 * n):
+                x += rows[e, m, r] * strained[r]
+        stress[m] = stiffness[e, m] * x
+    pulled_back(e, elements, turned, room, U, change)
+    on_g, on_x = room[4], room[5]
+    for b in range(3):
+        for j in range(n):
+            x = 0.0
+            for k in range(K):
+                x += gradients[e, k, j] * on_g[k, b]
+            for p in range(E):
+                x += tangents[e, p, j] * on_x[p, b]
+            forces[b, j] = x
+    for b in range(3):
+        for m in range(3):
+            for j in range(n):
+                f[i, b, j] += R[i, b, m] * forces[m, j]
+
+
+@compiled
+def node_turns(elements, Q):  # type: ignore[no-untyped-def]
+    """Rotations (b, m, 3, 3) of all nodes to begin from: those of their segments, (L, 3, 3)."""
+    number, directors = elements[0], elements[6]
+    out = np.zeros((len(directors), directors.shape[1], 3, 3))
+    for i in range(len(number)):
+        for a in range(directors.shape[1] if number[i] >= 0 else 0):
+            out[number[i], a] = Q[i]
+    return out
+
+
+@compiled
+def roomy(elements):  # type: ignore[no-untyped-def]
+    """What a call needs room for, see `metric_force`."""
+    K, M, E, s = elements[4].shape[1], elements[6].shape[1], elements[7].shape[1], elements[10].shape[1]
+    return (np.zeros((E, 3)), np.zeros((M, 2, 3)), np.zeros((K, 3)), np.zeros((M, 2, 3)), np.zeros((K, 3)),
+            np.zeros((E, 3)), np.zeros(s), np.zeros(s))  # fmt: skip
+
+
+@compiled
+def strains(e, elements, y, turned, room, A, U, change):  # type: ignore[no-untyped-def]
+    """Strains of element e at the position y (3, S) in the nominal frame; x', g, d and rotations of its nodes."""
+    _, sizes, tangents, gradients, node, drawn, directors, N, D, bend, _, drawn_strains = elements[:12]
+    pairs = elements[14]
+    E, M, K, P = sizes[e]
+    x, d, g, s = room[0], room[1], room[2], room[6]
+    n = y.shape[1]
+    for k in range(K):
+        for b in range(3):
+            total = 0.0
+            for j in range(n):
+                total += gradients[e, k, j] * y[b, j]
+            g[k, b] = total
+    for a in range(M):
+        A[:] = 0.0
+        for k in range(K):
+            if node[e, k] == a:
+                for b in range(3):
+                    for m in range(3):
+                        A[b, m] += g[k, b] * drawn[e, k, m]
+        nearest(A, turned[a], U, change)
+        for c in range(2):
+            for b in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += turned[a, b, m] * directors[e, a, c, m]
+                d[a, c, b] = total
+    for p in range(E):
+        xx, x1, x2, xs1, xs2, d11, d12, d22, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for b in range(3):
+            total = 0.0
+            for j in range(n):
+                total += tangents[e, p, j] * y[b, j]
+            x[p, b] = total
+            d1, d2, s1, s2 = 0.0, 0.0, 0.0, 0.0
+            for a in range(M):
+                d1 += N[e, p, a] * d[a, 0, b]
+                d2 += N[e, p, a] * d[a, 1, b]
+                s1 += D[e, p, a] * d[a, 0, b]
+                s2 += D[e, p, a] * d[a, 1, b]
+            xx += total * total
+            x1 += total * d1
+            x2 += total * d2
+            xs1 += total * s1
+            xs2 += total * s2
+            d11 += d1 * d1
+            d12 += d1 * d2
+            d22 += d2 * d2
+            twist += d2 * s1 - d1 * s2
+        eps = np.sqrt(xx) - 1
+        a11, a12, a22 = (d11 - 1) / 2, d12 / 2, (d22 - 1) / 2
+        b1, b2, b3, b4 = bend[e, p, 0], bend[e, p, 1], bend[e, p, 2], bend[e, p, 3]
+        s[6 * p], s[6 * p + 1], s[6 * p + 2] = eps, x1, x2
+        s[6 * p + 3] = xs1 - b1 * (eps + a11) - b3 * x2 - b2 * a12
+        s[6 * p + 4] = xs2 - b2 * (eps + a22) - b4 * x1 - b1 * a12
+        s[6 * p + 5] = twist / 2 - b3 * (a11 + a22)
+    for q in range(P):
+        i, j = pairs[e, q, 0], pairs[e, q, 1]
+        total = 0.0
+        for b in range(3):
+            total += g[i, b] * g[j, b] - drawn[e, i, b] * drawn[e, j, b]
+        s[6 * E + q] = total * (0.5 if i == j else np.sqrt(0.5))
+    for m in range(6 * E + P):
+        s[m] -= drawn_strains[e, m]
+
+
+@compiled
+def pulled_back(e, elements, turned, room, U, w):  # type: ignore[no-untyped-def]
+    """Forces on x' and on the gradient functions of element e from its stresses."""
+    _, sizes, _, _, node, drawn, _, N, D, bend = elements[:10]
+    pairs = elements[14]
+    E, M, K, P = sizes[e]
+    x, d, g, on_d, on_g, on_x, _, stress = room
+    on_d[:] = 0.0
+    for p in range(E):
+        b1, b2, b3, b4 = bend[e, p, 0], bend[e, p, 1], bend[e, p, 2], bend[e, p, 3]
+        m1, m2, t = stress[6 * p + 3], stress[6 * p + 4], stress[6 * p + 5]
+        axial = stress[6 * p] - b1 * m1 - b2 * m2
+        v1, v2 = stress[6 * p + 1] - b4 * m2, stress[6 * p + 2] - b3 * m1
+        a11, a12, a22 = -b1 * m1 - b3 * t, -(b2 * m1 + b1 * m2) / 2, -b2 * m2 - b3 * t
+        axial /= np.sqrt(x[p, 0] ** 2 + x[p, 1] ** 2 + x[p, 2] ** 2)
+        for b in range(3):
+            d1, d2, s1, s2 = 0.0, 0.0, 0.0, 0.0
+            for a in range(M):
+                d1 += N[e, p, a] * d[a, 0, b]
+                d2 += N[e, p, a] * d[a, 1, b]
+                s1 += D[e, p, a] * d[a, 0, b]
+                s2 += D[e, p, a] * d[a, 1, b]
+            y = x[p, b]
+            on_x[p, b] = axial * y + v1 * d1 + v2 * d2 + m1 * s1 + m2 * s2
+            f1, f2 = v1 * y + a11 * d1 + a12 * d2 - t / 2 * s2, v2 * y + a22 * d2 + a12 * d1 + t / 2 * s1
+            g1, g2 = m1 * y + t / 2 * d2, m2 * y - t / 2 * d1
+            for a in range(M):
+                on_d[a, 0, b] += N[e, p, a] * f1 + D[e, p, a] * g1
+                on_d[a, 1, b] += N[e, p, a] * f2 + D[e, p, a] * g2
+    for a in range(M):
+        Q = turned[a]
+        t0, t1, t2 = 0.0, 0.0, 0.0
+        for c in range(2):
+            t0 += d[a, c, 1] * on_d[a, c, 2] - d[a, c, 2] * on_d[a, c, 1]
+            t1 += d[a, c, 2] * on_d[a, c, 0] - d[a, c, 0] * on_d[a, c, 2]
+            t2 += d[a, c, 0] * on_d[a, c, 1] - d[a, c, 1] * on_d[a, c, 0]
+        U[:] = 0.0
+        for b in range(3):
+            w[b] = Q[0, b] * t0 + Q[1, b] * t1 + Q[2, b] * t2
+        for k in range(K):
+            if node[e, k] == a:
+                for b in range(3):
+                    y = Q[0, b] * g[k, 0] + Q[1, b] * g[k, 1] + Q[2, b] * g[k, 2]
+                    for m in range(3):
+                        U[b, m] += y * drawn[e, k, m]
+        turn_of(U, w)
+        for k in range(K):
+            if node[e, k] == a:
+                y0 = w[1] * drawn[e, k, 2] - w[2] * drawn[e, k, 1]
+                y1 = w[2] * drawn[e, k, 0] - w[0] * drawn[e, k, 2]
+                y2 = w[0] * drawn[e, k, 1] - w[1] * drawn[e, k, 0]
+                for b in range(3):
+                    on_g[k, b] = Q[b, 0] * y0 + Q[b, 1] * y1 + Q[b, 2] * y2
+    for q in range(P):
+        i, j = pairs[e, q, 0], pairs[e, q, 1]
+        y = stress[6 * E + q] * (0.5 if i == j else np.sqrt(0.5))
+        for b in range(3):
+            on_i, on_j = y * g[j, b], y * g[i, b]
+            on_g[i, b] += on_i
+            on_g[j, b] += on_j
+
+
+@compiled
+def nearest(A, Q, U, change):  # type: ignore[no-untyped-def]
+    """Q of A = Q U in place, from an earlier one."""
+    for _ in range(TURNS):
+        for b in range(3):
+            for m in range(3):
+                U[b, m] = Q[0, b] * A[0, m] + Q[1, b] * A[1, m] + Q[2, b] * A[2, m]
+        change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
+        turn_of(U, change)
+        size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+        if size > 0.5:
+            for b in range(3):
+                change[b] *= 0.5 / size
+        rodrigues(change, Q, U)
+        if size <= 1e-8:  # the next, quadratically smaller, is rounding
+            break
