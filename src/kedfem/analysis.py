@@ -12,7 +12,6 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of, meaningless
 from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
 from kedfem.accuracy.histories import Histories
-from kedfem.accuracy.locking import Locking
 from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
@@ -126,7 +125,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
-    watched = _Watched(recorded, untold, efforts, recoveries, Locking(ready.model), SingularPasses(ready))
+    watched = _Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
     envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
@@ -156,7 +155,6 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         *efforts.warnings(),
         *undetermined_warning(untold),
         *peak_warning(peak),
-        *watched.locking.warnings(),
         *watched.passes.warnings(),
         *eased_warning(solvers),
         *coarse_steps(scene),
@@ -281,7 +279,6 @@ class _Watched:
     untold: dict[str, str]
     efforts: CrossChecks
     recoveries: list[StressRecovery]
-    locking: Locking
     passes: SingularPasses
 
 
@@ -313,7 +310,6 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 values = rows(watched.recorded, block)
                 table.add(block, values)
                 watched.efforts.add(block.motion, values)
-                watched.locking.add(block)
                 watched.passes.add(block)
                 seen.add(block)
                 errors.add(block, values)

@@ -1,4 +1,4 @@
-"""What once was silent: beams that lock, loads between the steps, eased tolerances, growth, mass in a plane."""
+"""What once was silent: beams that locked, loads between the steps, eased tolerances, growth, mass in a plane."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kedfem.accuracy.locking import Locking
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics import transient
 from kedfem.dynamics.loads import coarse_steps
@@ -17,22 +16,23 @@ from tests.moving import bar, ran
 from tests.rooms.test_driven_efforts import arm
 
 
-@pytest.mark.parametrize(("elements", "least", "most"), [(4, 30.0, 200.0), (16, 0.0, 0.0)])
-def test_a_run_says_that_beams_in_space_lock(elements: int, least: float, most: float) -> None:
-    """Against planar beams the arm bends too little by 56 and 0.9 %; below 2 % nothing is said."""
-    raw = arm("spatial", elements)
-    raw["analysis"] |= {"end_time": 0.1, "step": 1e-3}
-    raw["links"]["arm"]["shape"]["up"] = [0, 0, 1]  # 4 mm high in the plane
-    ready, blocks = ran(raw)
-    locking = Locking(ready.model)
-    for block in blocks:
-        locking.add(block)
-    found = locking.warnings()
-    assert len(found) == (1 if least else 0)
-    if found:
-        assert "links.arm: its beams in space are too stiff by some" in found[0]
-        assert f"{elements} elements): take" in found[0]
-        assert least < float(found[0].split("stiff by some ")[1].split(" %")[0]) < most
+@pytest.mark.parametrize(("elements", "cap"), [(1, 0.15), (2, 0.01), (4, 1e-3)])
+def test_beams_in_space_do_not_lock(elements: int, cap: float) -> None:
+    """A steel arm 125 times as long as high that bends by 4.5 % of its length, against planar beams of eight elements.
+
+    Linear strains seen from one frame of each element bent it too little by 91, 78 and 56 %.
+    """
+    tips = []
+    for kind, count in (("beam", 8), ("spatial", elements)):
+        raw = arm(kind, count)
+        raw["analysis"] |= {"end_time": 0.1, "step": 1e-3}
+        if kind == "spatial":
+            raw["links"]["arm"]["shape"]["up"] = [0, 0, 1]  # 4 mm high in the plane
+        ready, blocks = ran(raw)
+        last = ready.model.links[-1]
+        tip = np.flatnonzero(np.abs(last.X[:, 0] - 0.5) * (last.one != 0) + (last.one == 0) < 1e-9)
+        tips.append(np.concatenate([block.links[-1].u[:, tip[0], :2] for block in blocks]))
+    assert np.abs(tips[1] - tips[0]).max() < cap * np.abs(tips[0]).max()
 
 
 def loaded(factor: dict[str, Any]) -> tuple[str, ...]:

@@ -102,40 +102,12 @@ def follow_block(  # type: ignore[no-untyped-def]
                 for i in range(L):
                     if number[i] >= 0:
                         metric_force(
-                            rates,
-                            i,
-                            elements,
-                            shapes,
-                            fit,
-                            R,
-                            u1,
-                            g0,
-                            g1,
-                            Q1,
-                            angle1,
-                            turned_nodes[number[i]],
-                            f1,
-                            work,
-                            room,
-                        )
+                            rates, i, elements, shapes, fit, R, u1, g0, g1, Q1, angle1, turned_nodes[number[i]], f1, work, room
+                        )  # fmt: skip
                     elif not bends[i]:
                         held_together(
-                            rates,
-                            i,
-                            kinds[i],
-                            follows[i],
-                            shapes,
-                            fit,
-                            K,
-                            R,
-                            u1,
-                            g0,
-                            g1,
-                            Q1,
-                            angle1,
-                            f1,
-                            work,
-                        )
+                            rates, i, kinds[i], follows[i], shapes, fit, K, R, u1, g0, g1, Q1, angle1, f1, work
+                        )  # fmt: skip
             if sweep == 0 or settled:
                 mean_rotation(bends, fit, shapes[0], R, u1, Q1)
             if sweep == 0:

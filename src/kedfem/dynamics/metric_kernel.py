@@ -1,11 +1,11 @@
 """Elements of beams in space by the change of their metric, compiled by numba: as `links.metric` has it.
 
-    element : (L,) number of a segment's element among these, -1 of others
-    sizes (b, 4) : Gauss points, nodes, gradient functions, pairs
-    tangents (b, E, S), gradients (b, K, S) : from coordinates
-    node (b, K), drawn (b, K, 3), directors (b, m, 2, 3), N, D (b, E, m), bend (b, E, 4)
-    stiffness, drawn_strains (b, s); rows (b, s, D S), share (b, D S, s) : strains of coordinates, and back
-    pairs (b, P, 2)
+element : (L,) number of a segment's element among these, -1 of others
+sizes (b, 4) : Gauss points, nodes, gradient functions, pairs
+tangents (b, E, S), gradients (b, K, S) : from coordinates
+node (b, K), drawn (b, K, 3), directors (b, m, 2, 3), N, D (b, E, m), bend (b, E, 4)
+stiffness, drawn_strains (b, s); rows (b, s, D S), share (b, D S, s) : strains of coordinates, and back
+pairs (b, P, 2)
 """
 
 import numpy as np

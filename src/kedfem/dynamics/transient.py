@@ -179,7 +179,7 @@ def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge
 def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
     """What to do about a step that does not settle."""
     k, beams = stuck.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
-    needed = " (a beam in space needs about 32 elements where it bends by a quarter arc)" * (
+    needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)" * (
         stuck.link in beams
     )
     return (

@@ -20,10 +20,14 @@ from jaxtyping import Float, Int
 from kedfem.links.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
 
-SECTION_STIFF = 1.0  # of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
-HUB_STIFF = 1000.0  # of E I / l, at ends and corners: joints there strain by l / 1000 L of the beam's own rotation
-Vectors = Float[np.ndarray, "*b 3"]
-Column = Float[np.ndarray, "*b"]
+SECTION_STIFF = (
+    1.0  # of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
+)
+HUB_STIFF = (
+    1000.0  # of E I / l, at ends and corners: joints there strain by l / 1000 L of the beam's own rotation
+)
+Vectors = Float[np.ndarray, "*b _ 3"]
+Column = Float[np.ndarray, "*b _"]
 
 
 def beam_element(
@@ -90,9 +94,13 @@ def strains_of(element: BeamElement, y: Vectors) -> Column:
     kappa2 = _dot(x, s2) - b2 * (eps + a22) - b4 * gamma1 - b1 * a12
     tau = (_dot(d2, s1) - _dot(d1, s2)) / 2 - b3 * (a11 + a22)
     i, j = element.pairs.T
-    within = _pair_factors(element) * (_dot(g[..., i, :], g[..., j, :]) - _dot(element.drawn[i], element.drawn[j]))
+    within = _pair_factors(element) * (
+        _dot(g[..., i, :], g[..., j, :]) - _dot(element.drawn[i], element.drawn[j])
+    )
     beam = np.stack([eps, gamma1, gamma2, kappa1, kappa2, tau], axis=-1)
-    return np.asarray(np.concatenate([beam.reshape(*beam.shape[:-2], -1), within], axis=-1) - element.drawn_strains)
+    return np.asarray(
+        np.concatenate([beam.reshape(*beam.shape[:-2], -1), within], axis=-1) - element.drawn_strains
+    )
 
 
 def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:
@@ -109,9 +117,7 @@ def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:
     on_x = n * x / np.linalg.norm(x, axis=-1)[..., None] + v1 * d1 + v2 * d2 + m1 * s1 + m2 * s2
     on_d = (v1 * x + a11 * d1 + a12 * d2 - t / 2 * s2, v2 * x + a22 * d2 + a12 * d1 + t / 2 * s1)
     on_s = (m1 * x + t / 2 * d2, m2 * x - t / 2 * d1)
-    torque = sum(
-        np.cross(d[..., i, :], element.N.T @ on_d[i] + element.D.T @ on_s[i]) for i in range(2)
-    )
+    torque = sum(np.cross(d[..., i, :], element.N.T @ on_d[i] + element.D.T @ on_s[i]) for i in range(2))
     on_g = _turning(element, g, Q, np.asarray(torque))
     first, second = (np.eye(len(element.node))[:, each] for each in element.pairs.T)
     c = (_pair_factors(element) * stress[..., 6 * E :])[..., None]
@@ -119,9 +125,7 @@ def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:
     return np.asarray(element.tangents.T @ on_x + element.gradients.T @ on_g)
 
 
-def _turning(
-    element: BeamElement, g: Vectors, Q: Float[np.ndarray, "*b m 3 3"], torque: Vectors
-) -> Vectors:
+def _turning(element: BeamElement, g: Vectors, Q: Float[np.ndarray, "*b m 3 3"], torque: Vectors) -> Vectors:
     """Forces on gradient functions that do what torques (…, m, 3) do on the nodes' rotations."""
     out = np.zeros_like(g)
     for a in range(Q.shape[-3]):

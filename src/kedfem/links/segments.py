@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beam_axis import Axis
-from kedfem.links.plane import plane_link
 from kedfem.links.metric import beam_element
+from kedfem.links.plane import plane_link
 from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
