@@ -14,7 +14,7 @@ from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import component_first, coordinates, dense_part, rows_of, work_on, work_over_time
 from kedfem.dynamics.held import closed, closure
 from kedfem.dynamics.history import Forcing, LinkHistory
-from kedfem.dynamics.metric import element_tables
+from kedfem.dynamics.metric import element_tables, room_for
 from kedfem.dynamics.mixing import DEPTH
 from kedfem.dynamics.ports import port_vectors
 from kedfem.dynamics.scheme import Scheme
@@ -65,6 +65,7 @@ class FollowingDense:
         self._shapes, self._frames = self._fitted()
         self._beams = self._points()
         self._elements = element_tables(links, self.parts)
+        self._element_room = room_for(self._elements)
         self._acting = acting_on(actions, links, [part.T for part in self.parts])
         self._kinds = np.array([KINDS[link.kind] for link in links])
 
@@ -145,7 +146,7 @@ class FollowingDense:
         history = (u, v, a, g, strains, np.zeros((T, L, D, D)), np.empty((T, L, D * P)), np.empty((T, L)))
         taken, worst = follow_block(
             self.coefficients, self._matrices, self._unknowns, self._shapes, self._frames, self._beams,
-            self._elements, self._kinds,
+            self._elements, self._element_room, self._kinds,
             (R, F), over_block(self._acting, motion), state, history, self._memory, self._counts,
         )  # fmt: skip
         if self.actions:

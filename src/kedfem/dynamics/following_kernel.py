@@ -10,7 +10,7 @@ near the diagonal: from column `first` of each row on.
     frames : bends (L,) whether a segment is a planar beam that knows its strains, follows (L,) whether the frame of any
         other does; fit (L, D, S) weights of the frame's rotation, K (L, N, N) of the others
     beams : those that know their strains, see `dynamics.beams_kernel`
-    elements : those of beams in space, see `dynamics.metric_kernel`
+    elements, element_room : of beams in space and for one of them at a time, see `dynamics.metric`
     kinds : (L,) 0: rows (u, v, w), 1: (u, v), 2: (u, v, ψ)
     state : u, v, a, F, f (L, D, S), C (3, L, D, S), force (L, Q) in world components; Q (L, 3, 3), angle (L,) of the
         frame; g (3, L, N) seen from it, and rates; strain, direction, turn of `beams`; turned (A,) coordinates of actions
@@ -32,7 +32,7 @@ from kedfem.compiled import compiled
 from kedfem.dynamics.actions_kernel import external
 from kedfem.dynamics.beams_kernel import begun, bent, ended
 from kedfem.dynamics.frames_kernel import elastic_energy, held_together, mean_rotation, oriented
-from kedfem.dynamics.metric_kernel import metric_force, node_turns, roomy
+from kedfem.dynamics.metric_kernel import metric_force
 from kedfem.dynamics.mixing_kernel import factored, mixed, solved
 
 SWEEPS, PATIENCE, EASIER = 40, 12, 100.0  # as in `dynamics.following`
@@ -47,6 +47,7 @@ def follow_block(  # type: ignore[no-untyped-def]
     frames,
     beams,
     elements,
+    element_room,
     kinds,
     forcing,
     acting,
@@ -89,7 +90,7 @@ def follow_block(  # type: ignore[no-untyped-def]
     swept_work = (np.zeros(k), np.zeros((L, Qn)), np.zeros((D, n)), np.zeros((L, D * n)), np.zeros(D * n))
     parts = (G, Yt, RB, SRB, columns, count)
     others = not bends.all()
-    number, turned_nodes, room = elements[0], node_turns(elements, Q0), roomy(elements)
+    number = elements.number
     for t in range(T):
         R = Rs[t]
         begin_step(coefficients, R, state, u1, lasting, resisted)
@@ -101,8 +102,9 @@ def follow_block(  # type: ignore[no-untyped-def]
             if others:
                 for i in range(L):
                     if number[i] >= 0:
+                        e, X = number[i], shapes[0]
                         metric_force(
-                            rates, i, elements, shapes, fit, R, u1, g0, g1, Q1, angle1, turned_nodes[number[i]], f1, work, room
+                            rates, i, e, elements, X, fit, R, u1, g0, g1, Q1, angle1, f1, work, element_room
                         )  # fmt: skip
                     elif not bends[i]:
                         held_together(

@@ -1,6 +1,7 @@
 """Tables of the elements of beams in space as compiled loops take them, see `dynamics.metric_kernel`."""
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +13,35 @@ DIMENSIONS = (1, 2, 2, 1, 2, 3, 2, 2, 2, 1, 1, 2, 2, 2)
 WHOLE_NUMBERS = (0, 3, 13)  # sizes, node, pairs
 
 
-def element_tables(links: Sequence[Link], parts: Sequence[DensePart]) -> Tables:
-    """Of all links that are elements of beams in space, padded to the largest; in the coordinates of their parts."""
+class Elements(NamedTuple):
+    """All elements of beams in space, b of them, as `links.record.BeamElement` has each; filled up with zeros.
+
+    number : (L,) of a segment's element among these, -1 of others
+    sizes : (b, 4) Gauss points E, nodes m, gradient functions K, pairs P
+    tangents, gradients : (b, E, S), (b, K, S) from coordinates
+    node, drawn, directors, N, D, bend, pairs : (b, K), (b, K, 3), (b, m, 2, 3), (b, E, m) twice, (b, E, 4), (b, P, 2)
+    stiffness, drawn_strains : (b, s); rows, share : (b, s, 3 S), (b, 3 S, s) strains of coordinates, and back
+    """
+
+    number: Any
+    sizes: Any
+    tangents: Any
+    gradients: Any
+    node: Any
+    drawn: Any
+    directors: Any
+    N: Any
+    D: Any
+    bend: Any
+    stiffness: Any
+    drawn_strains: Any
+    rows: Any
+    share: Any
+    pairs: Any
+
+
+def element_tables(links: Sequence[Link], parts: Sequence[DensePart]) -> Elements:
+    """Of all links that are elements of beams in space; in the coordinates of their parts."""
     which = [k for k, link in enumerate(links) if link.element is not None]
     number, width = np.full(len(links), -1), max(link.n for link in links)
     number[which] = np.arange(len(which))
@@ -23,7 +51,15 @@ def element_tables(links: Sequence[Link], parts: Sequence[DensePart]) -> Tables:
         _padded([own[k] for own in made], size, int if k in WHOLE_NUMBERS else float)
         for k, size in enumerate(DIMENSIONS)
     )
-    return number, *tables
+    return Elements(number, *tables)
+
+
+def room_for(elements: Elements) -> Tables:
+    """Of one element at a time: rotations of nodes, x', d, g, forces on d, g and x', strains, stresses."""
+    K, M = elements.node.shape[1], elements.directors.shape[1]
+    E, s = elements.N.shape[1], elements.stiffness.shape[1]
+    shapes = ((M, 3, 3), (E, 3), (M, 2, 3), (K, 3), (M, 2, 3), (K, 3), (E, 3), (s,), (s,))
+    return tuple(np.zeros(shape) for shape in shapes)
 
 
 def _own(link: Link, x: BeamElement, part: DensePart, width: int) -> Tables:

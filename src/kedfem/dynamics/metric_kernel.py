@@ -1,11 +1,6 @@
 """Elements of beams in space by the change of their metric, compiled by numba: as `links.metric` has it.
 
-element : (L,) number of a segment's element among these, -1 of others
-sizes (b, 4) : Gauss points, nodes, gradient functions, pairs
-tangents (b, E, S), gradients (b, K, S) : from coordinates
-node (b, K), drawn (b, K, 3), directors (b, m, 2, 3), N, D (b, E, m), bend (b, E, 4)
-stiffness, drawn_strains (b, s); rows (b, s, D S), share (b, D S, s) : strains of coordinates, and back
-pairs (b, P, 2)
+Tables are those of `dynamics.metric.Elements`, room is that of `dynamics.metric.room_for`.
 """
 
 import numpy as np
@@ -17,53 +12,51 @@ TURNS = 50
 
 
 @compiled
-def metric_force(rates, i, elements, shapes, fit, R, u, before, now, Q, angle, turned, f, work, room):  # type: ignore[no-untyped-def]
-    """Internal force of segment i at the displacement u, added to f, world components.
+def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, work, room):  # type: ignore[no-untyped-def]
+    """Internal force of segment i, element e, at the displacement u, added to f, world components.
 
     Parameters
     ----------
-    before, now, Q : as in `frames_kernel.held_together`; g is a displacement that has the strains
-    turned : (m, 3, 3) rotations of the nodes in the nominal frame; before the call earlier ones
-    work : of `held_together`; room : x' (E, 3), d (m, 2, 3), g (K, 3), forces on d, on g, on x', strains, stresses
+    X, fit, before, now, Q : as in `frames_kernel.held_together`; g is a displacement that has the strains
+    work : of `held_together`
     """
     n0, n1, n2, h1, h0, beta = rates
-    X = shapes[0]
     y, forces, strained, A, U, change = work
-    numbers, sizes, tangents, gradients = elements[:4]
-    stiffness, rows, share = elements[10], elements[12], elements[13]
-    e = numbers[i]
-    E, _, K, P = sizes[e]
-    s, stress = room[6], room[7]
-    n = u.shape[2]
-    S = 6 * E + P
+    rows, share, tangents, gradients = elements.rows, elements.share, elements.tangents, elements.gradients
+    E, M, K, P = elements.sizes[e]
+    turned, s, stress, on_g, on_x = room[0], room[7], room[8], room[5], room[6]
+    n, width, S = u.shape[2], tangents.shape[2], 6 * E + P
     for b in range(3):
         for j in range(n):
             x = X[i, b, j]
             for m in range(3):
                 x += R[i, m, b] * u[i, m, j]
             y[b, j] = x
-            forces[b, j] = 0.0
     rotation(i, SPACE, fit, y, Q, angle, A, U, change)
-    strains(e, elements, y, turned, room, A, U, change)
-    for r in range(3 * n):
-        x = 0.0
-        for m in range(S):
-            x += share[e, r, m] * s[m]
-        now[0, i, r] = x
-        strained[r] = 0.0
-        if beta != 0.0:
-            x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
-            x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
-            now[1, i, r], now[2, i, r] = x1, x2
-            strained[r] = beta * x1
+    for a in range(M):
+        for b in range(3):
+            for m in range(3):
+                turned[a, b, m] = Q[i, b, m]
+    strains(e, elements, y, room, A, U, change)
+    for b in range(3):
+        for j in range(n):
+            r, x = b * n + j, 0.0
+            for m in range(S):
+                x += share[e, b * width + j, m] * s[m]
+            now[0, i, r] = x
+            if beta != 0.0:
+                x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
+                x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
+                now[1, i, r], now[2, i, r] = x1, x2
+                strained[r] = beta * x1
     for m in range(S):
         x = s[m]
         if beta != 0.0:
-            for r in range(3 * n):
-                x += rows[e, m, r] * strained[r]
-        stress[m] = stiffness[e, m] * x
-    pulled_back(e, elements, turned, room, U, change)
-    on_g, on_x = room[4], room[5]
+            for b in range(3):
+                for j in range(n):
+                    x += rows[e, m, b * width + j] * strained[b * n + j]
+        stress[m] = elements.stiffness[e, m] * x
+    pulled_back(e, elements, room, U, change)
     for b in range(3):
         for j in range(n):
             x = 0.0
@@ -79,31 +72,12 @@ def metric_force(rates, i, elements, shapes, fit, R, u, before, now, Q, angle, t
 
 
 @compiled
-def node_turns(elements, Q):  # type: ignore[no-untyped-def]
-    """Rotations (b, m, 3, 3) of all nodes to begin from: those of their segments, (L, 3, 3)."""
-    number, directors = elements[0], elements[6]
-    out = np.zeros((len(directors), directors.shape[1], 3, 3))
-    for i in range(len(number)):
-        for a in range(directors.shape[1] if number[i] >= 0 else 0):
-            out[number[i], a] = Q[i]
-    return out
-
-
-@compiled
-def roomy(elements):  # type: ignore[no-untyped-def]
-    """What a call needs room for, see `metric_force`."""
-    K, M, E, s = elements[4].shape[1], elements[6].shape[1], elements[7].shape[1], elements[10].shape[1]
-    return (np.zeros((E, 3)), np.zeros((M, 2, 3)), np.zeros((K, 3)), np.zeros((M, 2, 3)), np.zeros((K, 3)),
-            np.zeros((E, 3)), np.zeros(s), np.zeros(s))  # fmt: skip
-
-
-@compiled
-def strains(e, elements, y, turned, room, A, U, change):  # type: ignore[no-untyped-def]
+def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
     """Strains of element e at the position y (3, S) in the nominal frame; x', g, d and rotations of its nodes."""
-    _, sizes, tangents, gradients, node, drawn, directors, N, D, bend, _, drawn_strains = elements[:12]
-    pairs = elements[14]
-    E, M, K, P = sizes[e]
-    x, d, g, s = room[0], room[1], room[2], room[6]
+    tangents, gradients, node, drawn = elements.tangents, elements.gradients, elements.node, elements.drawn
+    directors, N, D, bend, pairs = elements.directors, elements.N, elements.D, elements.bend, elements.pairs
+    E, M, K, P = elements.sizes[e]
+    turned, x, d, g, s = room[0], room[1], room[2], room[3], room[7]
     n = y.shape[1]
     for k in range(K):
         for b in range(3):
@@ -161,16 +135,16 @@ def strains(e, elements, y, turned, room, A, U, change):  # type: ignore[no-unty
             total += g[i, b] * g[j, b] - drawn[e, i, b] * drawn[e, j, b]
         s[6 * E + q] = total * (0.5 if i == j else np.sqrt(0.5))
     for m in range(6 * E + P):
-        s[m] -= drawn_strains[e, m]
+        s[m] -= elements.drawn_strains[e, m]
 
 
 @compiled
-def pulled_back(e, elements, turned, room, U, w):  # type: ignore[no-untyped-def]
+def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
     """Forces on x' and on the gradient functions of element e from its stresses."""
-    _, sizes, _, _, node, drawn, _, N, D, bend = elements[:10]
-    pairs = elements[14]
-    E, M, K, P = sizes[e]
-    x, d, g, on_d, on_g, on_x, _, stress = room
+    node, drawn, N, D = elements.node, elements.drawn, elements.N, elements.D
+    bend, pairs = elements.bend, elements.pairs
+    E, M, K, P = elements.sizes[e]
+    turned, x, d, g, on_d, on_g, on_x, _, stress = room
     on_d[:] = 0.0
     for p in range(E):
         b1, b2, b3, b4 = bend[e, p, 0], bend[e, p, 1], bend[e, p, 2], bend[e, p, 3]

@@ -6,6 +6,8 @@ one after the other; `at` says where each begins.
 
 from typing import Any, NamedTuple
 
+from kedfem.dynamics.metric import Elements
+
 
 class Coefficients(NamedTuple):
     """Of one member of generalised-α at a fixed step, and of Rayleigh damping.
@@ -58,7 +60,7 @@ class Bodies(NamedTuple):
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`
     column_at, columns : interface unknowns that each body knows; first : profile of their common matrix
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
-    beams : those that know their strains at points
+    beams : those that know their strains at points; elements : of beams in space, whose strains need no frame
     """
 
     at: Any
@@ -89,6 +91,7 @@ class Bodies(NamedTuple):
     fit: Any
     K: Any
     beams: Beams
+    elements: Elements
 
 
 class Ends(NamedTuple):
@@ -284,3 +287,4 @@ class Work(NamedTuple):
     end: Any
     vectors: Any
     law: Any
+    element: Any

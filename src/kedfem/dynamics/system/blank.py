@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from kedfem.dynamics.metric import room_for
 from kedfem.dynamics.mixing import DEPTH
 from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends, History, State, Trial, Work
 
@@ -49,7 +50,7 @@ def room(bodies: Bodies) -> Work:
     points = np.zeros((5, bodies.beams.tangent.shape[2]))
     return Work(
         y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
-        np.zeros((12, 3)), np.zeros(3),
+        np.zeros((12, 3)), np.zeros(3), room_for(bodies.elements),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from kedfem.compiled import inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import entry, held_together
+from kedfem.dynamics.metric_kernel import metric_force
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.record import COROTATIONAL, NOMINAL, TANGENTIAL
 
@@ -116,6 +117,10 @@ def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-
     rooms = (
         work.y[:N].reshape(d, n), work.turned[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
     )  # fmt: skip
+    if bodies.elements.number[i] >= 0:
+        metric_force(newmark(c), 0, bodies.elements.number[i], bodies.elements, X, fit, R[body : body + 1], moved, before,
+                     now, trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms, work.element)  # fmt: skip
+        return
     held_together(newmark(c), 0, bodies.kind[i], True, (X, one), fit, K, R[body : body + 1], moved, before, now,
                   trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms)  # fmt: skip
 

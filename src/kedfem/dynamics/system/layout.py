@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.metric import element_tables
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
@@ -131,6 +132,7 @@ def body_arrays(
             np.array([links[k].n for k in beams], int),
             *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
         ),
+        elements=element_tables(links, parts),
     )  # fmt: skip
 
 
