@@ -1,13 +1,17 @@
 """The step and the levels in time that a plan chooses: right, no dearer than needed, only what the scene leaves open."""
 
+from typing import Any
+
 import pytest
 
 from kedfem.accuracy import choices
-from kedfem.accuracy.choices import chosen_step
-from kedfem.accuracy.plan import STEP
+from kedfem.accuracy.choices import chosen_step, with_beams
+from kedfem.accuracy.histories import histories, relative_errors, worst
+from kedfem.accuracy.plan import STEP, plan_for
+from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_analysis
-from kedfem.scene import Scene, time_grid
+from kedfem.scene import Scene, following, scene_from, time_grid
 from tests.planned_steps import ASKED, Planned, four_bar, judged
 
 ALLOWED = STEP * ASKED
@@ -63,3 +67,35 @@ def test_factors_that_do_not_fit_twice_leave_one_level(monkeypatch: pytest.Monke
     monkeypatch.setattr(choices, "most_levels", lambda model: 1)
     scene, _, _ = chosen(four_bar(600, BEAMS, turns=0.5))
     assert scene.analysis.levels == 1
+
+
+def test_what_nothing_drives_has_its_beams_chosen() -> None:
+    """A beam that a joint lets fall: its stated step stays, frames follow, and one beam3 is not taken unseen."""
+    raw: dict[str, Any] = {
+        "gravity": [0, -9.81, 0],
+        "links": {"arm": {
+            "fidelity": "beam", "material": "pom",
+            "shape": {"kind": "bar", "between": [[0, 0], [0.6, 0]], "width": 0.008, "thickness": 0.02},
+        }},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "damping": {"beta": 1e-4},
+        "analysis": {"end_time": 0.3, "step": 3e-4},
+        "output": {"probes": {
+            "bent": {"link": "arm", "at": [0.3, 0], "quantity": "deflection"},
+            "root": {"link": "arm", "at": [0.15, 0.004], "quantity": "stress"},
+        }},
+    }  # fmt: skip
+    plan = plan_for(scene_from(raw))
+    assert plan is not None
+    assert plan.scene.links["arm"].element == "beam5"
+    assert time_grid(plan.scene).steps == 1000
+    assert following(plan.scene)
+    assert not any(share.what == "frames" for share in plan.shares)
+    coarse, chosen_, fine = (
+        histories(meshed(with_beams(plan.scene, ["arm"], each) if each else plan.scene))
+        for each in (("beam3", 1), None, ("beam5", 8))
+    )
+    assert worst(relative_errors(coarse, fine)) > 0.05  # 9.7 %, in the stress
+    assert worst(relative_errors(chosen_, fine)) < 0.01
+    raw["links"]["arm"]["fidelity"] = "solid"
+    assert plan_for(scene_from(raw)) is None

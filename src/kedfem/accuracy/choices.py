@@ -46,7 +46,9 @@ UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 
 
 def open_frames(scene: Scene) -> bool:
-    """Whether the scene leaves its frames open."""
+    """Whether the scene leaves its frames open; without a drive they follow."""
+    if not scene.driven_joints:
+        return False
     stated = "frames" in scene.analysis.model_fields_set or scene.analysis.stiffening
     return not stated and all(link.frames is None for link in scene.links.values())
 
@@ -74,6 +76,13 @@ def open_meshes(scene: Scene) -> list[str]:
     ]  # fmt: skip
 
 
+def beams_only(scene: Scene) -> bool:
+    """Whether all links with a shape are beams or rigid."""
+    return all(
+        link.family == "beam" or link.fidelity == "rigid" for link in scene.links.values() if link.shape
+    )
+
+
 def _elastic(link: LinkScene, family: str) -> bool:
     return link.shape is not None and link.fidelity not in {"rigid", "auto"} and link.family == family
 
@@ -89,10 +98,7 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     geometric = GeometricError(ready.model)
     histories(ready, look=geometric.add)
     error = geometric.estimate
-    beams = all(
-        link.family == "beam" or link.fidelity == "rigid" for link in scene.links.values() if link.shape
-    )
-    if error <= (FOLLOWED if beams else DEARER) * search.asked:
+    if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
         return scene, error
     if any(_elastic(scene.links[name], "beam") for name in spatial_beams(scene)):
         search.notes.append(

@@ -16,6 +16,7 @@ from typing import Any
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.choices import (
     DEARER,
+    beams_only,
     chosen_beams,
     chosen_frames,
     chosen_meshes,
@@ -86,14 +87,19 @@ class Plan:
 
 
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
-    """The plan of a scene that leaves something open; None of one that asks for plain defaults or moves by itself.
+    """The plan of a scene that leaves something open; None of one that asks for plain defaults.
+
+    Of scenes without a drive those of beams and rigid links: solids that move freely are not reduced, and trials of them
+    would be as dear as the run.
 
     Raises
     ------
     MotionError, MeshError, SceneError, SolveError
         If the scene cannot be run even as it stands.
     """
-    if scene.analysis.accuracy == "quick" or not scene.driven_joints or not anything_open(scene):
+    if scene.analysis.accuracy == "quick" or not anything_open(scene):
+        return None
+    if not scene.driven_joints and not beams_only(scene):
         return None
     return planned(scene, stage)
 
