@@ -402,8 +402,7 @@ def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, ar
     said = run_kedfem("run", arm)
     assert said.code == DOUBTFUL
     last = said.err.partition("doubtful: ")[2].replace("\n", " ")
-    assert last.startswith("estimated error of displacement over 100 %; ")
-    assert "energy unaccounted for" in last
+    assert "of energy unaccounted for" in last
     results = read_results(arm.with_name("arm-results") / "results.h5")
     assert (results.status, len(results.time)) == ("doubtful", 9)
     assert results.reason in last
