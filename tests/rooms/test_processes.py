@@ -13,13 +13,13 @@ import pytest
 BUSY = """
 import os, sys, time
 from pathlib import Path
-from kedfem.mesh.ways import apart
+from kedfem.mesh.apart import LONGEST, PART, apart
 
 def busy(file):
     file.write_text(str(os.getpid()))
     time.sleep(60)
 
-apart("part", busy, Path(sys.argv[1]))
+apart("part", PART, LONGEST, busy, Path(sys.argv[1]))
 """
 
 TOLD = """
