@@ -20,6 +20,7 @@ from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.dynamics.cost import factor_words
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.loads import coarse_steps
@@ -117,7 +118,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
-    solvers = clock.timed("factor", lambda: level_steps(scene, ready.model))
+    solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
     recoveries = clock.timed("recovery", lambda: _recoveries(ready.model))
@@ -237,18 +238,18 @@ class Clock:
     _name: str = ""
     _since: float = 0.0
 
-    def stage(self, name: str) -> None:
-        """End the running stage and begin the next."""
+    def stage(self, name: str, words: str = "") -> None:
+        """End the running stage and begin the next, told in its own words if there are any."""
         now = perf_counter()
         if self._name:
             self.seconds[self._name] = now - self._since
         self._name, self._since = name, now
         if name:
-            self.watch(name, 0, 0)
+            self.watch(words or name, 0, 0)
 
-    def timed(self, name: str, work: Callable[[], T]) -> T:
+    def timed(self, name: str, work: Callable[[], T], words: str = "") -> T:
         """Do the work of one stage."""
-        self.stage(name)
+        self.stage(name, words)
         out = work()
         self.stage("")
         return out

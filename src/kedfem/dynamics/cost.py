@@ -11,17 +11,13 @@ from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.model import Model
+from kedfem.mesh.room import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
-FACTOR_FLOPS, SOLVE_BYTES, FACTOR_BYTES = 1.0e4, 45.0, 22.0  # times N^1.5
-LINK_BYTES, ASSEMBLY_BYTES = (
-    5e3,
-    1.5e4,
-)  # times N: kept for each link; for one link at a time while it is assembled
-PLANE_FILL = 0.1  # of that a plane mesh has, from 18,000 to 240,000 unknowns
+FACTOR_FLOPS, SOLVE_BYTES = 1.0e4, 45.0  # times N^1.5
 SWEEPS = 4.0  # times the work of a step with nominal frames, where frames follow
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
@@ -64,6 +60,14 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
 def factor_bytes(model: Model) -> float:
     """Memory of the factors of all links, for one step size."""
     return FACTOR_BYTES * float(_fill(model).sum())
+
+
+def factor_words(model: Model) -> str:
+    """What is about to be factored, of large models with the memory that it takes, for whoever watches."""
+    unknowns = float(_unknowns(model).sum())
+    if unknowns <= TRIED:
+        return "factor"
+    return f"factor: {unknowns:,.0f} unknowns, about {factor_bytes(model) / 1e9:.2g} GB"
 
 
 def _unknowns(model: Model) -> Float[np.ndarray, " L"]:

@@ -15,7 +15,6 @@ what the balance M a = P − M R0'' − f + Wᵀ λ asks for is found from it by
 so that accelerations and joint forces of the combined state are in balance as the levels' are.
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,6 +30,7 @@ from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.segment import position
 from kedfem.dynamics.transient import Steps, block_length, first_states, steps_of, stresses_of, transient
 from kedfem.errors import SolveError
+from kedfem.mesh.room import memory
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
@@ -75,11 +75,6 @@ def most_levels(model: Model) -> int:
     return max(1, min(MOST, int(memory() / max(factor_bytes(model), 1.0))))
 
 
-def memory() -> float:
-    """Bytes of this machine."""
-    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
-
-
 def level_steps(scene: Scene, model: Model) -> list[Steps]:
     """The solver of each level, coarsest first, its matrices factored.
 
@@ -88,6 +83,14 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
     SolveError
         If the factors of all levels do not fit in memory, or an effective matrix is not positive definite.
     """
+    from kedfem.dynamics.cost import factor_bytes
+
+    need = factor_bytes(model)
+    if need > memory():
+        raise SolveError(
+            f"links: must have factors that fit in this machine's memory of {memory() / 1e9:.3g} GB, got "
+            f"{model.unknowns:,} unknowns in all, whose factors take about {need / 1e9:.3g} GB; take larger elements"
+        )
     levels, fit = scene.analysis.levels or 1, most_levels(model)
     if levels > max(fit, 1):
         most = "1" if fit == 1 else f"at most {fit}"

@@ -15,6 +15,7 @@ from kedfem.mesh.plane import Quads
 from kedfem.mesh.plate import PlateSizes, plate_quads
 from kedfem.mesh.quads import quad_mesh
 from kedfem.mesh.quality import checked_mesh
+from kedfem.mesh.room import NODES_EACH, check_room
 from kedfem.mesh.tetrahedra import FORMS
 from kedfem.mesh.ways import NOTHING, KeptWhole, cad_mesh, file_axes
 from kedfem.scene import (
@@ -68,8 +69,13 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
             key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
             mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
         case _:
-            mesh = swept_mesh(link_plate(where, link, folder), _layers(link))
-    return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)
+            plate = link_plate(where, link, folder)
+            elements = len(plate.quads[1]) * _layers(link)
+            check_room(where, 3.0 * NODES_EACH[str(link.element)] * elements, link.fidelity != "rigid")
+            mesh = swept_mesh(plate, _layers(link))
+    mesh = FORMS[str(link.element)](mesh)
+    check_room(where, 3.0 * len(mesh.points), link.fidelity != "rigid")
+    return checked_mesh(where, mesh, link.min_quality)
 
 
 def part_mesh(link: LinkScene, folder: Path) -> SolidMesh:
@@ -92,8 +98,9 @@ def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:
 
     Parameters and errors are those of `link_mesh`; there are 9 nodes to an element.
     """
-    plate = link_plate(f"links.{name}", link, folder)
-    return checked_mesh(f"links.{name}", middle_mesh(plate), link.min_quality)
+    mesh = middle_mesh(link_plate(f"links.{name}", link, folder))
+    check_room(f"links.{name}", 2.0 * len(mesh.points), link.fidelity != "rigid", plane=True)
+    return checked_mesh(f"links.{name}", mesh, link.min_quality)
 
 
 def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:

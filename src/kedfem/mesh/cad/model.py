@@ -19,6 +19,7 @@ from kedfem.mesh.session import gmsh_model
 from kedfem.scene.shapes import Cad
 from kedfem.scene.wording import nearest
 
+MOST_FACES = 3000  # each takes some 10 ms, and pairs of them are compared
 _SAME = 1e-5  # of the solid's size: how far corners may be off where the file's text says
 
 
@@ -58,6 +59,13 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: str | None) -> Solid:
     """One solid of a file, which is read into gmsh's empty model and left alone there."""
     tags = read_solids(gmsh, file)
+    most = max(len(_boundary(gmsh, tag)) for tag in tags)
+    if most > MOST_FACES:
+        raise MeshError(
+            f"{file.where}: must hold solids of at most {MOST_FACES:,} faces, got one of {most:,} in {file.path}; "
+            "export surfaces instead of facets, leave out threads, knurls and lettering, or mesh it with another "
+            "program (shape.kind = 'mesh')"
+        )
     bodies = _bodies(gmsh, file, tags)
     names = _solid_names(gmsh, file, tags, bodies)
     tag = tags[_choice(key, file, names, link, wanted)]

@@ -1,0 +1,42 @@
+"""Memory that a link takes, forecast from its number of unknowns, before anything of that size is made."""
+
+import os
+
+from kedfem.errors import MeshError
+
+#: Of a link of N unknowns, `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD): bytes of the factor
+#: over N^1.5, of what is kept over N, and of what is there while one link is assembled.
+FACTOR_BYTES, LINK_BYTES, ASSEMBLY_BYTES = 22.0, 5e3, 1.5e4
+PLANE_FILL = 0.1  # of the factor that a plane mesh has, from 18,000 to 240,000 unknowns
+#: New nodes to each element of a large mesh of hexahedra, and of tetrahedra that divide them.
+NODES_EACH = {"hex8": 1, "hex20": 4, "hex27": 8, "tet10": 8}
+
+
+def memory() -> float:
+    """Bytes of this machine."""
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
+
+
+def check_room(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
+    """Refuse a link that this machine's memory cannot hold: the least that its matrices and their factor take.
+
+    Parameters
+    ----------
+    where : the link, for messages
+    unknowns : of its mesh, or at least so many
+    factored : whether its effective matrix is; that of a rigid link is not
+    plane : whether it is a plane mesh
+
+    Raises
+    ------
+    MeshError
+        With the forecast, and what to change.
+    """
+    kept = LINK_BYTES * unknowns
+    factor = FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
+    if kept + factor > memory():
+        raise MeshError(
+            f"{where}: must fit in this machine's memory of {memory() / 1e9:.3g} GB, got about {unknowns:,.0f} unknowns, "
+            f"which take at least {(kept + factor) / 1e9:,.3g} GB (matrices {kept / 1e9:,.3g}, their factor "
+            f"{factor / 1e9:,.3g}); take larger elements (mesh.size, mesh.elements, mesh.unknowns)"
+        )

@@ -1,0 +1,92 @@
+"""What does not fit in this machine's memory is refused from its count alone, before it is made or assembled."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kedfem.dynamics import cost, levels
+from kedfem.dynamics.levels import level_steps
+from kedfem.errors import MeshError, SolveError
+from kedfem.links import build
+from kedfem.mesh import link, room
+from kedfem.mesh.room import FACTOR_BYTES, LINK_BYTES, check_room
+from kedfem.scene import scene_from
+
+
+def arm(**changes: Any) -> Any:
+    shape = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.2, "thickness": 0.1}
+    raw = {
+        "links": {"arm": {"material": "steel", "shape": shape, **changes}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
+        "analysis": {"turns": 1},
+    }
+    return scene_from(raw)
+
+
+def test_five_million_unknowns_are_refused_before_they_are_meshed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bar of 1.3 million hexahedra: neither nodes nor matrices are made."""
+    monkeypatch.setattr(room, "memory", lambda: 64e9)
+    for never in ("swept_mesh", "checked_mesh"):
+        monkeypatch.setattr(link, never, lambda *_: pytest.fail("was meshed"))
+    monkeypatch.setattr(build, "solid_link", lambda *_: pytest.fail("was assembled"))
+    with pytest.raises(MeshError) as caught:
+        build.bare_link(arm(mesh={"elements": [330, 70, 18]}), "arm")
+    assert str(caught.value) == (
+        "links.arm: must fit in this machine's memory of 64 GB, got about 4,989,600 unknowns, which take at least 270 GB "
+        "(matrices 24.9, their factor 245); take larger elements (mesh.size, mesh.elements, mesh.unknowns)"
+    )
+
+
+def test_the_forecast_is_below_the_count_that_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody is refused whose mesh would have fitted; the count is near for large meshes."""
+    for element in ("hex8", "hex20", "hex27", "tet10"):
+        said: list[float] = []
+        monkeypatch.setattr(link, "check_room", lambda where, count, *_, said=said: said.append(count))
+        made = link.link_mesh(
+            "arm", arm(element=element, mesh={"elements": [20, 12, 10]}).links["arm"], Path()
+        )
+        assert said[1] == 3 * len(made.points)
+        assert 0.75 * said[1] < said[0] <= said[1]
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "plane", "fits"), [("solid", False, False), ("rigid", False, True), ("plane", True, True)]
+)
+def test_what_is_not_factored_or_flat_takes_less(
+    monkeypatch: pytest.MonkeyPatch, fidelity: str, plane: bool, fits: bool
+) -> None:
+    N = 1e6
+    monkeypatch.setattr(room, "memory", lambda: LINK_BYTES * N + 0.5 * FACTOR_BYTES * N**1.5)
+    if fits:
+        check_room("links.arm", N, fidelity != "rigid", plane)
+    else:
+        with pytest.raises(MeshError, match="must fit in this machine's memory"):
+            check_room("links.arm", N, fidelity != "rigid", plane)
+
+
+def test_links_that_fit_alone_but_not_together_are_refused_before_they_are_factored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from kedfem.accuracy.prepared import meshed
+
+    scene = arm(mesh={"elements": [4, 1, 1]})
+    model = meshed(scene).model
+    need = cost.factor_bytes(model)
+    monkeypatch.setattr(levels, "memory", lambda: 0.9 * need)
+    monkeypatch.setattr(levels, "steps_of", lambda *_: pytest.fail("was factored"))
+    with pytest.raises(SolveError, match=r"links: must have factors that fit in this machine's memory"):
+        level_steps(scene, model)
+
+
+def test_a_long_factorisation_is_told_with_unknowns_and_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    from kedfem.accuracy.prepared import meshed
+
+    model = meshed(arm(mesh={"elements": [4, 1, 1]})).model
+    assert cost.factor_words(model) == "factor"
+    monkeypatch.setattr(cost, "TRIED", 10)
+    words = cost.factor_words(model)
+    assert words.startswith(f"factor: {model.unknowns:,} unknowns, about ")
+    assert np.isfinite(float(words.split()[-2]))
