@@ -160,7 +160,7 @@ def measured(topology: str, n: int) -> Raw:
         return spent
 
     make = TOPOLOGIES[topology]
-    ran(make(6))
+    ran(make(18))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     raw = make(n)
     spent = ran(raw)

@@ -120,7 +120,9 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     ready, reduction = prepared(scene, clock.stage)
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
-    recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path))
+    recorded = clock.timed(
+        "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
+    )
     recoveries = clock.timed("recovery", lambda: _recoveries(ready.model))
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]

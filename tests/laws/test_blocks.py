@@ -138,3 +138,43 @@ def test_joints_of_rigid_links_bear_the_same(name: str, whole_up_to: Any) -> Non
         sizes[unit] = max(sizes.get(unit, 0.0), float(np.abs(wanted).max()))
     for key, wanted in other.items():
         assert_allclose(one[key], wanted, atol=1e-9 * sizes[key.rsplit("_", 1)[-1]])
+
+
+REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "a drive too many": (
+        dict(four_bar(0.3, 0.95, 0.35, 1.0, 1.2)),
+        {
+            "drives": {
+                x: {"joint": x, "motion": {"kind": "cycloidal", "angle": 0.1, "rise": 1.0}} for x in "AD"
+            }
+        },
+    ),
+    "a dead point as drawn": (
+        {
+            "A": ("revolute", "ground", "crank", (0.3, -0.4, 0.0), Z),
+            "B": ("revolute", "crank", "coupler", (0.3, 0.0, 0.0), Z),
+            "C": ("revolute", "coupler", "rocker", (0.7, 0.0, 0.0), Z),
+            "D": ("revolute", "rocker", "ground", (0.9, 0.0, 0.0), Z),
+        },
+        {},
+    ),
+    "a link that is free": (
+        {**four_bar(0.3, 0.95, 0.35, 1.0, 1.2), "E": ("revolute", "rocker", "flap", np.zeros(3), Z)},
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_driven_is_refused_the_same(name: str, whole_up_to: Any) -> None:
+    """The quick look at many bodies, least squares of each drive's rate, lets nothing pass that ranks refuse."""
+    joints, sections = REFUSED[name]
+    scene = linkage_scene(joints, None if sections else "A", sections=sections)
+
+    def refusal() -> str:
+        with pytest.raises(MotionError) as caught:
+            linkage(scene)
+        return str(caught.value)
+
+    one, other = (whole_up_to(many, refusal) for many in (0, 1000))
+    assert one == other

@@ -137,7 +137,11 @@ def budget(
 
 def wanted(ready: Prepared) -> tuple[str, ...]:
     """Kinds of channels that a scene has."""
-    return tuple(by_kind({each.channel.name: 0.0 for each in recording(ready.scene, ready.model)}))
+    return tuple(
+        by_kind(
+            {each.channel.name: 0.0 for each in recording(ready.scene, ready.model, linked=ready.linkage)}
+        )
+    )
 
 
 def spanned(scene: Scene, model: Model) -> Scene:

@@ -50,7 +50,9 @@ def histories(
     look : sees every block
     follow : sees every block with its rows
     """
-    recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
+    recorded = [
+        x for x in recording(ready.scene, ready.model, linked=ready.linkage) if asked_for(x.channel.name)
+    ]
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers):

@@ -44,7 +44,6 @@ class Linkage:
     joints : for each row the joint's name, or that of the coupling as `gears.NAME`
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
-    redundant : joints whose rows repeat what others already hold
     drives : what is driven
     start : poses (1, B, ...) that the path starts from
     mobility : free motions that the drives leave; as many rows, the last ones, hold these
@@ -56,7 +55,6 @@ class Linkage:
     joints: tuple[str, ...]
     size: float
     centre: Float[np.ndarray, "3"]
-    redundant: tuple[str, ...]
     drives: Drives
     start: Poses
     mobility: int = 0
@@ -66,6 +64,17 @@ class Linkage:
     def drive(self) -> str | None:
         """Name of the first driven joint; None where nothing is driven."""
         return self.drives.joints[0] if self.drives else None
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """Joints whose rows repeat what others already hold as drawn, by rank-revealing QR of Jᵀ."""
+        if not self.joints:
+            return ()
+        _, r, pivot = scipy.linalg.qr(
+            _jacobian(self.rows, len(self.bodies), self.size).T, pivoting=True, mode="economic"
+        )
+        rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
+        return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
 
 
 def linkage(scene: Scene) -> Linkage:
@@ -79,20 +88,36 @@ def linkage(scene: Scene) -> Linkage:
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
     rows, driven, drawn = _drawn(scene)
-    J, bodies, size = drawn.J, (GROUND, *drawn.links), drawn.size
-    if driven:
-        free = _check_mobility(scene, drawn)
-        held = _holding(scene, J, bodies, size, free)
-        J, rows = np.concatenate([J, drawn_jacobian(held, len(bodies), size)]), rows + held
-    else:
-        free = J.shape[1] - rank(J)
-    names = tuple(row.joint for row in rows)
-    start = resting_poses(1, len(bodies))
+    bodies, size = (GROUND, *drawn.links), drawn.size
     every = stacked(rows)
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
-    return Linkage(
-        bodies, every, names, size, drawn.centre, _redundant(J, names), driven, start, free, several
-    )
+    free = 0
+    if not driven:
+        free = drawn.J.shape[1] - rank(drawn.J)
+    elif several is None or not _well_driven(every, several, size):
+        free = _check_mobility(scene, drawn)
+        rows = rows + _holding(scene, drawn.J, bodies, size, free)
+        every = stacked(rows)
+        several = several and blocks(every, len(bodies), size)
+    names = tuple(row.joint for row in rows)
+    start = resting_poses(1, len(bodies))
+    return Linkage(bodies, every, names, size, drawn.centre, driven, start, free, several)
+
+
+def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
+    """Whether joints and drives hold every motion as drawn, and each drive can move alone: nothing is to be refused.
+
+    J has the rank of its columns, and its least squares leave nothing of the rates at which one drive moves.
+    """
+    f = features(rows, resting_poses(1, plan.count + 1), np.zeros((1, len(rows.angles))))
+    values = plan.values(rows, f, size)
+    greatest, least = plan.extremes(values)[0]
+    if least <= RANK_TOLERANCE * greatest:
+        return False
+    driven = np.flatnonzero(rows.drive >= 0)
+    rates = np.zeros((1, rows.count, len(driven)))
+    rates[0, driven, np.arange(len(driven))] = 1.0
+    return float(np.abs(plan.left(values, rates)).max()) <= RANK_TOLERANCE
 
 
 def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
@@ -240,9 +265,12 @@ def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
 
 def drawn_jacobian(rows: list[Row], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
     """Row derivatives in the drawn position, lengths divided by `size`."""
-    arrays = stacked(rows)
-    f = features(arrays, resting_poses(1, bodies), np.zeros((1, len(arrays.angles))))
-    return np.asarray(jacobian(arrays, f, bodies, size)[0])
+    return _jacobian(stacked(rows), bodies, size)
+
+
+def _jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
+    f = features(rows, resting_poses(1, bodies), np.zeros((1, len(rows.angles))))
+    return np.asarray(jacobian(rows, f, bodies, size)[0])
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:
@@ -307,12 +335,3 @@ def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, 
     change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T
     _, _, order = scipy.linalg.qr(change.T, pivoting=True, mode="economic")
     return [rows[k] for k in order[:free]]
-
-
-def _redundant(J: np.ndarray, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Joints that own the dependent rows, by rank-revealing QR of Jᵀ."""
-    if not names:
-        return ()
-    _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
-    rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
-    return tuple(sorted({names[k] for k in pivot[rank:]}))

@@ -47,7 +47,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
 
 def forecast(ready: Prepared) -> Cost:
     """Cost of a run: a few steps are taken and recorded as a run does; from sizes alone where they cannot be taken."""
-    recorded = recording(ready.scene, ready.model, None, ready.path)
+    recorded = recording(ready.scene, ready.model, None, ready.path, ready.linkage)
     try:
         return tried_cost(
             ready.scene, ready.linkage, ready.path, ready.model, lambda block: rows(recorded, block)

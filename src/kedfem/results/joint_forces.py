@@ -159,7 +159,7 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces
     attachment, link = model.joints[k], model.links[k]
     rows = rows_of_joint(attachment, joint)
     arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
-    shares = [(j, share[rows]) for j, share in enumerate(attachment.shares) if share[rows].any()]
+    shares = [(j, attachment.shares[j][rows]) for j in _sharing(attachment, rows)]
     from_rows = attachment.from_rows[rows]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
@@ -172,6 +172,15 @@ def _wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces
         return _resultant(link, placed(block), f.reshape(len(f), len(arms), link.d))
 
     return wrench
+
+
+def _sharing(attachment: Attachment, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " l"]:
+    """Links whose port forces tell some of a link's."""
+    if not attachment.shares:
+        return np.zeros(0, int)
+    ends = np.cumsum([share.shape[1] for share in attachment.shares])
+    told = np.concatenate(attachment.shares, axis=1)[rows].any(axis=0)
+    return np.unique(np.searchsorted(ends, np.flatnonzero(told), side="right"))
 
 
 def _arms_over_time(

@@ -61,8 +61,12 @@ class Followed:
         return np.asarray(motion.p2[:, b] + motion.R2[:, b] @ self.X + self.elastic(block, "a"))
 
 
-def probe_channels(scene: Scene, model: Model) -> list[Recorded]:
+def probe_channels(scene: Scene, model: Model, linked: Linkage | None = None) -> list[Recorded]:
     """The channels of all probes.
+
+    Parameters
+    ----------
+    linked : the scene's linkage, where that is at hand
 
     Raises
     ------
@@ -71,7 +75,7 @@ def probe_channels(scene: Scene, model: Model) -> list[Recorded]:
     """
     if not scene.output.probes:
         return []
-    linked = linkage(scene)
+    linked = linked or linkage(scene)
     return [_channel(scene, model, linked, name, probe) for name, probe in scene.output.probes.items()]
 
 

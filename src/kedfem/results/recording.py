@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import inertias_of_model
 from kedfem.dynamics.model import Model
-from kedfem.motion.linkage import linkage
+from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path
 from kedfem.results.acting import acting, measured_actions
 from kedfem.results.audit import Account, energy_channels
@@ -18,21 +18,23 @@ from kedfem.scene import Scene
 
 
 def recording(
-    scene: Scene, model: Model, account: Account | None = None, along: Path | None = None
-) -> list[Recorded]:
+    scene: Scene, model: Model, account: Account | None = None, along: Path | None = None,
+    linked: Linkage | None = None,
+) -> list[Recorded]:  # fmt: skip
     """All channels that a scene asks for.
 
     Parameters
     ----------
     account : of energy and momentum, if one is kept already
     along : path of the rigid motion, if joint forces of rigid links are wanted beside those of elastic ones
+    linked : the scene's linkage, where that is at hand
 
     Raises
     ------
     SceneError
         If a probe is outside its link.
     """
-    probes = probe_channels(scene, model)
+    probes = probe_channels(scene, model, linked)
     actions = account.actions if account else None
     forces = Forces(RowForces(model), actions or measured_actions(scene, model))
     account = account or Account(model, forces.actions)
@@ -47,7 +49,7 @@ def recording(
         *joints,
         *drive,
         *gears,
-        *_rigid(scene, model, along),
+        *_rigid(scene, model, along, linked),
         *acting(scene, forces.actions),
         *energies,
     ]
@@ -58,11 +60,11 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
     return {each.channel.name: each.rows(block) for each in recorded}
 
 
-def _rigid(scene: Scene, model: Model, along: Path | None) -> list[Recorded]:
+def _rigid(scene: Scene, model: Model, along: Path | None, linked: Linkage | None) -> list[Recorded]:
     """What joints and drive would bear were all links rigid."""
     if scene.driven is None:
         return []
-    linked = linkage(scene)
+    linked = linked or linkage(scene)
     forces = rigid_forces(scene, linked, inertias_of_model(scene, linked, model), along)
 
     def rows(name: str) -> Callable[[Block], Rows]:
