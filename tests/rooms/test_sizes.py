@@ -70,6 +70,7 @@ MISTAKES = [
     ("all in mm", four_bar(1000), "links.crank, coupler, rocker: 100 to 300 m long", "'25 mm'"),
     ("small, all in mm", four_bar(80, drive__motion__speed="3000 rpm"), "the end of links.crank moves at",
      "faster than any rotor"),
+    ("smaller, all in mm", four_bar(80, drive__motion__speed="450 rpm"), "would stretch it by 0.27 %", "'25 mm'"),
     ("one width in mm", four_bar(links__crank__shape__width=20), "links.crank.shape.width: 20 m", "'20 mm'"),
     ("GPa forgotten", four_bar(materials__mine__youngs_modulus=210), "mine.youngs_modulus: 210 Pa", "'210 GPa'"),
     ("MPa forgotten", four_bar(materials__mine__youngs_modulus=2.1e5), "youngs_modulus: 2.1e+05 Pa", "MPa"),

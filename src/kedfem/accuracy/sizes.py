@@ -16,6 +16,9 @@ GRAVITY = 100.0  # m/s²
 TURNS = 1e6  # rpm: beyond dental drills and turbochargers
 WIDE = 3.0, 2.0  # lengths of a link, and m, that its section may be wide
 TIP = 2000.0  # m/s of a driven link's end: beyond what any material bears in a rotor
+STRETCHED = 0.002  # strain of a long metal link by its own spin: a helicopter's blade has 0.001
+LONG = 3.0  # m, such a link
+METAL = 1e10  # Pa, its least modulus
 APART = 1e4  # longest of shortest link
 
 
@@ -156,3 +159,17 @@ def _other_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
                 f"drive of joint {name}: at {turns:.4g} rpm the end of links.{links[0]} moves at {tip:.4g} m/s, "
                 "faster than any rotor's: are lengths and speed in their units?"
             )
+        elif links and found.lengths[links[0]] > LONG and (strain := _spun(scene, links[0], tip)) > STRETCHED:
+            yield (
+                f"drive of joint {name}: at {turns:.4g} rpm the end of links.{links[0]} moves at {tip:.4g} m/s, and its "
+                f"own inertia would stretch it by {100 * strain:.2g} %, more than such large machines bear: "
+                "are lengths in mm? write '25 mm', or 0.025"
+            )
+
+
+def _spun(scene: Scene, link: str, tip: float) -> float:
+    """Strain at the root of a uniform bar that spins about its end, of a metal; 0 of others."""
+    material = scene.materials.get(scene.links[link].material or "")
+    if material is None or material.youngs_modulus < METAL:
+        return 0.0
+    return material.density * tip**2 / (2 * material.youngs_modulus)
