@@ -18,6 +18,7 @@ MODULES = (
     "statics",
     "planes",
     "spatial_beams",
+    "space_statics",
     "histories",
     "rotation",
     "stiffening",
