@@ -138,6 +138,13 @@ class TestApart:
         assert apart("rod.step", PART, LONGEST, loud) == 36
         assert capfd.readouterr() == ("", "")
 
+    def test_what_takes_too_much_memory_is_given_up_and_the_next_works(self) -> None:
+        with pytest.raises(
+            MeshError, match=r"^rod.step: .*, got one for which they need more than 6 GB of memory; mend"
+        ):
+            apart("rod.step", PART, LONGEST, np.ones, int(1e9))
+        assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
+
     def test_errors_come_through(self) -> None:
         with pytest.raises(ValueError, match="math domain"):
             apart("rod.step", PART, LONGEST, math.sqrt, -1.0)

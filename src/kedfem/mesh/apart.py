@@ -12,6 +12,7 @@ from kedfem.processes import end_with_parent
 
 LONGEST = 180  # seconds of processor time after which a part is given up
 READING = 60  # seconds of processor time after which a mesh file is given up
+MOST_MEMORY = 6e9  # bytes that the process may hold
 PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
 PART = (
     "must be a part that gmsh and OpenCASCADE can work on",
@@ -38,7 +39,7 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
     Raises
     ------
     MeshError
-        The process broke down, or took longer; or what the function raises.
+        The process broke down, took longer or more than MOST_MEMORY; or what the function raises.
     """
     from joblib.externals.loky import TimeoutError as LateError
     from joblib.externals.loky import get_reusable_executor
@@ -53,6 +54,9 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
             executor.shutdown(kill_workers=True)
             reason = f"got none within {PATIENCE} s"
             break
+        except MemoryError:
+            reason = f"got one for which they need more than {MOST_MEMORY / 1e9:g} GB of memory"
+            break
         except TerminatedWorkerError as error:
             reason = "got one at which they broke down"
             if "SIGXCPU" in str(error):
@@ -65,7 +69,13 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
 
 
 def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns, in silence; the process is ended if that takes more processor time than so much."""
+    """What a function returns, in silence; the process is ended if that takes more processor time than so much.
+
+    Raises
+    ------
+    MemoryError
+        It would hold more than MOST_MEMORY.
+    """
     end_with_parent()
     try:
         import resource
@@ -75,8 +85,12 @@ def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
     resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(process_time() + seconds)), hard))
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    bound = int(MOST_MEMORY) if most == resource.RLIM_INFINITY else min(int(MOST_MEMORY), most)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
     try:
         with silent():
             return work(*given)
     finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
         resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))

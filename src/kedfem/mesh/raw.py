@@ -68,7 +68,7 @@ def read_mesh(path: Path) -> RawMesh:
     ending = path.suffix.lower()
     try:
         return _through_gmsh(path) if ending in THROUGH_GMSH else _through_meshio(path)
-    except MeshError:
+    except (MeshError, MemoryError):
         raise
     except (Exception, SystemExit) as error:  # each of the readers fails in its own way
         raise MeshError(" ".join(str(error).split())[:300] or type(error).__name__) from error

@@ -3,7 +3,7 @@
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
@@ -23,6 +23,10 @@ _SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
 _LEAST = 0.1  # scaled Jacobian below which another way may do better
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
+_FAR_TOO_MANY = (
+    1_500_000  # unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
+)
+_UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 
 
@@ -150,14 +154,32 @@ def _mesh_along(
     with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
         size = share * plan_size(plan_with_cusps, sizing)
         plan, filled = without_cusps(plan_with_cusps, size)
+        layers = _layers(plan, size, sizing)
+        _check_count(solid, direction, float(layers.sum()), size, sizing)
         flat = plan_mesh(solid.name, plan, size, sizing.turn)
-    thicknesses = np.diff(plan.heights)
-    layers = np.maximum(np.rint(thicknesses / size).astype(int), max(1, sizing.layers))
     mesh = swept(flat, plan, layers)
     words = _way_in_words(direction, flat, plan, int(layers.sum()))
     if filled > 0:
         words += f"; cusps between touching edges filled, {100 * filled:.2g} % of the volume"
     return SolidMesh(mesh.points, mesh.cells, way=words)
+
+
+def _layers(plan: Plan, size: float, sizing: Sizing) -> Int[np.ndarray, " s"]:
+    """Layers of elements through each slab."""
+    return np.asarray(np.maximum(np.rint(np.diff(plan.heights) / size).astype(int), max(1, sizing.layers)))
+
+
+def _check_count(
+    solid: Solid, direction: Float[np.ndarray, "3"], layers: float, size: float, sizing: Sizing
+) -> None:
+    """Refuse, before anything is meshed, far more elements than anybody would take, unless a size is asked for."""
+    length = max(float((solid.high - solid.low) @ np.abs(direction)), size)
+    unknowns = _UNKNOWNS_EACH * layers * solid.volume / length / size**2
+    if sizing.size is None and sizing.across <= 2 and unknowns > _FAR_TOO_MANY:
+        raise OtherWayError(
+            f"{solid.name}: swept along {direction_in_words(direction)} it would have about {unknowns / 1e6:.2g} million "
+            f"unknowns, since its smallest step or wall asks for elements of {1e3 * size:.2g} mm"
+        )
 
 
 def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan, layers: int) -> str:
