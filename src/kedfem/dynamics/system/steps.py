@@ -23,7 +23,7 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.instant import Instant, turned
 from kedfem.dynamics.system.internal import own
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.record import Spring, System
+from kedfem.dynamics.system.record import System
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
@@ -32,21 +32,16 @@ Rows = Float[np.ndarray, "T _ _"]
 
 
 def nominal_system(scene: Scene, model: Model) -> System | None:
-    """The system of a scene whose links have nominal frames; None where its steps are not yet those of the system.
-
-    That is with slots, bushings and shafts, and where a link is reduced: its functions are not made for force elements.
-    """
+    """The system of a scene whose links have nominal frames; None with slots, which it does not know yet."""
     kinds = {joint.kind for joint in scene.joints.values()}
     names = [link.name for link in model.links]
-    if "slot" in kinds or len(set(names)) < len(names) or any(link.full is not None for link in model.links):
+    if "slot" in kinds or len(set(names)) < len(names):
         return None
     rigid = linkage(scene)
     ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, {})
     held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
     own = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
-    system = system_of(scene, rigid, model=own)
-    soft = any(each.linear and isinstance(each.law, Spring) for each in system.constraints)
-    return None if soft else system
+    return system_of(scene, rigid, model=own)
 
 
 class SystemSteps:
