@@ -19,6 +19,7 @@ from tests import scenes
 from tests.scenes import bar, cycloidal
 
 from .test_audit import EXAMPLES
+from .test_driven_efforts import arm as whipped
 from .test_dynamics import four_bar, slider_crank
 
 
@@ -109,6 +110,17 @@ def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
     plan = planned(scene_from(raw))
     assert plan.scene.links["arm"].fidelity in {"beam", "solid"}
     assert plan.reached
+
+
+def test_frames_follow_beams_in_space_that_bend_far() -> None:
+    """The arm bends by 4.5 % of its length, which nominal frames cannot have; linear strains would lock."""
+    raw = whipped("spatial", 2)
+    raw["links"]["arm"]["shape"]["up"] = [0, 0, 1]
+    del raw["analysis"]["frames"]
+    raw["analysis"] |= {"accuracy": 0.02}
+    plan = planned(scene_from(raw))
+    assert plan.scene.analysis.frames == "following"
+    assert any("frames follow" in note for note in plan.notes)
 
 
 def test_trials_that_differ_in_the_step_share_their_model() -> None:

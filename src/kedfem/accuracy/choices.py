@@ -13,7 +13,7 @@ from kedfem.accuracy.trials import TRIAL_STEPS, Trials, shortened
 from kedfem.accuracy.variants import refinable, refined, with_analysis, with_links, with_steps
 from kedfem.dynamics.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, spatial_beams, time_grid, turn_steps
+from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, time_grid, turn_steps
 
 FOLLOWED = (
     0.5  # of the accuracy: nominal frames that err by more give way to frames that follow, in scenes of beams
@@ -99,11 +99,6 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     histories(ready, look=geometric.add)
     error = geometric.estimate
     if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
-        return scene, error
-    if any(_elastic(scene.links[name], "beam") for name in spatial_beams(scene)):
-        search.notes.append(
-            "frames that follow would be needed; for beams in space they are not chosen unasked"
-        )
         return scene, error
     following = with_analysis(scene, frames="following")
     try:
