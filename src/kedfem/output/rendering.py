@@ -254,7 +254,7 @@ def draw_words(plotter: Any, title: str, exaggeration: float, cut: bool) -> None
 
     font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
     letters = int(plotter.window_size[0] / 16)
-    text = "\n".join(textwrap.wrap(title, letters, max_lines=2, placeholder=" …"))
+    text = "\n".join(textwrap.wrap(title, letters, max_lines=3, placeholder=" …"))
     words = plotter.add_text(text, (0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font)
     words.prop.justification_vertical = "top"
     words.prop.SetLineSpacing(1.2)
