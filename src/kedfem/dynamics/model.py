@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.coupling import Attachment, SharedCut, joined
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
-from kedfem.dynamics.places import on_part, part_seat, slider_axis
+from kedfem.dynamics.places import on_part, part_seat, slider_axis, slider_guide
 from kedfem.dynamics.row_joints import RowJoint, needs_rows
 from kedfem.dynamics.row_ports import Ways
 from kedfem.dynamics.slots import slot_ways
@@ -376,7 +376,7 @@ def _wide_seat(link: Link) -> str:
 
 def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
-    guide = next(key for key, joint in joints.items() if joint.kind == "prismatic")
+    guide = slider_guide(scene, name)
     for key, joint in joints.items():
         if key != guide and needs_rows(scene, key):
             raise SceneError(

@@ -11,7 +11,7 @@ from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, joint_seat
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import Scene
+from kedfem.scene import GROUND, Scene
 
 T = TypeVar("T")
 
@@ -20,8 +20,14 @@ def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
     if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
         return None
-    joint = next((j for j in scene.joints.values() if j.kind == "prismatic" and name in j.links), None)
-    return None if joint is None else joint_axis(joint)
+    guide = slider_guide(scene, name)
+    return joint_axis(scene.joints[guide]) if guide else None
+
+
+def slider_guide(scene: Scene, name: str) -> str:
+    """The joint on the ground that a rigid slider slides in, "" if there is none; it may carry further slides."""
+    on = (key for key, joint in scene.joints.items() if joint.kind == "prismatic" and name in joint.links)
+    return next((key for key in on if GROUND in scene.joints[key].links), "")
 
 
 def seat_of(scene: Scene, name: str, link: Link) -> Seat:

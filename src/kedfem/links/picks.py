@@ -62,7 +62,7 @@ def picked(
     if bores := _first([[each for each in found if each.inward] for found in about]):
         return _told(link, where, seen, bores)
     journals = _first([[each for each in found if not each.inward] for found in about])
-    if any(each.gap < 0 or link.d == 2 for each in journals):
+    if any(each.gap < -each.level or link.d == 2 for each in journals):
         return _told(link, where, seen, journals)
     if len(face := flat_face(link, seen)):
         return face
