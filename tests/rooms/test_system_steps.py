@@ -48,6 +48,7 @@ def bushed() -> dict[str, Any]:
     return raw
 
 
+DEAR = "solid links, reduced"
 SCENES = {
     "springs with dampers": lambda: four_bar("nominal", springs=line(200.0), steps=72),
     "from rest, damped links, rho_inf 0.8": lambda: four_bar(
@@ -57,7 +58,7 @@ SCENES = {
     "motor over speed": lambda: four_bar("nominal", motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
     "spring along a slide": slider_crank,
     "bushing and shaft": bushed,
-    "solid links, reduced": lambda: four_bar("nominal", "reduced", springs=line(20.0), steps=36),
+    DEAR: lambda: four_bar("nominal", "reduced", springs=line(20.0), steps=36),
     "plane links": lambda: four_bar(
         "nominal", "plane", springs=line(20.0), motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
 }  # fmt: skip
@@ -79,7 +80,9 @@ def condensed(scene: Any, model: Any) -> ActedSteps:
     return ActedSteps(inner, actions(scene, model))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=pytest.mark.long) if x == DEAR else x for x in SCENES]
+)
 def test_all_that_is_recorded_is_as_by_the_condensed_solver(name: str) -> None:
     """Of the largest value of all channels in the same unit; that solver finds first rates of bushings by differences."""
     within = 1e-7 if name == "bushing and shaft" else 1e-8

@@ -24,6 +24,7 @@ from kedfem.dynamics.system.instant import Instant, turned
 from kedfem.dynamics.system.internal import own
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import System
+from kedfem.errors import MeshError
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
@@ -32,14 +33,20 @@ Rows = Float[np.ndarray, "T _ _"]
 
 
 def nominal_system(scene: Scene, model: Model) -> System | None:
-    """The system of a scene whose links have nominal frames; None with slots, which it does not know yet."""
+    """The system of a scene whose links have nominal frames.
+
+    None with slots, which it does not know yet, and where a force element's seat does not tell how it turns as a whole.
+    """
     kinds = {joint.kind for joint in scene.joints.values()}
     names = [link.name for link in model.links]
     if "slot" in kinds or len(set(names)) < len(names):
         return None
     rigid = linkage(scene)
     ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, {})
-    held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
+    try:
+        held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
+    except MeshError:
+        return None
     own = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
     return system_of(scene, rigid, model=own)
 
