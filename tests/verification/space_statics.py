@@ -62,6 +62,14 @@ class Rod:
             K[np.ix_(dofs, dofs)] += (own + own.T) / 2
         return K[np.ix_(self.free, self.free)]
 
+    def stiffness(self) -> np.ndarray:
+        """K0 of all unknowns, for small displacements."""
+        K = np.zeros((self.X.size, self.X.size))
+        for of, element in self.elements:
+            dofs = (3 * of[:, None] + np.arange(3)).ravel()
+            K[np.ix_(dofs, dofs)] += (element.rows.T * element.stiffness) @ element.rows
+        return K
+
     def scaled(self, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A matrix with a unit diagonal, and what scales it: values and directions differ by lengths squared."""
         scale = 1 / np.sqrt(np.abs(np.diag(K)))
@@ -228,17 +236,32 @@ def buckling() -> list[Row]:
     return [Row("critical load [N]", lateral(1.0), critical_load(4), 0.01, "4 beam3")]
 
 
-# -- corners -------------------------------------------------------------------------------------------------
+# -- ends and corners -------------------------------------------------------------------------------------------------
+
+
+def hinge_error(elements: int) -> float:
+    """How much further the tip goes under a load along z if a hinge about z, not a clamp, holds the root's moment."""
+    axis = straight_axis(np.array([[0.0, 0, 0], [0.5, 0, 0]]), elements, 3, None)
+    rod = Rod(axis, FLAT, ALLOY)
+    along_x, along_z = (1 + int(np.abs(rod.X[1:4, k]).argmax()) for k in (0, 2))
+    pinned = np.array(
+        [0, 1, 2, *(3 * along_z + np.arange(3)), 3 * along_x + 1]
+    )  # two points on z, no turn about it
+    K, place = rod.stiffness(), 3 * rod.tip + 2
+    moved = []
+    for held in (pinned, np.arange(12)):
+        free = np.setdiff1d(np.arange(len(K)), held)
+        A, scale = rod.scaled(K[np.ix_(free, free)])
+        load = (free == place) * scale
+        moved.append(float(load @ np.linalg.solve(A, load)))
+    return moved[0] / moved[1] - 1
 
 
 def corner_errors(elements: int) -> Sequence[float]:
     """Tip compliances of an L with so many elements a leg, less Castigliano's, of these."""
     axis = straight_axis(np.array([[0.0, 0, 0], [0.5, 0, 0], [0.5, 0.3, 0]]), elements, 3, None)
     rod = Rod(axis, FLAT, ALLOY)
-    K = np.zeros((rod.X.size, rod.X.size))
-    for of, element in rod.elements:
-        dofs = (3 * of[:, None] + np.arange(3)).ravel()
-        K[np.ix_(dofs, dofs)] += (element.rows.T * element.stiffness) @ element.rows
+    K = rod.stiffness()
     A, scale = rod.scaled(K[np.ix_(rod.free, rod.free)])
     place = 3 * rod.tip + np.arange(3) - 12
     found = scale[:, None] * np.linalg.solve(A, np.diag(scale)[:, place])

@@ -5,7 +5,7 @@ import numpy as np
 from tests.rooms.test_driven_efforts import arm
 from tests.runs import ran
 
-from .space_statics import error, exact_slanted, slanted
+from .space_statics import error, exact_slanted, hinge_error, slanted
 
 
 def test_a_strip_bent_both_ways_and_twisted_converges_with_the_fourth_power_of_its_elements() -> None:
@@ -16,6 +16,14 @@ def test_a_strip_bent_both_ways_and_twisted_converges_with_the_fourth_power_of_i
     assert errors[1] < 1e-3
     assert np.all(slopes > 3.3)
     assert np.all(slopes < 4.7)
+
+
+def test_hinges_strain_the_end_of_a_beam_the_less_the_finer_its_mesh() -> None:
+    """An end is 1000 E I / l stiff: its share of the tip's compliance falls with l."""
+    errors = np.array([hinge_error(n) for n in (1, 4, 16)])
+    assert errors[0] < 1e-3
+    assert np.all(errors > 0)
+    assert np.all((np.diff(np.log2(errors)) > -2.2) & (np.diff(np.log2(errors)) < -1.6))
 
 
 def test_an_arm_that_whips_converges_as_planar_beams_do() -> None:
