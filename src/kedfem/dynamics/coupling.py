@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.dynamics.places import part_seat, slider_axis
 from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import Own, Ways, element_joint, gear_joint, row_joint
+from kedfem.dynamics.row_ports import Own, Ways, can_be_bars, element_joint, gear_joint, rigid_points, row_joint
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, port_weights
@@ -143,7 +143,8 @@ def joined(
         for kind, every in (("springs", scene.springs), ("motors", scene.motors))
         for name, element in (every.items() if elements else ())
     ]
-    for row, own in [*held_by_rows, *geared, *acting]:
+    stiff = [rigid_points(link, key, ways) for key, link in links.items() if elements and can_be_bars(link)]
+    for row, own in [*held_by_rows, *geared, *acting, *stiff]:
         if all(each is None for each in own):
             continue
         for each in own:

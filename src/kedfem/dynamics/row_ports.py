@@ -21,7 +21,7 @@ from kedfem.dynamics.row_joints import (
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import port_weights
+from kedfem.links.seats import port_weights, rigid_seat
 from kedfem.links.stations import stations
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import LineSpring, Motor, Scene, Spring
@@ -125,6 +125,27 @@ def element_joint(
         np.zeros(0), np.zeros(0), np.eye(3)[2],
     )  # fmt: skip
     return row, [first, second]
+
+
+def can_be_bars(link: Link) -> bool:
+    """Whether a link is a rigid one in space, which four of its points tell."""
+    return link.rigid and link.kind == "solid"
+
+
+def rigid_points(link: Link, key: str, ways: Ways) -> tuple[RowJoint, list[Own | None]]:
+    """Four points of a rigid link, its centre of mass and one along each axis, as a joint without rows."""
+    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    seat, length = rigid_seat(link, centre), link.size / 2
+    points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    weights = seat.fit[0] + length * np.concatenate([np.zeros((1, link.n)), seat.fit[1:]])
+    none, every = np.zeros((0, 3)), np.zeros((4, 6, 3))
+    every[:, :3] = np.eye(3)
+    side = Side(ways.bodies[link.name], centre, every, np.zeros((4, 3, 0)), points=points)
+    row = RowJoint(
+        f"rigid.{key}", centre, (ways.bodies[link.name], 0), (side, None), none, none, None, none[:, 0], none[:, 0],
+        np.eye(3)[2],
+    )  # fmt: skip
+    return row, [Own(key, "", points, weights, np.eye(12)), None]
 
 
 def _point_side(

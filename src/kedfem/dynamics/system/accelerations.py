@@ -1,20 +1,18 @@
-"""Accelerations that balance all forces and keep all constraints; of rigid links those of rigid bodies.
+"""Accelerations that balance all forces and keep all constraints; if asked, those of bodies that do not strain.
 
-A rigid link is a stiff one. Started without strain, or accelerated as its stiffness asks, it would ring. With P the
-motions without strain, its acceleration is a_c + b, a_c centripetal and b = P Pᵀ b:
+With P the motions of a body without strain, its acceleration is then a_c + b, a_c centripetal and b = P Pᵀ b:
 
     P Pᵀ b + s (1 − P Pᵀ) b = r − a_c − μ + Wᵀ λ,   μ + s (1 − P Pᵀ) b → μ
 
 which closes in on b without strain by a factor s each time.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import component_first, coordinates
+from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body
 from kedfem.dynamics.system.instant import Flat, Instant
 from kedfem.dynamics.system.internal import drawn, own, rows, turned_rate
@@ -23,51 +21,34 @@ from kedfem.motion.newton import cross_matrix
 
 STIFFER = 1e6  # s
 AGAIN = 3  # times: what strains is then 1e-18 of b
-REST = 1e-8  # mass of a rigid link, of its stiffness, where its strain is sought: it has its place where nothing holds it
 
 
 def accelerations(
-    now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: Sequence[bool] | None = None
+    now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: bool = False
 ) -> Solved:
     """Accelerations under forces r (N,), world components, with joints and constraints closed.
 
     Parameters
     ----------
     u, v : (N,) displacements and rates
-    rigid : bodies that accelerate as rigid ones do where they are; the rigid links if not given
+    rigid : whether all bodies accelerate as rigid ones do where they are
     """
     of = now.of
-    rigid = [link.rigid for link in of.system.model.links] if rigid is None else rigid
-    pure = [rigid_motions(now, k, u) if stiff else None for k, stiff in enumerate(rigid)]
+    pure = [rigid_motions(now, k, u) if rigid else None for k in range(len(of.parts))]
     held = []
     for P, part in zip(pure, of.parts, strict=True):
         one = np.eye(part.W.shape[1])
         held.append(held_body(one if P is None else P @ P.T + STIFFER * (one - P @ P.T), part.W))
     balance = Balance(of, held, now.R, asked)
-    turning, stress = centripetal(now, u, v, rigid), np.zeros_like(r)
-    for _ in range(AGAIN if any(rigid) else 1):
+    stress = np.zeros_like(r)
+    turning = centripetal(now, u, v) if rigid else stress
+    for _ in range(AGAIN if rigid else 1):
         found = balance.solved(r - turning - stress, turning)
         for k, P in enumerate(pure):
             if P is not None:
                 x = balance.turned(k, found.x[own(of, k)], back=True)
                 stress[own(of, k)] += STIFFER * balance.turned(k, x - P @ (P.T @ x))
     return replace(found, x=found.x + turning)
-
-
-def strained(now: Instant, a: Flat, asked: Asked) -> tuple[Flat, Flat]:
-    """The strain that carries accelerations a of rigid links: their displacement and z; others hardly strain."""
-    of, links = now.of, now.of.system.model.links
-    parts = list(zip(links, of.parts, strict=True))
-    stiffness = [component_first(part.T, link.K0) if link.rigid else None for link, part in parts]
-    highest = max(float(np.linalg.eigvalsh(K)[-1]) for K in stiffness if K is not None)
-    held, left = [], np.zeros_like(a)
-    for k, (K, part) in enumerate(zip(stiffness, of.parts, strict=True)):
-        one = highest * np.eye(part.W.shape[1])
-        held.append(held_body(STIFFER * one if K is None else REST * one + K, part.W))
-        if K is not None:
-            left[own(of, k)] = (now.F - a)[own(of, k)]
-    found = Balance(of, held, now.R, replace(asked, target=np.zeros_like(asked.target))).solved(left)
-    return found.x, found.z
 
 
 def rigid_motions(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "N m"]:
@@ -94,16 +75,14 @@ def _position(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "n d"]:
     return np.asarray(out)
 
 
-def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
+def centripetal(now: Instant, u: Flat, v: Flat) -> Flat:
     """([ω]² − [ω₀]²) X of bodies that turn at ω in all, ω₀ of it nominal; world components."""
     out = np.zeros_like(v)
     for k, link in enumerate(now.of.system.model.links):
-        if which[k]:
-            omega = cross_matrix(now.omega[k])
-            spin = omega + own_spin(link, rows(now.of, k, v[own(now.of, k)]), now.R[k])
-            X = _position(now, k, u)
-            rows_ = turned_rate(spin @ spin - omega @ omega, X)
-            out[own(now.of, k)] = coordinates(link, now.of.parts[k], rows_).ravel()
+        omega = cross_matrix(now.omega[k])
+        spin = omega + own_spin(link, rows(now.of, k, v[own(now.of, k)]), now.R[k])
+        moved = turned_rate(spin @ spin - omega @ omega, _position(now, k, u))
+        out[own(now.of, k)] = coordinates(link, now.of.parts[k], moved).ravel()
     return out
 
 

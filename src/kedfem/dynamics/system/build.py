@@ -5,13 +5,15 @@ are laws on the same coordinates.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.row_joints import RowJoint, Side, bore_axis, in_plane, joint_frame, ordered
+from kedfem.dynamics.row_ports import can_be_bars
 from kedfem.dynamics.system.record import (
     ANGLE,
     COORDINATE,
@@ -37,6 +39,7 @@ from kedfem.dynamics.system.record import (
     Term,
 )
 from kedfem.errors import SceneError
+from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
 from kedfem.motion.rows import CONSTRAINED, perpendiculars
@@ -68,7 +71,13 @@ def system_of(
     found.between_prescribed({joint.name for joint in model.rows})
     names = tuple(link.name for link in model.links)
     k = int(model.joints[0].B.shape[1])
+    model = replace(model, links=tuple(without_stiffness(x) if can_be_bars(x) else x for x in model.links))
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
+
+
+def without_stiffness(link: Link) -> Link:
+    """A rigid link whose bars hold it: it has no stiffness, and needs no frame of its own."""
+    return replace(link, K0=np.zeros_like(np.asarray(link.K0)), fit=None, frames=())
 
 
 @dataclass
@@ -84,7 +93,9 @@ class _Builder:
     def joint(self, joint: RowJoint) -> None:
         """What a joint constrains, a pair of gears couples, a spring or motor acts on."""
         scene, (kind, _, name) = self.scene, joint.name.rpartition(".")
-        if kind == "gears":
+        if kind == "rigid":
+            self.bars(joint)
+        elif kind == "gears":
             factor, first = joint.plus[0]
             of = scene.gears[name].joints
             terms = (*self.coordinate(of[1], joint, 1.0), *self.coordinate(of[0], first, factor))
@@ -96,6 +107,21 @@ class _Builder:
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)
+
+    def bars(self, joint: RowJoint) -> None:
+        """A rigid link: all distances between four of its points are as drawn."""
+        side = joint.sides[0]
+        if side is None:
+            return
+        ground, zero = self._numbered(_rigid_end(0, np.zeros(3), self.unknowns)), np.zeros(3)
+        ends = [
+            self._numbered(End(side.body, POINT, X, np.eye(3), np.ones(3), 0, onto[None]))
+            for X, onto in zip(side.points, np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto), strict=True)
+        ]
+        for i, j in combinations(range(len(ends)), 2):
+            a, b = side.points[i], side.points[j]
+            long = Term(DISTANCE, ends[i], ends[j], a, b, zero)
+            self.add(joint.name, (long, Term(DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint)
 
     def between_prescribed(self, known: set[str]) -> None:
         """Springs and motors between the ground and what drives carry: no unknowns, but hubs bear them."""
@@ -145,12 +171,7 @@ class _Builder:
     def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: RowJoint) -> None:
         """A constraint, linear where the frames of all its links are nominal."""
         numbers = {n for joint in joints for n in joint.bodies}
-        own = any(
-            link.fit is not None
-            for link, n in zip(self.model.links, self.model.bodies, strict=True)
-            if n in numbers
-        )
-        self.constraints.append(Constraint(name, terms, law, linear=not own))
+        self.constraints.append(Constraint(name, terms, law, linear=not numbers & self.own))
 
     def coordinate(
         self, name: str, joint: RowJoint, factor: float, turns: bool | None = None
@@ -224,11 +245,21 @@ class _Builder:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
         end = _rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found)
+        return self._numbered(end)
+
+    def _numbered(self, end: End) -> int:
+        """The number of an end; of one that is there already its own."""
         for n, other in enumerate(self.ends):
             if same_end(other, end):
                 return n
         self.ends.append(end)
         return len(self.ends) - 1
+
+    @property
+    def own(self) -> set[int]:
+        """Numbers of the bodies whose frames are not nominal."""
+        every = zip(self.model.links, self.model.bodies, strict=True)
+        return {n for link, n in every if link.fit is not None}
 
     @property
     def unknowns(self) -> int:

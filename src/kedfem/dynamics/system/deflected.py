@@ -140,7 +140,7 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
         hard = now.hard(C)
         m = np.where(hard, 0.0, now.forces(e)[:, 0])
         asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
-        return -accelerations(now, now.F - f, u, moving, asked, [True] * len(links)).x
+        return -accelerations(now, now.F - f, u, moving, asked, rigid=True).x
 
     u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v))
     return u, rate(u)

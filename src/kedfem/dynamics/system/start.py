@@ -1,6 +1,6 @@
 """Where a march begins at rest: rates as given, and accelerations that balance forces and keep all constraints.
 
-Rates of constraints are exact (`rates`). Rigid links begin with the strain that carries their accelerations.
+Rates of constraints are exact (`rates`), the bars of rigid links among them.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import coordinates
-from kedfem.dynamics.system.accelerations import accelerations, strained
+from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.balance import Asked, Balance, held_body
 from kedfem.dynamics.system.blank import empty_state
@@ -19,7 +19,7 @@ from kedfem.dynamics.system.march import Ready
 
 
 def rest(of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None, time: float = 0.0) -> State:
-    """The state at a time without elastic displacement, but for the strain of rigid links.
+    """The state at a time without elastic displacement.
 
     Parameters
     ----------
@@ -54,9 +54,6 @@ def begun(now: Instant, u: Flat, v: Flat) -> State:
     inside = now.inside(u, v)
     found = accelerations(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
     m[hard] = found.m
-    if not u.any() and any(link.rigid for link in of.system.model.links):
-        u, z = strained(now, found.x, asked)
-        inside = now.inside(u, v)
     e[2] += C @ found.z
     state = empty_state(of.bodies, of.constraints)
     for k, each in enumerate(inside):
