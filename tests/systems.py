@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.frames import frames_of
+from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import initial_rates
 from kedfem.dynamics.system.arrays import History, State
@@ -34,13 +35,16 @@ class Begun:
         return self.motion(self.ready.c.h * np.arange(first, first + count))
 
 
-def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True, **unchecked: Any) -> Begun:
+def begun(
+    raw: dict[str, Any], frames: str | None = None, driven: bool = True, today: bool = True, **unchecked: Any
+) -> Begun:
     """A scene as a system.
 
     Parameters
     ----------
     frames : given after the scene has been checked: what today's solvers refuse
     driven : whether its drives stay
+    today : whether there is a model as today's solvers have it, without points for springs, motors and rigid links
     unchecked : sections put in after the check
     """
     raw = {**raw, "analysis": {**raw["analysis"], "initial": "rest"}}
@@ -50,8 +54,10 @@ def begun(raw: dict[str, Any], frames: str | None = None, driven: bool = True, *
     if not driven:
         scene.fill(drive=None, drives={})
     scene.fill(**unchecked)
-    made = meshed(scene)
-    system = system_of(scene, made.linkage, made.path)
+    linkage, path = moving(scene)
+    system = system_of(scene, linkage, path)
+    model = elastic_model(scene, linkage, along=path) if today else system.model
+    made = Prepared(scene, linkage, path, model)
     of = ready(system, generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf))
 
     def motion(t: np.ndarray) -> RigidMotion:

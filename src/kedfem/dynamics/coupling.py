@@ -13,7 +13,15 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.dynamics.places import part_seat, slider_axis
 from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import Own, Ways, can_be_bars, element_joint, gear_joint, rigid_points, row_joint
+from kedfem.dynamics.row_ports import (
+    Own,
+    Ways,
+    can_be_bars,
+    element_joint,
+    gear_joint,
+    rigid_points,
+    row_joint,
+)
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.seats import Seat, holds, is_flat, port_weights
@@ -116,14 +124,16 @@ class Joined:
 
 
 def joined(
-    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways, elements: bool = False
-) -> Joined:
+    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways, elements: bool = False,
+    bars: bool = False,
+) -> Joined:  # fmt: skip
     """All joints of a scene, and cuts between segments, as attachments of its elastic links.
 
     Parameters
     ----------
     links : elastic links, or their segments, by a key of each
     elements : whether springs and motors get interface points, as joints without rows
+    bars : whether rigid links get points between which distances are kept
 
     Raises
     ------
@@ -143,7 +153,7 @@ def joined(
         for kind, every in (("springs", scene.springs), ("motors", scene.motors))
         for name, element in (every.items() if elements else ())
     ]
-    stiff = [rigid_points(link, key, ways) for key, link in links.items() if elements and can_be_bars(link)]
+    stiff = [rigid_points(link, key, ways) for key, link in links.items() if bars and can_be_bars(link)]
     for row, own in [*held_by_rows, *geared, *acting, *stiff]:
         if all(each is None for each in own):
             continue

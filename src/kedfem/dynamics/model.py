@@ -124,7 +124,7 @@ def elastic_model(
     ----------
     bare : `bare_links` of the scene, if they are there already
     along : the linkage's path over the drive's range, needed with slots
-    elements : whether springs and motors get interface points
+    elements : whether springs, motors and rigid links get interface points, as a system has them
 
     Raises
     ------
@@ -163,11 +163,11 @@ def elastic_model(
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = _made_rigid(scene, links)
+    links = _made_rigid(scene, links, thicken=elements)
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
-    held = joined(scene, links, cuts, ways, elements)
+    held = joined(scene, links, cuts, ways, elements, bars=elements)
     loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads
@@ -179,20 +179,41 @@ def elastic_model(
     )  # fmt: skip
 
 
-def _made_rigid(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
+def _made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
     """The same with rigid links made so: stiff beside the elastic ones, whatever they are made of themselves.
 
     Those whose frames follow are no stiffer than what bends them less by far in a step than the step's own error.
+
+    Parameters
+    ----------
+    thicken : whether a mass that lies in a plane gets next to no thickness, which bars between points need no more of
     """
     made = {key for key, link in links.items() if scene.links[link.name].fidelity == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out = dict(links)
     for key in made:
-        _with_extent(links[key])
+        link = _thickened(links[key]) if thicken else links[key]
+        _with_extent(link)
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
-        followed = links[key].fit is not None
-        out[key] = rigid(links[key], min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
+        followed = link.fit is not None
+        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
     return out
+
+
+def _thickened(link: Link) -> Link:
+    """A link whose mass lies in a plane, with 2e-8 of its largest second moment added along all directions."""
+    second = _second_moments(link)
+    if second[0] >= 2 * LAMINA * second[-1] or link.d < 3 or link.kind == "beam":
+        return link
+    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
+
+
+def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
+    """Of its mass about the centre, the least first [kg m²]."""
+    F = rigid_functions(link)
+    A = F.T @ np.asarray(link.mass[0] @ F)
+    return np.asarray(np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0]))
 
 
 def _with_extent(link: Link) -> None:
@@ -203,9 +224,7 @@ def _with_extent(link: Link) -> None:
     SceneError
         If the least second moment of its mass about the centre is nothing beside the largest.
     """
-    F = rigid_functions(link)
-    A = F.T @ np.asarray(link.mass[0] @ F)
-    second = np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0])
+    second = _second_moments(link)
     if second[0] < LAMINA * second[-1]:
         raise SceneError(
             f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "

@@ -129,7 +129,7 @@ def element_joint(
 
 def can_be_bars(link: Link) -> bool:
     """Whether a link is a rigid one in space, which four of its points tell."""
-    return link.rigid and link.kind == "solid"
+    return link.rigid and link.d == 3 and link.n == 4 and link.kind != "beam"
 
 
 def rigid_points(link: Link, key: str, ways: Ways) -> tuple[RowJoint, list[Own | None]]:

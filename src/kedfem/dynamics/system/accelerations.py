@@ -23,9 +23,7 @@ STIFFER = 1e6  # s
 AGAIN = 3  # times: what strains is then 1e-18 of b
 
 
-def accelerations(
-    now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: bool = False
-) -> Solved:
+def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: bool = False) -> Solved:
     """Accelerations under forces r (N,), world components, with joints and constraints closed.
 
     Parameters

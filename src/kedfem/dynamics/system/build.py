@@ -12,20 +12,14 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.row_joints import RowJoint, Side, bore_axis, in_plane, joint_frame, ordered
-from kedfem.dynamics.row_ports import can_be_bars
+from kedfem.dynamics.row_joints import RowJoint, bore_axis, in_plane, joint_frame, ordered
+from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (
     ANGLE,
     COORDINATE,
     DISTANCE,
-    FACE,
     GAP,
-    PLANAR,
-    PLANAR_BEAM,
-    POINT,
     RATE,
-    RIGID,
-    SOLID,
     TIME,
     TURN,
     Constraint,
@@ -46,7 +40,6 @@ from kedfem.motion.rows import CONSTRAINED, perpendiculars
 from kedfem.scene import LineSpring, Motor, Scene
 
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
-NOTHING = 1e-12  # entries of a selection that are rounding
 Vector = Float[np.ndarray, "3"]
 
 
@@ -71,7 +64,11 @@ def system_of(
     found.between_prescribed({joint.name for joint in model.rows})
     names = tuple(link.name for link in model.links)
     k = int(model.joints[0].B.shape[1])
-    model = replace(model, links=tuple(without_stiffness(x) if can_be_bars(x) else x for x in model.links))
+    bars = {row.bodies[0] for row in model.rows if row.name.startswith("rigid.")}
+    links = tuple(
+        without_stiffness(x) if n in bars else x for x, n in zip(model.links, model.bodies, strict=True)
+    )
+    model = replace(model, links=links)
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
 
 
@@ -113,11 +110,8 @@ class _Builder:
         side = joint.sides[0]
         if side is None:
             return
-        ground, zero = self._numbered(_rigid_end(0, np.zeros(3), self.unknowns)), np.zeros(3)
-        ends = [
-            self._numbered(End(side.body, POINT, X, np.eye(3), np.ones(3), 0, onto[None]))
-            for X, onto in zip(side.points, np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto), strict=True)
-        ]
+        ground, zero = self._numbered(rigid_end(0, np.zeros(3), self.unknowns)), np.zeros(3)
+        ends = [self._numbered(each) for each in corners(side)]
         for i, j in combinations(range(len(ends)), 2):
             a, b = side.points[i], side.points[j]
             long = Term(DISTANCE, ends[i], ends[j], a, b, zero)
@@ -244,7 +238,7 @@ class _Builder:
     def end(self, joint: RowJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
-        end = _rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found)
+        end = rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found)
         return self._numbered(end)
 
     def _numbered(self, end: End) -> int:
@@ -265,40 +259,3 @@ class _Builder:
     def unknowns(self) -> int:
         """Number of interface unknowns."""
         return int(self.model.joints[0].B.shape[1])
-
-
-def same_end(one: End, other: End) -> bool:
-    """Whether two ends are one: on the same points of the same body."""
-    return one.body == other.body and all(
-        x.shape == y.shape and np.array_equal(x, y)
-        for x, y in ((one.origin, other.origin), (one.onto, other.onto))
-    )
-
-
-def _rigid_end(body: int, at: Vector, k: int) -> End:
-    """An end on the ground or on a prescribed body."""
-    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
-
-
-def end_of(side: Side) -> End:
-    """An end on a body, or on a slider that rides on one."""
-    onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
-    p, d, _ = onto.shape
-    directions, lengths, known = np.eye(3), np.ones(3), p - 1
-    arms = side.points[1:] - side.points[0]
-    if known:
-        lengths[:known] = np.linalg.norm(arms, axis=1)
-        directions[:known] = arms / lengths[:known, None]
-        if d == 2:
-            directions[1] = np.cross([0, 0, 1], directions[0]) if known == 1 else directions[1]
-            directions[2] = [0, 0, 1]
-        elif known == 2:
-            directions[2] = np.cross(directions[0], directions[1])
-    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, onto)
-
-
-def _form(side: Side, d: int, known: int) -> int:
-    """What an end knows of its orientation."""
-    if known:
-        return PLANAR if d == 2 else {2: FACE, 3: SOLID}[known]
-    return PLANAR_BEAM if side.shared and d == 3 and side.seat[0, 5].any() else POINT

@@ -88,7 +88,7 @@ def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
     """y becomes the displacements of an end's interface points, one after the other."""
     first, last = ends.column_at[e], ends.column_at[e + 1]
     at, c = ends.onto_at[e], ends.column_at[e + 1] - ends.column_at[e]
-    for r in range((ends.onto_at[e + 1] - at) // max(c, 1)):
+    for r in range(ends.components[e] * (ends.known[e] + 1)):  # also of an end without unknowns
         y[r] = 0.0
         for m in range(first, last):
             y[r] += ends.onto[at + r * c + m - first] * z[ends.columns[m]]

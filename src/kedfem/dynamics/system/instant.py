@@ -125,9 +125,9 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
 def always(of: Ready) -> Always:
     """What starts of a system ask at every time."""
     still, links = Still(of), of.system.model.links
-    least = min(
-        np.linalg.eigvalsh(K)[3 if link.planar else 6] for K, link in zip(still.K, links, strict=True)
-    )
+    pairs = zip(still.K, links, strict=True)
+    elastic = (np.linalg.eigvalsh(K)[3 if link.planar else 6] for K, link in pairs if K.any())
+    least = min(elastic, default=1.0)
     return Always(renumbered(of), closure(of), still, float(least))
 
 

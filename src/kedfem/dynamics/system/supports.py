@@ -12,7 +12,7 @@ from jaxtyping import Float
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Carried
 from kedfem.dynamics.system.arrays import History
-from kedfem.dynamics.system.build import end_of, same_end
+from kedfem.dynamics.system.ends import corners, end_of, same_end
 from kedfem.dynamics.system.instant import renumbered
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import (
@@ -116,10 +116,11 @@ class Supports:
             sides = [*row.sides, *(side for _, other in row.plus for side in other.sides)]
             for side in sides:
                 if side is not None and side.shared:
-                    out.append(self._on_side(row.name, end_of(side)).reshape(len(self.z), -1))
+                    ends = corners(side) if row.name.startswith("rigid.") else [end_of(side)]
+                    out += [self._on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
         return np.concatenate(out, axis=1)
 
-    def _on_side(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
+    def _on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
         """What a joint's constraints and laws exert on the points of one of its ends."""
         y = np.zeros((len(self.z), *end.onto.shape[:2]))
         for n, each in enumerate(self.of.system.constraints):

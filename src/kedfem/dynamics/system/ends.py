@@ -1,0 +1,53 @@
+"""Ends of constraints from what joints have on links: coupling surfaces, points of rigid links, prescribed bodies."""
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.row_joints import Side
+from kedfem.dynamics.system.record import FACE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End
+
+NOTHING = 1e-12  # entries of a selection that are rounding
+Vector = Float[np.ndarray, "3"]
+
+
+def corners(side: Side) -> list[End]:
+    """The points of a rigid link, each an end."""
+    every = zip(side.points, np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto), strict=True)
+    return [End(side.body, POINT, X, np.eye(3), np.ones(3), 0, onto[None]) for X, onto in every]
+
+
+def same_end(one: End, other: End) -> bool:
+    """Whether two ends are one: on the same points of the same body."""
+    return one.body == other.body and all(
+        x.shape == y.shape and np.array_equal(x, y)
+        for x, y in ((one.origin, other.origin), (one.onto, other.onto))
+    )
+
+
+def rigid_end(body: int, at: Vector, k: int) -> End:
+    """An end on the ground or on a prescribed body."""
+    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
+
+
+def end_of(side: Side) -> End:
+    """An end on a body, or on a slider that rides on one."""
+    onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
+    p, d, _ = onto.shape
+    directions, lengths, known = np.eye(3), np.ones(3), p - 1
+    arms = side.points[1:] - side.points[0]
+    if known:
+        lengths[:known] = np.linalg.norm(arms, axis=1)
+        directions[:known] = arms / lengths[:known, None]
+        if d == 2:
+            directions[1] = np.cross([0, 0, 1], directions[0]) if known == 1 else directions[1]
+            directions[2] = [0, 0, 1]
+        elif known == 2:
+            directions[2] = np.cross(directions[0], directions[1])
+    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, onto)
+
+
+def _form(side: Side, d: int, known: int) -> int:
+    """What an end knows of its orientation."""
+    if known:
+        return PLANAR if d == 2 else {2: FACE, 3: SOLID}[known]
+    return PLANAR_BEAM if side.shared and d == 3 and side.seat[0, 5].any() else POINT
