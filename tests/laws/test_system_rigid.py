@@ -102,7 +102,7 @@ def test_a_body_moves_as_by_the_oracle() -> None:
 def test_a_rigid_link_among_beams_moves_as_by_the_oracle_and_keeps_its_length(
     frames: str, driven: bool, acting: bool
 ) -> None:
-    """In nominal frames its bars are linear: one pass a step; else exact. A spring about a hinge, a damper, a motor act."""
+    """In nominal frames its bars are linear: one pass a step; else exact. A spring about a hinge and a motor act."""
     more = elements() if acting else {}
     more.get("springs", {}).pop("line", None)  # the oracle's iterations do not converge with it beside bars
     raw = four_bar(**more)
