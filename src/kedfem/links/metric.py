@@ -20,12 +20,10 @@ from jaxtyping import Float, Int
 from kedfem.links.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
 
-SECTION_STIFF = (
-    1.0  # of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
-)
-HUB_STIFF = (
-    1000.0  # of E I / l, at ends and corners: joints there strain by l / 1000 L of the beam's own rotation
-)
+# of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
+SECTION_STIFF = 1.0
+# of E I / l, besides, at ends and corners, which joints strain
+HUB_STIFF = 1000.0
 Vectors = Float[np.ndarray, "*b _ 3"]
 Column = Float[np.ndarray, "*b _"]
 
