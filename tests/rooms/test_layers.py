@@ -1,6 +1,7 @@
 """Solids made of layers: the direction, the sections and the sweep, each part against OpenCASCADE's own figures."""
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from types import ModuleType
 
@@ -499,3 +500,39 @@ class TestRandomLayers:
             assert_same_body(mesh, gmsh, tolerance=1e-3 if "cusps" in mesh.way else 1e-4)
         assert mesh_quality(mesh).least > (0.3 if abs(web - 1) > 0.25 else 0.1)
         assert_conforming(mesh)
+
+
+class TestCount:
+    """A step of 0.1 mm asks for elements as thin: millions of them are told before any is made."""
+
+    @staticmethod
+    def stepped(occ: ModuleType) -> Shapes:
+        return occ.fuse([post(occ, 0, 0, 0, 50, 12)], [post(occ, 0, 0, 50, 100, 12.1)])[0]
+
+    def test_far_too_many_are_told_before_they_are_made(self, monkeypatch):
+        made = []
+        monkeypatch.setattr("kedfem.mesh.layered.layers.swept", lambda *_: pytest.fail("was swept"))
+        monkeypatch.setattr(
+            "kedfem.mesh.layered.layers.plan_mesh", lambda *given: made.append(given) or plan_mesh(*given)
+        )
+        with pytest.raises(
+            OtherWayError, match=r"swept along z through 2 slabs, 16 layers: about 3.3 million unknowns"
+        ):
+            meshed(self.stepped)
+        assert len(made) == 1  # a finer one would have more
+
+    def test_the_forecast_is_near_what_a_mesh_has(self, monkeypatch):
+        """A plate with a bore in a given size: 24 unknowns an element, and those of the surfaces."""
+        monkeypatch.setattr("kedfem.mesh.layered.layers._FAR_TOO_MANY", 1)
+
+        def plate(occ: ModuleType) -> Shapes:
+            return occ.cut([box(occ, 0, 0, 0, 60, 40, 10)], [post(occ, 30, 20, -1, 11, 6)])[0]
+
+        mesh = meshed(plate, Sizing(size=2 * MM))  # a size that is asked for is taken
+        with pytest.raises(OtherWayError) as caught:
+            meshed(plate)
+        monkeypatch.undo()
+        told = float(re.search(r"about ([\d.e-]+) million", str(caught.value))[1])
+        own = meshed(plate)
+        assert 0.5 < 1e6 * told / (3 * len(own.points)) <= 1.0
+        assert len(mesh.cells) > len(own.cells)

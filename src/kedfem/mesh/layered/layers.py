@@ -30,6 +30,10 @@ _UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 
 
+class TooManyError(OtherWayError):
+    """Sweeping along a direction gives far too many elements: smaller ones give more."""
+
+
 def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """Hexahedra of a solid whose faces lie along one direction or across it: its section swept through its slabs.
 
@@ -60,9 +64,16 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     best: tuple[float, SolidMesh] | None = None
     refusals: list[str] = []
     tries = [(direction, share) for direction in layer_directions(gmsh, solid) for share in _SHARES]
+    hopeless = None
     for direction, share in tries:
+        if direction is hopeless:
+            continue
         try:
             mesh = _mesh_along(gmsh, solid, direction, sizing, share)
+        except TooManyError as error:
+            hopeless = direction
+            refusals.append(str(error))
+            continue
         except KedfemError as error:
             refusals.append(str(error))
             continue
@@ -154,31 +165,26 @@ def _mesh_along(
     with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
         size = share * plan_size(plan_with_cusps, sizing)
         plan, filled = without_cusps(plan_with_cusps, size)
-        layers = _layers(plan, size, sizing)
-        _check_count(solid, direction, float(layers.sum()), size, sizing)
         flat = plan_mesh(solid.name, plan, size, sizing.turn)
-    mesh = swept(flat, plan, layers)
+    layers = np.maximum(np.rint(np.diff(plan.heights) / size).astype(int), max(1, sizing.layers))
     words = _way_in_words(direction, flat, plan, int(layers.sum()))
+    _check_count(solid, words, flat, plan, layers, sizing)
+    mesh = swept(flat, plan, layers)
     if filled > 0:
         words += f"; cusps between touching edges filled, {100 * filled:.2g} % of the volume"
     return SolidMesh(mesh.points, mesh.cells, way=words)
 
 
-def _layers(plan: Plan, size: float, sizing: Sizing) -> Int[np.ndarray, " s"]:
-    """Layers of elements through each slab."""
-    return np.asarray(np.maximum(np.rint(np.diff(plan.heights) / size).astype(int), max(1, sizing.layers)))
-
-
 def _check_count(
-    solid: Solid, direction: Float[np.ndarray, "3"], layers: float, size: float, sizing: Sizing
+    solid: Solid, words: str, flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " s"], sizing: Sizing
 ) -> None:
-    """Refuse, before anything is meshed, far more elements than anybody would take, unless a size is asked for."""
-    length = max(float((solid.high - solid.low) @ np.abs(direction)), size)
-    unknowns = _UNKNOWNS_EACH * layers * solid.volume / length / size**2
+    """Refuse, before they are made, far more elements than anybody would take, unless a size is asked for."""
+    material = np.stack([region.material for region in plan.regions])[flat.regions]
+    unknowns = _UNKNOWNS_EACH * float((material @ layers).sum())
     if sizing.size is None and sizing.across <= 2 and unknowns > _FAR_TOO_MANY:
-        raise OtherWayError(
-            f"{solid.name}: swept along {direction_in_words(direction)} it would have about {unknowns / 1e6:.2g} million "
-            f"unknowns, since its smallest step or wall asks for elements of {1e3 * size:.2g} mm"
+        raise TooManyError(
+            f"{solid.name}: {words}: about {unknowns / 1e6:.2g} million unknowns, "
+            "since a small step or wall asks for elements as small"
         )
 
 
