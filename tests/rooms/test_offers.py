@@ -99,6 +99,24 @@ def test_a_rounded_rim_is_a_fillet_of_its_own_radius(tmp_path: Path) -> None:
     assert "fillet of radius 2.5 mm" in forms(tmp_path, disc)
 
 
+def test_the_corner_of_a_rounded_block_is_a_corner_and_a_dome_is_part_of_a_ball(tmp_path: Path) -> None:
+    def block(occ: Any) -> None:
+        """A block with rounded edges, the dome of a ball of 40 mm on it."""
+        occ.addBox(0, 0, 0, 30, 30, 10)
+        occ.synchronize()
+        import gmsh
+
+        rounds = occ.fillet([1], [tag for _, tag in gmsh.model.getEntities(1)], [3.0])
+        lens, _ = occ.intersect(
+            [(3, occ.addSphere(15, 15, -25, 40))], [(3, occ.addCylinder(15, 15, 5, 0, 0, 20, 8))]
+        )
+        occ.fuse(rounds, lens)
+
+    found = forms(tmp_path, block)
+    assert found.count("rounded corner of radius 3 mm") == 8
+    assert "part of a ball of radius 40 mm" in found
+
+
 def test_what_gmsh_says_of_surfaces_is_told_in_words(tmp_path: Path) -> None:
     written(tmp_path, "part", lever, ("step",))
     with solid_model(CadKeys("p", "s"), tmp_path / "part.step", "part", Cad(file="part.step")) as (_, solid):

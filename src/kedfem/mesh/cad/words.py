@@ -11,7 +11,8 @@ from kedfem.mesh.places import in_mm
 
 _CLOSED = 0.9  # of a full turn: cylinders with keyways are bores and journals still
 _QUARTER = 100.0  # [deg] that a fillet between two walls turns, at the most
-_CORNER = 0.15  # of a ball's area: less is a rounded corner
+_EIGHTH = 0.02  # of a ball's area: how far the rounded corner between three walls may be off an eighth of it
+_PART = 0.3  # of a ball's area: less is called a part of it
 _AXES = ("x", "y", "z")
 
 
@@ -22,9 +23,10 @@ def face_form(face: CadFace) -> str:
         case "plane":
             return f"plane face facing {direction_in_words(face.direction)}"
         case "sphere":
-            whole = "ball seat" if face.inward else "ball"
-            corner = face.area < _CORNER * 4 * np.pi * face.radius**2
-            return f"{'rounded corner' if corner else whole} {radius}"
+            share = face.area / (4 * np.pi * face.radius**2)
+            if abs(share - 1 / 8) < _EIGHTH:
+                return f"rounded corner {radius}"
+            return f"{'part of a ' * (share < _PART)}{'ball seat' if face.inward else 'ball'} {radius}"
         case "cylinder":
             return f"{_cylinder(face)} {radius} along {direction_in_words(face.direction)}"
         case _:
