@@ -117,22 +117,25 @@ def tied(
     """`coupled`, and with it the interface unknowns z and the rows' forces m."""
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
     v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
-    RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
+    held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
+    RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
     z, m = np.zeros(parts[0].attachment.B.shape[1]), np.zeros(0)
     if len(z):
         # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-        H = np.sum([b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], axis=0)
-        f = np.sum([b.T @ (part.S @ x) for part, b, x in zip(parts, RB, v, strict=True)], axis=0)
+        H, f = np.zeros((len(z), len(z))), np.zeros(len(z))
+        for part, b, c, x in zip(parts, RB, held, v, strict=True):
+            H[np.ix_(c, c)] += b.T @ part.S @ b
+            f[c] += b.T @ (part.S @ x)
         z, m = solved(H, f, tie)
-    forces = [part.S @ (b @ z - x) for part, b, x in zip(parts, RB, v, strict=True)]
+    forces = [part.S @ (b @ z[c] - x) for part, b, c, x in zip(parts, RB, held, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)], z, m
 
 
-def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "c k"]:
-    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns."""
-    B = part.attachment.B
-    out = np.zeros((len(part.S), B.shape[1]))
+def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:
+    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns that the link has a share in."""
+    B = part.attachment.B[:, held]
+    out = np.zeros((len(part.S), len(held)))
     out[: len(B)] = port_rotation(part.attachment, R).T @ B
     return out
 
