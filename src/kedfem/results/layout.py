@@ -4,13 +4,13 @@ Numbers carry HDF5's own checksum (Fletcher's), its tables those of the layout o
 checks nothing: their digest is stored beside them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 FORMAT = 2
 """Version of the file's layout."""
@@ -19,7 +19,7 @@ CHUNK_ROWS = 512
 """Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
 
 PEAKS = "peaks"
-DIGEST = "digest_of_texts"
+OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"
 CHECKSUM = 4  # bytes of a chunk
 
 
@@ -78,30 +78,37 @@ def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n c"]:
 
 
 def seal(file: Any) -> None:
-    """Store the digest of the file's texts as they are now."""
-    file.attrs[DIGEST] = np.frombuffer(_digest(file), np.uint8)
+    """Store the digests of the file's texts as they are now; those of channels and scene are written once."""
+    if OF_CHANNELS not in file.attrs:
+        file.attrs[OF_CHANNELS] = _digest(_channel_texts(file))
+    file.attrs[OF_NOTES] = _digest(_note_texts(file))
 
 
 def sealed(file: Any) -> bool:
     """Whether the texts are those that were written."""
-    return bytes(file.attrs[DIGEST]) == _digest(file)
+    digests = {OF_CHANNELS: _channel_texts(file), OF_NOTES: _note_texts(file)}
+    return all(np.array_equal(file.attrs[name], _digest(texts)) for name, texts in digests.items())
 
 
-def _digest(file: Any) -> bytes:
+def _digest(texts: Iterable[str]) -> Int[np.ndarray, "32"]:
     digest = sha256()
-    for text in _texts(file):
+    for text in texts:
         digest.update(sha256(text.encode("utf-8", "surrogateescape")).digest())
-    return digest.digest()
+    return np.frombuffer(digest.digest(), np.uint8)
 
 
-def _texts(file: Any) -> Iterator[str]:
-    """All that is said in words, in an order of its own."""
-    yield from _said("", file)
+def _channel_texts(file: Any) -> Iterator[str]:
+    """What is said of the channels, and the scene, in an order of its own."""
     for key in sorted(file["scene"]):
         yield f"{key} = {file['scene'][key].asstr()[()]}"
-    yield from _said("notes", file["notes"])
     for rows in sorted(series(file), key=lambda each: str(each.name)):
         yield from _said(rows.name, rows)
+
+
+def _note_texts(file: Any) -> Iterator[str]:
+    """What is said of the run."""
+    yield from _said("", file)
+    yield from _said("notes", file["notes"])
     if PEAKS in file:
         for name in sorted(file[PEAKS]):
             yield from _said(name, file[PEAKS][name])
