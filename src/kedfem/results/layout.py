@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, UInt8
 
 FORMAT = 2
 """Version of the file's layout."""
@@ -90,7 +90,7 @@ def sealed(file: Any) -> bool:
     return all(np.array_equal(file.attrs[name], _digest(texts)) for name, texts in digests.items())
 
 
-def _digest(texts: Iterable[str]) -> Int[np.ndarray, "32"]:
+def _digest(texts: Iterable[str]) -> UInt8[np.ndarray, "32"]:
     digest = sha256()
     for text in texts:
         digest.update(sha256(text.encode("utf-8", "surrogateescape")).digest())
