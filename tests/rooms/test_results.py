@@ -157,9 +157,10 @@ def test_changed_texts_are_noticed(tmp_path: Path, text: str) -> None:
 
 def said(results: Results) -> str:
     """All that a file holds."""
-    values = [values.tobytes() for _, values in results.channels.values()]
+    numbers = [results.time, results.angle, *(values for _, values in results.channels.values())]
+    values, none = [each.tobytes() for each in numbers], np.zeros(0)
     kinds = [str(channel) for channel, _ in results.channels.values()]
-    rest = replace(results, channels={}, time=results.time.tobytes(), angle=results.angle.tobytes())
+    rest = replace(results, channels={}, time=none, angle=none)
     return f"{rest} {kinds} {values}"
 
 

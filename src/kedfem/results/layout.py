@@ -55,7 +55,7 @@ def series(file: Any) -> list[Any]:
     return found
 
 
-def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n c"]:
+def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n ..."]:
     """The first rows of a dataset, a frozen array.
 
     Raises
