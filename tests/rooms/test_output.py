@@ -508,6 +508,7 @@ def test_gravity_points_down_the_page_unless_it_is_looked_along() -> None:
     grid = SimpleNamespace(
         points=np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0.05]]), length=1.4, celltypes=np.array([3]),
         point_data={"von_mises": np.zeros(3)}, extract_cells=lambda kept: SimpleNamespace(n_cells=0),
+        cell_data={},
     )  # fmt: skip
     for gravity, up in (((0, 0, 0), (0, 1, 0)), ((-9.8, 0, 0), (1, 0, 0)), ((0, 0, -9.8), (0, 1, 0))):
         assert view(grid, np.array(gravity, float)).up @ up > 0.9

@@ -1,6 +1,8 @@
 """Work of libraries in a process of its own: what they write stays there, where they break down or hang is an error."""
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 from time import process_time
 from typing import Any, TypeVar
 
@@ -49,7 +51,9 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
     for _ in range(2):  # a process that has served others may break down where a new one does not
         executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
         try:
-            found: T = executor.submit(limited, seconds, work, *given).result(timeout=PATIENCE)
+            found: T = executor.submit(limited, str(Path.cwd()), seconds, work, *given).result(
+                timeout=PATIENCE
+            )
         except LateError:
             executor.shutdown(kill_workers=True)
             reason = f"got none within {PATIENCE} s"
@@ -68,8 +72,12 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
     raise MeshError(f"{where}: {wanted}, {reason}; {advice}")
 
 
-def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
+def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns, in silence; the process is ended if that takes more processor time than so much.
+
+    Parameters
+    ----------
+    folder : that paths are relative to; the process may have begun in another
 
     Raises
     ------
@@ -77,6 +85,7 @@ def limited(seconds: float, work: Callable[..., T], *given: Any) -> T:
         It would hold more than MOST_MEMORY.
     """
     end_with_parent()
+    os.chdir(folder)
     try:
         import resource
     except ImportError:  # a system without such limits
