@@ -63,7 +63,8 @@ def test_a_factor_over_the_angle_of_the_drive_is_that_over_time() -> None:
     raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 0.5}
     over = {"over": "angle", "at": [0.0, 0.15], "value": [0.0, 1.0]}
     by_angle = cantilever("drive", {"frame": "link", "factor": over}) | {"drive": raw["drive"]}
-    assert_allclose(tip(by_angle), tip(raw), atol=1e-9)
+    # each of 250 steps stops its iterations at 1e-7 of what moves: how compiled code rounds decides after which one
+    assert_allclose(tip(by_angle), tip(raw), atol=2e-5)
 
 
 def test_a_quasi_static_start_has_loads_that_turn_with_the_link() -> None:
