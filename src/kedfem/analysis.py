@@ -127,7 +127,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     frequencies = clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
-    efforts = CrossChecks(scene, ready.linkage, channels, ready.model.rows)
+    efforts = CrossChecks(scene, ready.linkage, channels, account)
     watched = _Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
     envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
     doubts = doubtful(scene, ready.model, recoveries)
@@ -312,7 +312,7 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                     continue
                 values = rows(watched.recorded, block)
                 table.add(block, values)
-                watched.efforts.add(block.motion, values)
+                watched.efforts.add(block, values)
                 watched.passes.add(block)
                 seen.add(block)
                 errors.add(block, values)

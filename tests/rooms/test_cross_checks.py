@@ -6,32 +6,44 @@ from typing import Any
 import numpy as np
 import pytest
 
+from kedfem.accuracy.prepared import Prepared
 from kedfem.analysis import analyse
-from kedfem.results.acting import Measured
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joint_rows import joint_rows
+from kedfem.results.acting import Measured, measured_actions
+from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.recording import recording, rows
+from kedfem.results.row_forces import RowForces
+from kedfem.results.row_work import interface
 from kedfem.scene import scene_from
 from tests.moving import ran
 from tests.rooms.test_driven_efforts import ON_CRANK, four_bar
-from tests.spatial_joints import SLIDERS
+from tests.spatial_joints import BEAMS, SLIDERS
 
 
 def checked(raw: dict[str, Any], **changed: float) -> tuple[str, ...]:
     """Warnings of a run with some channels multiplied."""
-    ready, blocks = ran(raw)
-    every = recording(ready.scene, ready.model, along=ready.path)
-    checks = CrossChecks(ready.scene, ready.linkage, [each.channel for each in every], ready.model.rows)
+    return compared(*ran(raw), **changed)[0].warnings()
+
+
+def compared(ready: Prepared, blocks: list[Block], **changed: float) -> tuple[CrossChecks, Account]:
+    """A run's efforts with some channels multiplied, and its energy."""
+    account = Account(ready.model, measured_actions(ready.scene, ready.model))
+    every = recording(ready.scene, ready.model, account, ready.path)
+    checks = CrossChecks(ready.scene, ready.linkage, [each.channel for each in every], account)
     for block in blocks:
         values = rows(every, block)
-        checks.add(block.motion, values | {name: x * values[name] for name, x in changed.items()})
-    return checks.warnings()
+        checks.add(block, values | {name: x * values[name] for name, x in changed.items()})
+    return checks, account
 
 
 def test_a_drive_that_is_dropped_contradicts_rigid_links() -> None:
     raw = SLIDERS["driven slider without a shape"]()
     assert checked(raw) == ()
-    (effort,) = checked(raw, **{"drive/force": 0.0})
+    effort, work = checked(raw, **{"drive/force": 0.0})
     assert effort.startswith("drive/force contradicts drive/rigid_force: over the run it is 0 % of it")
+    assert work.startswith("drive/force: the work of the drive is off")
 
 
 @pytest.mark.parametrize("acting", ["spring to the ground", "motor"])
@@ -42,6 +54,55 @@ def test_a_spring_or_motor_that_is_missing_at_the_hub_is_noticed(acting: str, mo
     found = checked(raw)
     assert any(each.startswith("drive/torque contradicts drive/rigid_torque") for each in found)
     assert any(each.startswith("drive/torque: the work of the drive is off") for each in found)
+
+
+@pytest.mark.parametrize("kind", [*BEAMS, *SLIDERS])
+def test_drives_do_the_work_of_all_port_forces_on_the_nominal_motion(kind: str) -> None:
+    """To rounding, with every kind of joint between links that move, springs in them or not; of inertia's slider 2e-9."""
+    checks, _ = compared(*ran((BEAMS | SLIDERS)[kind]()))
+    assert checks.worked
+    assert checks.unworked < 1e-8
+
+
+@pytest.mark.parametrize("effort", ["drive/A/torque", "drive/J/torque", "drive/K/force"])
+def test_a_drive_that_is_dropped_beside_constraints_that_vary_is_noticed(effort: str) -> None:
+    found = checked(BEAMS["driven hinge and slide"](), **{effort: 0.0})
+    assert any("the work of the drive is off" in each for each in found)
+
+
+@pytest.mark.parametrize(
+    ("kind", "part"), [("prismatic", 1e-4), ("cylindrical", 1e-3), ("screw", 1e-2), ("universal", 5e-9)]
+)
+def test_what_constraints_that_vary_do_on_the_elastic_motion_is_their_forces_times_how_they_vary(
+    kind: str, part: float
+) -> None:
+    """−∫ μᵀ C' z dt, by C and z of both ends of each step: C z = 0 at all times, so μᵀ C z' = −μᵀ C' z."""
+    off = []
+    for step in (1e-3, 5e-4, 2.5e-4):
+        raw = BEAMS[kind]()
+        raw["analysis"]["step"] = step
+        ready, blocks = ran(raw)
+        checks, account = compared(ready, blocks)
+        model, work, forces, C, z, mu = ready.model, [], RowForces(ready.model), [], [], []
+        for block in blocks:
+            found = account.rows(block)
+            work.append(found["work"][:, 1] - found["driven"][:, 0])
+            C.append(joint_rows(model.rows, block.motion).C)
+            z.append(interface(model, block))
+            mu.append(forces.of(block))
+        rate = np.einsum("tr,trk,tk->t", means(mu), np.diff(np.concatenate(C), axis=0), means(z))
+        by_rows = np.concatenate([[0.0], -np.cumsum(rate)])
+        assert np.abs(by_rows).max() > part * checks.exchanged
+        off.append(np.abs(np.concatenate(work) - by_rows).max() / checks.exchanged)
+    assert off[1] < 1e-4
+    slopes = np.diff(np.log2(off))
+    assert ((slopes > -2.3) & (slopes < -1.8)).all()
+
+
+def means(x: list[np.ndarray]) -> np.ndarray:
+    """Of both ends of each step."""
+    every = np.concatenate(x)
+    return 0.5 * (every[1:] + every[:-1])
 
 
 @pytest.mark.parametrize(("by", "alarms"), [(0.45, 1), (0.98, 0), (1.3, 0)])

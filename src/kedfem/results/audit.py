@@ -126,7 +126,10 @@ class Account:
         self._impulse = 0.0
 
     def rows(self, block: Block) -> dict[str, Rows]:
-        """The channels over a block; the same block again is not counted twice."""
+        """The channels over a block; the same block again is not counted twice.
+
+        Beside them `driven`: work of the supports on the nominal motion, which is that of the drives alone.
+        """
         if block is not self._block:
             if block.step != self._next:
                 self._begin()
@@ -159,13 +162,14 @@ class Account:
         taken = np.column_stack([taken, pushed])
         state = np.vstack([flow.kinetic + strain, flow.momentum, flow.angular]).T
         rates = np.vstack(
-            [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning]
+            [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning, flow.led]
         ).T
         if self._sums is None:
-            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(12), np.zeros(9))
+            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(13), np.zeros(9))
             self._start = state[0]
         before = self._sums.t
         work, total = self._sums.add(block.motion.t, rates, taken)
+        work, driven = work[:, :12], work[:, 1:2] - work[:, 12:]
         work = work - total[:, 8:] * (np.arange(12) == 1)
         change = state - self._start
         left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
@@ -184,6 +188,7 @@ class Account:
         return {
             "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
             "dissipated": total[:, :1], "neglected": (work[:, 2] + total[:, 1])[:, None], "residual": left[:, :1],
+            "driven": driven,
         }  # fmt: skip
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 8"]]:

@@ -29,6 +29,7 @@ class Flow:
     force, moment : (3, T) of P and the port forces together [N, N m]
     turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the nominal frame [N m]
     neglected : (T,) its power on the nominal rotation [W]
+    led : (T,) power of the port forces on the elastic motion, where joints hold by rows [W]
     """
 
     kinetic: Scalars
@@ -41,6 +42,7 @@ class Flow:
     moment: Vectors
     turning: Vectors
     neglected: Scalars
+    led: Scalars
 
     def __add__(self, other: "Flow") -> "Flow":
         """Both together."""
@@ -131,7 +133,7 @@ def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
     sizes = np.stack([_lengths(y[0, 0]), _lengths(about[0]), pushed]).sum(axis=1)
     return Flow(
         kinetic.sum(axis=0), in_world(y[0, 0]), in_world(about[0]), sizes, loads.sum(axis=0), supports.sum(axis=0),
-        in_world(y[1, 0]), in_world(about[1]), *_neglected(found, at),
+        in_world(y[1, 0]), in_world(about[1]), *_neglected(found, at), found.powers[2].sum(axis=0),
     )  # fmt: skip
 
 

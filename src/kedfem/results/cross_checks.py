@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.row_joints import RowJoint
+from kedfem.dynamics.history import Block
 from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross
+from kedfem.results.audit import Account
 from kedfem.results.records import Channel
-from kedfem.scene import GROUND, Scene
+from kedfem.scene import Scene
 
 Rows = Float[np.ndarray, "T c"]
 
@@ -101,13 +102,11 @@ class CrossChecks:
 
     Parameters
     ----------
-    rows : joints enforced by constraint equations; where their directions vary they do work on the elastic motion too,
-        and that of the drives is not compared
+    account : of the same run's energy; the drives' work is compared with that of all port forces on the nominal motion.
+        On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in joints do
     """
 
-    def __init__(
-        self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], rows: Sequence[RowJoint] = ()
-    ) -> None:
+    def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
         self.size = linkage.size
         self.pairs = [
@@ -117,13 +116,15 @@ class CrossChecks:
             if rigid in known and "without what is along" not in known[rigid].description
         ]
         self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
-        steady = all(_steady(scene, row) for row in rows)
-        self.worked = steady and bool(self.drives) and all(each.effort for each in self.drives)
+        self.account = account
+        self.worked = bool(self.drives) and all(each.effort for each in self.drives)
         self._last: tuple[float, float] | None = None
-        self._work, self._left, self._exchanged = 0.0, 0.0, 0.0
+        self._work, self._left = 0.0, 0.0
+        self.exchanged = 0.0  # largest energy or work so far [J]
 
-    def add(self, motion: RigidMotion, values: dict[str, Rows]) -> None:
+    def add(self, block: Block, values: dict[str, Rows]) -> None:
         """The rows of one more block."""
+        motion = block.motion
         for each in self.pairs:
             each.add(values[each.elastic][:, each.columns], values[each.rigid])
         if not self.worked:
@@ -132,16 +133,16 @@ class CrossChecks:
         t0, before = self._last or (float(motion.t[0]), float(power[0]))
         h = np.diff(motion.t, prepend=t0)
         work = self._work + np.cumsum(0.5 * h * (power + np.concatenate([[before], power[:-1]])))
-        left = work - values["energy/work"][:, 1]
+        left = work - self.account.rows(block)["driven"][:, 0]
         exchanged = [values["energy/strain"], values["energy/kinetic"], values["energy/work"], work]
         self._last, self._work = (float(motion.t[-1]), float(power[-1])), float(work[-1])
         self._left = max(self._left, float(np.abs(left).max()))
-        self._exchanged = max(self._exchanged, *(float(np.ptp(x, axis=0).max()) for x in exchanged))
+        self.exchanged = max(self.exchanged, *(float(np.ptp(x, axis=0).max()) for x in exchanged))
 
     @property
     def unworked(self) -> float:
         """Work of the drives that the account of energy does not have, as a part of the energy exchanged [-]."""
-        return self._left / self._exchanged if self._exchanged else 0.0
+        return self._left / self.exchanged if self.exchanged else 0.0
 
     def warnings(self) -> tuple[str, ...]:
         """Efforts that contradict each other."""
@@ -171,10 +172,3 @@ def _rigid_name(name: str) -> str:
     """The channel of rigid links beside one of elastic ones."""
     head, _, what = name.rpartition("/")
     return f"{head}/rigid_{what}" if what in {"force", "torque"} else ""
-
-
-def _steady(scene: Scene, row: RowJoint) -> bool:
-    """Whether a joint holds rigidly, along directions that do not vary."""
-    joint = scene.joints.get(row.name)
-    fixed = joint is not None and GROUND in joint.links and joint.kind in {"prismatic", "revolute"}
-    return fixed and bool(np.isinf(row.stiffness).all())

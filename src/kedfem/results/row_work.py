@@ -53,10 +53,16 @@ def row_work(
 
 
 def deflections(model: Model, block: Block, rows: JointRows) -> Float[np.ndarray, "T r"]:
-    """e = C z over time, z from the displacements at all ports."""
+    """e = C z over time."""
+    return np.asarray(np.einsum("trk,tk->tr", rows.C, interface(model, block)))
+
+
+def interface(model: Model, block: Block) -> Float[np.ndarray, "T k"]:
+    """Interface unknowns z over time, from the displacements at all ports."""
     w = [
         (joint.weights @ history.u[:, joint.nodes]).reshape(len(block), -1)[:, joint.keep]
         for joint, history in zip(model.joints, block.links, strict=True)
     ]
-    z = np.concatenate(w, axis=1) @ np.linalg.pinv(np.vstack([joint.B for joint in model.joints])).T
-    return np.asarray(np.einsum("trk,tk->tr", rows.C, z))
+    return np.asarray(
+        np.concatenate(w, axis=1) @ np.linalg.pinv(np.vstack([joint.B for joint in model.joints])).T
+    )
