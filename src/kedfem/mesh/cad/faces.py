@@ -53,7 +53,7 @@ def joined_faces(
 ) -> tuple[Face, ...]:
     """The faces of a mesh from the corners of the sides on each face of its solid; those of one surface are one."""
     found = []
-    for group in _one_surface(gmsh, solid):
+    for group in one_surface(gmsh, solid):
         found.append(_face(solid, group, np.concatenate([sides[solid.faces[i].tag] for i in group])))
     return tuple(face for face in found if len(face.sides))
 
@@ -74,7 +74,7 @@ def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face
     )
 
 
-def _one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
+def one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
     """Faces in groups: those of one cylinder or sphere that share an edge, without names or with the same one."""
     edges = [
         {tag for _, tag in gmsh.model.getBoundary([(2, face.tag)], combined=False, oriented=False)}

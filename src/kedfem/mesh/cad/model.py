@@ -58,6 +58,26 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 
 def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: str | None) -> Solid:
     """One solid of a file, which is read into gmsh's empty model and left alone there."""
+    tags, names, bodies = _named_solids(gmsh, file)
+    tag = tags[_choice(key, file, names, link, wanted)]
+    leave_only(gmsh, tag)
+    return _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
+
+
+def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
+    """Every solid of a file, which is read into gmsh's empty model and stays there, where the file has it.
+
+    Raises
+    ------
+    MeshError
+        As `solid_model`, for any of them.
+    """
+    tags, names, bodies = _named_solids(gmsh, file)
+    return [_solid(gmsh, file, tag, name, bodies[tag]) for tag, name in zip(tags, names, strict=True)]
+
+
+def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str], dict[int, Body | None]]:
+    """The tags of a file's solids, now in gmsh's model, their names, and their bodies in the file's text."""
     tags = read_solids(gmsh, file)
     most = max(len(_boundary(gmsh, tag)) for tag in tags)
     if most > MOST_FACES:
@@ -67,10 +87,7 @@ def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: s
             "program (shape.kind = 'mesh')"
         )
     bodies = _bodies(gmsh, file, tags)
-    names = _solid_names(gmsh, file, tags, bodies)
-    tag = tags[_choice(key, file, names, link, wanted)]
-    leave_only(gmsh, tag)
-    return _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
+    return tags, _solid_names(gmsh, file, tags, bodies), bodies
 
 
 def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | None) -> Solid:
