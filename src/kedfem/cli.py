@@ -216,10 +216,10 @@ def accuracy(
 def new(
     kind: Annotated[
         str | None,
-        typer.Argument(metavar="[KIND]", help="One of: " + ", ".join(KINDS) + "; left out with --from."),
+        typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + "; left out with --from."),
     ] = None,
     path: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="Default: KIND.toml or ASSEMBLY.toml here.")
+        Path | None, typer.Argument(metavar="FILE", help="Default: KIND.toml or ASSEMBLY.toml here.")
     ] = None,
     assembly: Annotated[
         Path | None,
@@ -256,6 +256,8 @@ def _new_from(assembly: Path, target: Path, scale: float | None) -> None:
 
     if target.exists():
         raise _exists(target)
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: must be in a folder that is there, got none at {target.parent}")
     with _progress() as watch:
         watch("assembly", 0, 0)
         text = draft_scene(assembly, target.parent, scale)

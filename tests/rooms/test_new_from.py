@@ -118,6 +118,9 @@ def test_a_file_that_exists_stays(run_kedfem: Command, assembly: Path) -> None: 
     wanted = "error: four bar.toml: must be a new file, got one that exists already\n"
     assert (said.code, said.err) == (USER_ERROR, wanted)
     assert Path("four bar.toml").read_text() == "precious"
+    said = run_kedfem("new", "--from", assembly, "no/x.toml")
+    wanted = "error: no/x.toml: must be in a folder that is there, got none at no\n"
+    assert (said.code, said.err) == (USER_ERROR, wanted)
 
 
 @pytest.mark.parametrize(
