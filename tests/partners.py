@@ -125,8 +125,11 @@ def chain(
     flat = np.array([1.0, 1.0, 0.0]) if plane else np.ones(3)
     places = [flat * x for x in PLACES[: len(kinds) + 1]]
     here, last = kinds.index("J") + 1, len(kinds)
-    if kind == "weld" and plane and here < last:
-        places[here + 1] = 2 * places[here] - places[here - 1]  # two plane links are welded along one edge
+    solids = {"solid", "reduced", "rigid"}.issuperset(partners)
+    if kind == "weld" and here < last and (plane or solids):
+        places[here + 1] = (
+            2 * places[here] - places[here - 1]
+        )  # two of a width are welded along one face or edge
     random = np.random.default_rng(SEEDS.get((kind, form), 0))
     axes = [
         direction(kind if k == here else each, k, places, plane, random)

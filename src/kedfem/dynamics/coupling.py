@@ -379,16 +379,21 @@ def port_points(
         points += _points_off(seat.origin, seats, [seat.directions[2]])
     for link, s in seats.items():
         if not all(holds(s, d) for d in directions):
-            raise MeshError(f"joints.{name}: {_unheld(links[link])}")
+            raise MeshError(f"joints.{name}: {_unheld(links[link], joint.kind)}")
     return np.array(points)
 
 
-def _unheld(link: Link) -> str:
+def _unheld(link: Link, kind: str) -> str:
     """What to do about a seat that does not hold a joint's points."""
     if link.kind == "spatial_beam":
         return (
             f"must sit at an end or a corner of beam '{link.name}', or need its section only, got a joint that "
             "needs the direction of its axis too: give the beam a point there"
+        )
+    if kind == "weld":
+        return (
+            f"must weld faces that lie in one plane, or sit on a bore of link '{link.name}', "
+            "got a flat face at an angle to the other link's: cut the two so that they meet in a plane"
         )
     return (
         f"must sit on a bore of link '{link.name}', or on a flat face that contains its axis, "

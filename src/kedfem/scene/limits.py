@@ -11,7 +11,7 @@ from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Tabl
 from kedfem.scene.files import part_geometry
 from kedfem.scene.laws import table_noise
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
+from kedfem.scene.planes import FLAT, leaving, off_plane, rigid_in_space, spring_ends, vector
 from kedfem.scene.shapes import Bar, Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
@@ -45,7 +45,7 @@ def planar_faults(parts: Parts) -> Iterator[str]:
 
 
 def mixed_faults(parts: Parts) -> Iterator[str]:
-    """Joints other than hinges between plane links and others."""
+    """Joints other than hinges between plane links and others: a rigid link in space may slide on a plane one too."""
     for joint in parts.joints.values():
         held = [parts.links[name] for name in link_names(joint) if name in parts.links]
         kinds = [NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS]
@@ -54,6 +54,11 @@ def mixed_faults(parts: Parts) -> Iterator[str]:
             names = " and ".join(f"{link.name!r}, a {kind}" for link, kind in zip(held, kinds, strict=True))
             wanted = "must be revolute or spherical between a plane link and another"
             yield joint.fault("kind", f"{wanted}, got {joint.word('kind')!r} of {names}")
+        rigid = [link.name for link in held if rigid_in_space(parts, link)]
+        if rigid and NOUNS["plane"] in kinds and joint.word("kind") == "weld":
+            plane = next(link.name for link in held if fidelity(link) == "plane")
+            wanted = "must be revolute or spherical between a plane link and a rigid one that moves freely"
+            yield joint.fault("kind", f"{wanted}, got 'weld' of {plane!r} and {rigid[0]!r}")
 
 
 def plane_faults(parts: Parts, here: str) -> Iterator[str]:

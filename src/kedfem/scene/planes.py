@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from kedfem.scene.apart import Apart
-from kedfem.scene.checks import fidelity, link_names
+from kedfem.scene.checks import NOUNS, fidelity, link_names
+from kedfem.scene.moving import moving_joints
 from kedfem.scene.parts import NONE, Entry, Parts
 from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import Bar, Polyline
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
 
 FLAT = 1e-9  # how far from the plane, relative to the size of the scene
-WORDS = ("fidelity", "beam", "kind", "link", "links")
+WORDS = ("fidelity", "beam", "kind", "link", "links", "joint")
 Key = tuple[str, *tuple[str | int, ...]]
 
 
@@ -29,8 +30,8 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     known = {section: _entries(section, table) for section, table in tables.items()}
     probes = _entries("probes", scene.output.probes, "output")
     parts = Parts(
-        **known, probes=probes, drive=NONE, drives={}, gears={}, damping=NONE, analysis=NONE, animation=NONE,
-        gravity=scene.gravity, materials=[], folder=scene.folder,
+        **known, probes=probes, drive=NONE, drives=_entries("drives", scene.driven_joints), gears={}, damping=NONE,
+        analysis=NONE, animation=NONE, gravity=scene.gravity, materials=[], folder=scene.folder,
     )  # fmt: skip
     return spatial_names(parts)
 
@@ -64,6 +65,17 @@ def spatial_names(parts: Parts) -> frozenset[str]:
 def _rigid_line(link: Entry) -> bool:
     """Whether a link is a rigid polyline, which has a beam's record."""
     return fidelity(link) == "rigid" and isinstance(getattr(link.record, "shape", None), Polyline)
+
+
+def rigid_in_space(parts: Parts, link: Entry) -> bool:
+    """Whether a rigid link moves as a body in space: it has a solid shape, and no drive simply carries it along."""
+    if fidelity(link) != "rigid" or _rigid_line(link) or getattr(link.record, "shape", None) is None:
+        return False
+    by_rows = {joint.name for joint in moving_joints(parts)}
+    return not any(
+        link.name in link_names(parts.joints[name])
+        for name in parts.driven_joints & parts.joints.keys() - by_rows
+    )
 
 
 def _welds(parts: Parts) -> list[Entry]:
@@ -124,8 +136,10 @@ def own_obstacles(parts: Parts, name: str, around: Iterable[Entry]) -> Iterator[
         ]
         if getattr(entry.record, "kind", None) == "weld" and others:
             other = fidelity(others[0])
-            if other not in {"beam", "rigid"}:
-                yield entry.fault("kind", f"must be a hinge {whose}, got a weld to a {other}")
+            if other not in {"beam", "rigid"} or rigid_in_space(parts, others[0]):
+                yield entry.fault(
+                    "kind", f"must be a hinge {whose}, got a weld to a {NOUNS.get(other, 'rigid link')}"
+                )
         centre = getattr(entry.record, "centre", None)
         if centre is not None and math.dist(centre, entry.record.at) > FLAT:
             yield entry.fault(
