@@ -25,9 +25,9 @@ def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
 
 
 def slider_guide(scene: Scene, name: str) -> str:
-    """The joint on the ground that a rigid slider slides in, "" if there is none; it may carry further slides."""
-    on = (key for key, joint in scene.joints.items() if joint.kind == "prismatic" and name in joint.links)
-    return next((key for key in on if GROUND in scene.joints[key].links), "")
+    """The joint that a rigid slider slides in, "" if there is none: one on the ground first, as it may carry others."""
+    on = [key for key, joint in scene.joints.items() if joint.kind == "prismatic" and name in joint.links]
+    return next((key for key in on if GROUND in scene.joints[key].links), on[0] if on else "")
 
 
 def seat_of(scene: Scene, name: str, link: Link) -> Seat:
