@@ -206,13 +206,11 @@ def test_forces_that_tear_the_links_apart_are_told_by_the_literal_solver() -> No
         run(raw)
 
 
-def test_a_spring_along_a_slide_pulls_its_link_back() -> None:
-    """−k q − F0 on the shoe of a slider-crank, whose travel is that of the nominal motion but for a little."""
-    bar = {"kind": "bar", "width": 0.02, "thickness": 0.01}
-    rod = {"material": "m", "fidelity": "beam"}
-    raw = four_bar(
-        "nominal", springs={"p": {"kind": "spring", "joint": "S", "stiffness": 1000.0, "preload": 20.0}}
-    )
+def slider_crank(steps: int = 180, **spring: float) -> dict[str, Any]:
+    """A spring along the slide of a slider-crank."""
+    along = {"kind": "spring", "joint": "S", "stiffness": 1000.0, "preload": 20.0, **spring}
+    raw = four_bar("nominal", springs={"p": along}, steps=steps)
+    bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "fidelity": "beam"}
     raw["links"] = {
         "crank": {**rod, "shape": {**bar, "between": [[0, 0], [0.1, 0]]}},
         "rod": {**rod, "shape": {**bar, "between": [[0.1, 0], [0.4, 0]]}},
@@ -224,6 +222,12 @@ def test_a_spring_along_a_slide_pulls_its_link_back() -> None:
         "C": {"kind": "spherical", "links": ["rod", "shoe"], "at": [0.4, 0]},
         "S": {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.4, 0], "axis": "x"},
     }
+    return raw
+
+
+def test_a_spring_along_a_slide_pulls_its_link_back() -> None:
+    """−k q − F0 on the shoe of a slider-crank, whose travel is that of the nominal motion but for a little."""
+    raw = slider_crank()
     force, travel = (channel(*run(raw), f"springs/p/{x}") for x in ("force", "travel"))
     phi = np.pi / 180 * 2 * np.arange(len(travel))
     drawn = 0.1 * np.cos(phi) + np.sqrt(0.3**2 - (0.1 * np.sin(phi)) ** 2) - 0.4

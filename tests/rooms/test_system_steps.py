@@ -1,5 +1,6 @@
 """Springs and motors on links with nominal frames: the system's steps record what those of the condensed solver do."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,28 +17,9 @@ from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.results.recording import recording
 from kedfem.results.records import Channel
 from kedfem.scene import scene_from, time_grid
-from tests.rooms.test_acted import four_bar, line
+from tests.rooms.test_acted import four_bar, line, slider_crank
 
 CURVE = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
-
-
-def slider_crank() -> dict[str, Any]:
-    """A spring along the slide of a slider, damped."""
-    spring = {"kind": "spring", "joint": "S", "stiffness": 1000.0, "damping": 5.0, "preload": 20.0}
-    raw = four_bar("nominal", springs={"p": spring}, steps=72)
-    bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "fidelity": "beam"}
-    raw["links"] = {
-        "crank": {**rod, "shape": {**bar, "between": [[0, 0], [0.1, 0]]}},
-        "rod": {**rod, "shape": {**bar, "between": [[0.1, 0], [0.4, 0]]}},
-        "shoe": {"fidelity": "rigid", "mass": 0.2},
-    }
-    raw["joints"] = {
-        "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
-        "B": {"kind": "revolute", "links": ["crank", "rod"], "at": [0.1, 0]},
-        "C": {"kind": "spherical", "links": ["rod", "shoe"], "at": [0.4, 0]},
-        "S": {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.4, 0], "axis": "x"},
-    }
-    return raw
 
 
 def bushed() -> dict[str, Any]:
@@ -56,7 +38,7 @@ SCENES = {
         analysis={"initial": "rest", "rho_inf": 0.8},
     ),
     "motor over speed": lambda: four_bar("nominal", motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
-    "spring along a slide": slider_crank,
+    "spring along a slide": partial(slider_crank, steps=72, damping=5.0),
     "bushing and shaft": bushed,
     DEAR: lambda: four_bar("nominal", "reduced", springs=line(20.0), steps=36),
     "plane links": lambda: four_bar(
