@@ -28,7 +28,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import turned_vectors
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.segment import position
-from kedfem.dynamics.transient import Steps, block_length, first_states, steps_of, stresses_of, transient
+from kedfem.dynamics.transient import Steps, block_length, started, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.mesh.room import memory
 from kedfem.motion.linkage import Linkage
@@ -122,7 +122,7 @@ def leveled(
         yield from transient(scene, linkage, along, model, solvers[0])
         return
     scenes = level_scenes(scene)
-    start = first_states(scenes[-1], linkage, along, model, stresses_of(solvers[-1]))
+    start = started(scenes[-1], linkage, along, model, solvers[-1])
     schemes = [generalised_alpha(time_grid(each).step, each.analysis.rho_inf) for each in scenes]
     streams = [
         _Stream(transient(each, linkage, along, model, solver, start), scheme)

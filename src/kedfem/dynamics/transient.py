@@ -28,6 +28,7 @@ from kedfem.dynamics.segment import CONVERGED, EASIER, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nodal
 from kedfem.dynamics.stiffening import Stiffening, stiffening
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
@@ -46,6 +47,7 @@ KEPT = 20_000  # time points of a turn whose rigid motion is kept
 Steps = (
     CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | SystemSteps | FollowingSteps | FollowingDense
 )
+Start = list[LinkState] | State
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
     'take a smaller step, or frames = "following"'
@@ -69,10 +71,11 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
     every = actions(scene, model)
     small = all(map(_is_small, model.links))
-    if every and small and scene.analysis.solver != "literal":
+    damped = any(row.damping.any() for row in model.rows)  # which only the system's starts know
+    if (every or damped) and small and scene.analysis.solver != "literal" and not scene.analysis.stiffening:
         system = nominal_system(scene, model)
         if system is not None:
-            return SystemSteps(system, model, scheme, every)
+            return SystemSteps(scene, system, model, scheme)
     small = small and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
@@ -89,13 +92,13 @@ def _is_small(link: Link) -> bool:
 
 def transient(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps,
-    start: list[LinkState] | None = None,
+    start: Start | None = None,
 ) -> Iterator[Block]:  # fmt: skip
     """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
 
     Parameters
     ----------
-    start : states at t = 0, those of `first_states` if not given
+    start : the state at t = 0, that of `started` if not given
 
     Raises
     ------
@@ -103,9 +106,9 @@ def transient(
         If a displacement is not finite: with step, time and drive angle.
     """
     stresses = stresses_of(solver)
-    states = first_states(scene, linkage, along, model, stresses) if start is None else start
+    states = started(scene, linkage, along, model, solver) if start is None else start
     drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
-    yield Block(0, drawn, _first(model, solver, states))
+    yield Block(0, drawn, _first(model, solver, states, drawn))
     state: Any = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
@@ -135,13 +138,25 @@ def stresses_of(solver: Steps) -> Stiffening | None:
     return None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
 
 
-def begun(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: list[LinkState]
-) -> Any:
+def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
+    """How the elastic motion begins: at rest, or quasi-static.
+
+    Raises
+    ------
+    SolveError
+        If no quasi-static deflection is found.
+    """
+    if not isinstance(solver, SystemSteps):
+        return first_states(scene, linkage, along, model, stresses_of(solver))
+    at_rest = scene.analysis.initial == "rest"
+    rates = initial_rates(scene, linkage, model) if at_rest else []
+    return solver.start(at_rest, lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)), rates)
+
+
+def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: Start) -> Any:
     """A solver's state at the first time point."""
-    if isinstance(solver, SystemSteps):
-        none = np.zeros(1)
-        return solver.begin(states, rigid_motion(linkage, along, none, path_parameter(scene, none)))
+    if isinstance(states, State) or isinstance(solver, SystemSteps):
+        return states
     if not model.rows or isinstance(solver, FollowingSteps | FollowingDense):
         return solver.begin(states)
     rows = rows_at_start(scene, linkage, along, model)
@@ -159,8 +174,12 @@ def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
     return None if rows is None else first_rows(rows, h)
 
 
-def _first(model: Model, solver: Steps, states: list[LinkState]) -> list[LinkHistory]:
+def _first(model: Model, solver: Steps, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
     """The first time point of all links, as their frames see it."""
+    if isinstance(solver, SystemSteps) and isinstance(states, State):
+        return solver.first(states, forcings(model, drawn), drawn)
+    if isinstance(states, State):
+        raise ValueError("the start of links must be their states, got a system's")
     if not isinstance(solver, FollowingSteps | FollowingDense):
         return [history([state]) for state in states]
     every = zip(model.links, model.joints, states, strict=True)

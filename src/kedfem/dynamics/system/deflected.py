@@ -24,13 +24,14 @@ from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 
 SWEEPS = 60
+DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 CONVERGED = 1e-10  # change of a sweep, of the deflection
 SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a body that nothing else holds; taken out again by sweeps
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
 
-AHEAD = {2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
+AHEAD = {1: [1], 2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 Spins = Float[np.ndarray, "L 3 3"]
@@ -98,17 +99,19 @@ def _moving(of: Ready, motion_at: Motion, time: float) -> tuple[Flat, Flat]:
     h = of.c.h / 4
     instants = [Instant(of, motion_at, time)]
     instants += [Instant(of, motion_at, time + k * h, instants[0]) for k in range(1, 5)]
-    u = np.zeros((5, int(of.bodies.at[-1])))
-    z1: list[Flat | None] = [None] * 5
-    for again in range(2 if _feels_rates(of) else 1):
+    u, v, change = np.zeros((5, int(of.bodies.at[-1]))), np.zeros((5, 0)), np.inf
+    for again in range(DAMPED if _feels_rates(of) else 1):
+        before, felt = u.copy(), v
         for k, now in enumerate(instants):
             guess = u[k]
-            if again == 0 and k:  # as the last has turned, then as all before have gone
-                guess = u[0] + h * _turning(instants[0], u[0]) if k == 1 else AHEAD[k] @ u[:k]
-            u[k] = _balanced(now, guess, lambda u, f: np.zeros_like(u), _spins(now), z1[k])
-        v = LATER @ u / h
-        z1 = [now.interface(x) for now, x in zip(instants, v, strict=True)]
-    return u[0], v[0]
+            if again == 0 and k:  # joints are closed in all before, and so in what these go on to
+                guess = AHEAD[k] @ u[:k]
+            z1 = now.interface(v[k]) if again else None
+            u[k] = _balanced(now, guess, lambda u, f: np.zeros_like(u), _spins(now), z1)
+        v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
+        if again and (change > last / 2 or change <= CONVERGED * float(np.linalg.norm(u[0]))):
+            break
+    return u[0], v[0] if again == 0 else felt[0]  # the rates that dampers have felt: u balances these
 
 
 def _feels_rates(of: Ready) -> bool:
@@ -177,13 +180,6 @@ def _balanced(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
         'their weight, or a drive at a natural frequency; take initial = "rest", a slower drive or stiffer links'
     )
-
-
-def _turning(now: Instant, u: Flat) -> Flat:
-    """Rates [ω]× u of a deflection that turns with the nominal motion."""
-    links = enumerate(zip(now.of.system.model.links, cross_matrix(now.omega), strict=True))
-    each = [turned_rate(W, rows(now.of, k, u[own(now.of, k)])) for k, (_, W) in links]
-    return as_coordinates(now.of, each)
 
 
 def _asked(now: Instant, u: Flat, z1: Flat | None) -> Asked:

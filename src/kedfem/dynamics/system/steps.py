@@ -1,29 +1,30 @@
-"""Steps of links with nominal frames under motors, springs and dampers, taken by the system, as histories of links.
+"""Steps of links with nominal frames, taken by the system, as histories of links.
 
 What a force element exerts on its links is part of their forces F there, and forces at ports are those of joints alone.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from kedfem.dynamics.action import Action, kernel_table, vectors
 from kedfem.dynamics.coupling import Attachment, joined
-from kedfem.dynamics.dense import coordinates, port_rows, work_on, work_over_time
-from kedfem.dynamics.history import Block, Forcing, LinkHistory
+from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import port_columns, turned_ports
+from kedfem.dynamics.row_joints import RowJoint
 from kedfem.dynamics.row_ports import Ways
 from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.system.arrays import History, State
-from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.instant import Instant, turned
-from kedfem.dynamics.system.internal import own
+from kedfem.dynamics.system.deflected import quasi_static
+from kedfem.dynamics.system.ends import end_of
+from kedfem.dynamics.system.instant import Motion
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.record import System
+from kedfem.dynamics.system.record import End, System
+from kedfem.dynamics.system.start import rest
+from kedfem.dynamics.system.supports import supports
 from kedfem.errors import MeshError
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
@@ -47,8 +48,25 @@ def nominal_system(scene: Scene, model: Model) -> System | None:
         held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
     except MeshError:
         return None
-    own = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
-    return system_of(scene, rigid, model=own)
+    here = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
+    return system_of(scene, rigid, model=here)
+
+
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """An end of a force element on link k: interface points (p, b) on some of its nodes, and their part of its ports.
+
+    bears : number of components that it bears on: a slider has no moment
+    to_ports : (q, m) forces at ports of joints that are on the link what forces at these points are, link frame
+    """
+
+    name: str
+    k: int
+    end: End
+    nodes: Int[np.ndarray, " b"]
+    weights: Float[np.ndarray, "p b"]
+    bears: int
+    to_ports: Float[np.ndarray, "q m"]
 
 
 class SystemSteps:
@@ -57,54 +75,56 @@ class SystemSteps:
     Parameters
     ----------
     model : of the links whose states are handed on, without interface points for force elements
-    every : motors and springs as actions on it
     """
 
     stiffening = None
 
-    def __init__(self, system: System, model: Model, scheme: Scheme, every: Sequence[Action]) -> None:
-        self.model, self.links, self.ready, self.every = model, model.links, ready(system, scheme), every
+    def __init__(self, scene: Scene, system: System, model: Model, scheme: Scheme) -> None:
+        self.scene, self.model, self.links = scene, model, model.links
+        self.ready = ready(system, scheme)
         self.factorisations = len(self.ready.parts)
-        unit = {"stiffness": 0.0, "damping": 0.0, "over": 0, "at": (0.0,), "value": (1.0,)}
-        self._unit = kernel_table([replace(action, **unit) for action in every])  # type: ignore[arg-type]
-        names = {each.name: n for n, each in enumerate(system.constraints)}
-        self._of = [names.get(action.name.replace("/", "."), -1) for action in every]
-        self._W = [
-            port_rows(part.T, joint, link.n)
-            for part, joint, link in zip(self.ready.parts, model.joints, model.links, strict=True)
+        every = list(zip(model.links, model.joints, system.model.joints, strict=True))
+        bodies = linkage(scene).bodies
+        inverse = [np.linalg.pinv(port_columns(joint, link.n)) for link, joint, _ in every]
+        self._to_ports = [
+            x @ port_columns(own, link.n) for x, (link, _, own) in zip(inverse, every, strict=True)
         ]
-        self._from_work = [np.linalg.pinv(W) for W in self._W]
+        self._bearings = [
+            _bearing(row, side, bodies, system.model, inverse)
+            for row in system.model.rows if row.name.startswith(("springs.", "motors."))
+            for side in (0, 1) if row.sides[side] is not None
+        ]  # fmt: skip
 
-    def begin(self, states: Sequence[LinkState], motion: RigidMotion) -> State:
-        """The system's state from those of links.
+    def start(self, at_rest: bool, motion_at: Motion, rates: Sequence[Float[np.ndarray, "_ _"]]) -> State:
+        """The state at t = 0.
 
         Parameters
         ----------
-        motion : nominal motion at that time only
+        rates : per link (n, d) δ' at rest, world components; none if not given
+
+        Raises
+        ------
+        SolveError
+            If no quasi-static deflection is found.
         """
-        of = self.ready
-        state, now = empty_state(of.bodies, of.constraints), Instant(of, lambda t: motion, float(motion.t[0]))
-        bearing = np.zeros(of.system.unknowns)
-        state.time[0], state.F[:] = motion.t[0], now.F
-        for k, (link, part, joint, s) in enumerate(
-            zip(self.links, of.parts, of.system.model.joints, states, strict=True)
-        ):
-            at = own(of, k)
-            for out, x in ((state.u, s.u), (state.v, s.v), (state.a, s.a)):
-                out[at] = coordinates(link, part, x).ravel()
-            state.f[at] = work_on(part, s.f @ s.R.T).ravel()
-            for m, x in enumerate(s.C if s.C is not None else ()):
-                N = at.stop - at.start
-                state.damped[3 * at.start + m * N :][:N] = work_on(part, x).ravel()
-            left = (state.a[at] + state.f[at] - state.F[at]).reshape(link.d, link.n)
-            inside = np.linalg.lstsq(part.W.T, (s.R.T @ left).ravel(), rcond=None)[0]
-            force = _turned(joint, inside[None], s.R.T[None])[0]
-            state.port_force[of.bodies.port_at[k] : of.bodies.port_at[k + 1]] = force
-            bearing += joint.B.T @ force
-        z = np.stack([now.interface(x) for x in (state.u, state.v, state.a)])
-        state.z[:, now.always.number], state.bearing[now.always.number] = z, bearing
-        state.e[:], state.turned[:] = now.coordinates(z), turned(now, z[0])
-        return state
+        return rest(self.ready, motion_at, rates) if at_rest else quasi_static(self.ready, motion_at, rates)
+
+    def first(self, state: State, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
+        """A state as histories of one time point."""
+        bodies, g = self.ready.bodies, np.zeros_like(state.u)
+        for k, link in enumerate(self.links):
+            here = slice(int(bodies.at[k]), int(bodies.at[k + 1]))
+            g[here] = (forcing[k].R[0].T @ state.u[here].reshape(link.d, -1)).ravel()
+        found = History(
+            u=state.u[None], v=state.v[None], a=state.a[None], F=state.F[None], g=g[None], strain=state.strain[:1],
+            R=motion.R[:, bodies.motion], port_force=state.port_force[None], energy=np.zeros((1, len(self.links))),
+            z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None],
+        )  # fmt: skip
+        out = self._histories(found, forcing, motion)
+        for k, (x, link) in enumerate(zip(out, self.links, strict=True)):
+            flat = x.g.ravel()
+            out[k] = replace(x, strain=np.array([0.5 * float(flat @ (link.K0 @ flat))]))
+        return out
 
     def advance(
         self, state: State, forcing: Sequence[Forcing], motion: RigidMotion
@@ -117,46 +137,60 @@ class SystemSteps:
             If the iterations of a step do not converge.
         """
         state, found = march(self.ready, state, motion)
-        moved = [self._moved(k, found, each) for k, each in enumerate(forcing)]
-        acting = self._acting(moved, found, motion)
-        return [
-            replace(link, F=link.F + F, port_forces=self._at_joints(k, found, link.R, F))
-            for k, (link, F) in enumerate(zip(moved, acting, strict=True))
-        ], state
+        return self._histories(found, forcing, motion), state
 
-    def _moved(self, k: int, found: History, forcing: Forcing) -> LinkHistory:
-        """How a link moves; its forces are still those of loads alone."""
-        u, v, a, g = (displacements(self.ready, k, x) for x in (found.u, found.v, found.a, found.g))
-        strain = found.energy[:, k].copy()
-        return LinkHistory(u, v, a, g, forcing.R, forcing.F, np.zeros((len(u), 0)), strain)
-
-    def _acting(self, moved: Sequence[LinkHistory], found: History, motion: RigidMotion) -> list[Rows]:
-        """Forces of motors and springs on the rows (T, n, d) of all links, world components."""
-        from kedfem.dynamics.actions_kernel import evaluate_all
-
-        out = [np.zeros_like(link.u) for link in moved]
-        if not self.every:
-            return out
-        x, _ = vectors(self.every, Block(0, motion, moved))
-        forces, none = np.zeros_like(x), np.zeros((len(x), len(self.every), 4))
-        evaluate_all(motion.t, x, np.zeros_like(x), np.zeros(len(self.every)), self._unit, forces, none)
-        for i, (action, n) in enumerate(zip(self.every, self._of, strict=True)):
-            for e, end in enumerate(action.ends):
-                if end.k >= 0:
-                    f = found.multiplier[:, n, None, None] * forces[:, i, e, : len(end.weights)] * end.mask
-                    out[end.k] += np.einsum("mn,tmc->tnc", end.weights, f)[:, :, : out[end.k].shape[2]]
+    def _histories(
+        self, found: History, forcing: Sequence[Forcing], motion: RigidMotion
+    ) -> list[LinkHistory]:
+        """All links, with what force elements exert on them."""
+        acting = [np.zeros_like(each.F) for each in forcing]
+        bodies, out = self.ready.bodies, []
+        at_ports = [
+            _turned_back(joint, found.port_force[:, bodies.port_at[k] : bodies.port_at[k + 1]], each.R)
+            @ self._to_ports[k].T
+            for k, (joint, each) in enumerate(zip(self.ready.system.model.joints, forcing, strict=True))
+        ]
+        seen = supports(self.ready, self.scene, found, motion)
+        for one in self._bearings:
+            R, c = forcing[one.k].R, one.bears
+            y = np.zeros((len(R), len(one.weights), R.shape[1]))
+            y[:, :, :c] = seen.on_end(one.name, one.end)[:, :, :c]
+            acting[one.k][:, one.nodes] += np.einsum("pb,tpd->tbd", one.weights, y)
+            at_ports[one.k] -= (y @ R).reshape(len(y), -1) @ one.to_ports.T
+        for k, (each, F) in enumerate(zip(forcing, acting, strict=True)):
+            u, v, a, g = (displacements(self.ready, k, x) for x in (found.u, found.v, found.a, found.g))
+            out.append(LinkHistory(u, v, a, g, each.R, each.F + F, at_ports[k], found.energy[:, k].copy()))
         return out
 
-    def _at_joints(self, k: int, found: History, R: Rows, F: Rows) -> Float[np.ndarray, "T q"]:
-        """Forces of joints on a link at its ports, link frame: those at interface points less those of force elements."""
-        bodies, part, joint = self.ready.bodies, self.ready.parts[k], self.ready.system.model.joints[k]
-        force = found.port_force[:, bodies.port_at[k] : bodies.port_at[k + 1]]
-        work = _turned(joint, force, R) @ part.W - work_over_time(part, F @ R).reshape(len(R), -1)
-        return np.asarray(work @ self._from_work[k])
+
+def _bearing(
+    row: RowJoint, side: int, bodies: Sequence[str], model: Model, inverse: Sequence[Float[np.ndarray, "_ _"]]
+) -> Bearing:
+    """What an end of a force element has on a link, or on the link that its slider rides on."""
+    on = row.sides[side]
+    if on is None:
+        raise ValueError(f"{row.name}: must have an end on a link, got none")
+    slider = next((x for x in model.sliders if x.name == bodies[on.body]), None)
+    if slider is not None:
+        k, weights = slider.carrier, slider.weights[None]
+    else:
+        k = model.bodies.index(on.body)
+        before = row.sides[0]
+        first = len(before.points) if side and before is not None and before.body == on.body else 0
+        ports = [p for p, name in enumerate(model.joints[k].joints) if name == row.name][first:][
+            : len(on.points)
+        ]
+        weights = np.zeros((len(ports), model.links[k].n))
+        weights[:, model.joints[k].nodes] = model.joints[k].weights[ports]
+    link, nodes = model.links[k], np.flatnonzero(weights.any(axis=0))
+    bears = 2 if slider is not None and link.planar else link.d
+    columns = np.zeros((link.n, link.d, len(weights), link.d))
+    for c in range(bears):
+        columns[:, c, :, c] = weights.T
+    to_ports = inverse[k] @ columns.reshape(link.n * link.d, -1)
+    return Bearing(row.name, k, end_of(on), nodes, weights[:, nodes], bears, to_ports)
 
 
-def _turned(joint: Attachment, force: Float[np.ndarray, "T q"], R: Rows) -> Float[np.ndarray, "T q"]:
+def _turned_back(joint: Attachment, force: Float[np.ndarray, "T q"], R: Rows) -> Float[np.ndarray, "T q"]:
     """Rᵀ of forces at held components of ports."""
-    out = np.zeros((len(force), len(joint.weights), joint.components))
-    out.reshape(len(force), -1)[:, joint.keep] = force
-    return np.asarray((out @ R).reshape(len(force), -1)[:, joint.keep])
+    return turned_ports(joint, R.transpose(0, 2, 1), force)

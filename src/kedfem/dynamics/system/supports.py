@@ -117,10 +117,10 @@ class Supports:
             for side in sides:
                 if side is not None and side.shared:
                     ends = corners(side) if row.name.startswith("rigid.") else [end_of(side)]
-                    out += [self._on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
+                    out += [self.on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
         return np.concatenate(out, axis=1)
 
-    def _on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
+    def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
         """What a joint's constraints and laws exert on the points of one of its ends."""
         y = np.zeros((len(self.z), *end.onto.shape[:2]))
         for n, each in enumerate(self.of.system.constraints):
