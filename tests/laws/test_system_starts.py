@@ -85,10 +85,15 @@ def test_quasi_static_starts_do_not_vibrate(frames: str) -> None:
     assert np.linalg.norm(shaken.u[-1] - wanted) > 0.1 * size
 
 
+@pytest.mark.parametrize("sparse", [False, True])
 @pytest.mark.parametrize("turned", [0.5, 2.0, 4.0])
-def test_a_bar_that_spins_faster_than_it_vibrates_is_deflected_exactly(turned: float) -> None:
+def test_a_bar_that_spins_faster_than_it_vibrates_is_deflected_exactly(
+    turned: float, sparse: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """E A u'' + ρ A Ω² (x + u) = 0: u = sin k x / (k cos k L) − x, k = Ω √(ρ/E); its first frequency is at k L = π/2."""
     L, E = 0.5, 1e9
+    if sparse:
+        monkeypatch.setattr("kedfem.dynamics.system.layout.SMALL", 0)
     k = turned / L
     speed = k * np.sqrt(E / 7850)
     raw: Raw = {

@@ -19,6 +19,7 @@ from kedfem.results.records import Channel
 from kedfem.scene import scene_from, time_grid
 from tests.rooms.test_acted import balance, four_bar, line, slider_crank
 
+SOLIDS = {"crank": [4, 1, 1], "coupler": [24, 2, 1], "rocker": [4, 1, 1]}
 CURVE = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
 
 
@@ -27,6 +28,14 @@ def bushed() -> dict[str, Any]:
     raw = four_bar("nominal", springs=line(100.0), steps=72)
     raw["joints"]["C"]["bushing"] = {"stiffness": [1e5, 2e5, 1e5], "damping": [10.0, 10.0, 10.0]}
     raw["drive"] |= {"shaft_stiffness": 500.0, "shaft_damping": 0.5}
+    return raw
+
+
+def large() -> dict[str, Any]:
+    """Solid links, one of 1,407 unknowns with a sparse factor beside two with dense matrices."""
+    raw = four_bar("nominal", "solid", springs=line(20.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0})
+    for name, link in raw["links"].items():
+        link["mesh"] = {"elements": SOLIDS[name]}
     return raw
 
 
@@ -41,6 +50,7 @@ SCENES = {
     "spring along a slide": partial(slider_crank, steps=72, damping=5.0),
     "bushing and shaft": bushed,
     DEAR: lambda: four_bar("nominal", "reduced", springs=line(20.0), steps=36),
+    "a large solid link beside small ones": large,
     "plane links": lambda: four_bar(
         "nominal", "plane", springs=line(20.0), motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
 }  # fmt: skip
@@ -94,3 +104,17 @@ def test_quasi_static_starts_of_damped_bushings_and_shafts_do_not_ring(spring: b
         left.append(balance(raw)[0])
     assert left[0] < 5e-4
     assert left[0] / left[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_sparse_bodies_move_as_dense_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From quasi-static starts, whose iterations end at 1e-10 of deflections; rates are of these over a quarter step."""
+    raw = bushed()
+    raw |= {"damping": {"beta": 1e-5, "alpha": 1.0}}
+    _, wanted = channels(raw, steps_of)
+    monkeypatch.setattr("kedfem.dynamics.system.layout.SMALL", 0)
+    solver, found = channels(raw, steps_of)
+    assert isinstance(solver, SystemSteps)
+    assert not solver.ready.bodies.dense.any()
+    for each, x in wanted.items():
+        size = max(float(np.abs(y).max()) for like, y in wanted.items() if like.unit == each.unit)
+        assert np.abs(found[each] - x).max() <= 1e-7 * size, each.name

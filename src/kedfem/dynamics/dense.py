@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -40,6 +40,18 @@ class DensePart:
     S: Float[np.ndarray, "q q"]
     W: Float[np.ndarray, "q N"]
     unit: bool = False
+
+
+class Coordinates(Protocol):
+    """How coordinates of a part are its nodal rows: row c is T[c] x[c]; without any T they are these themselves."""
+
+    @property
+    def T(self) -> tuple[np.ndarray, ...]:
+        """Per component (n, n)."""
+
+    @property
+    def unit(self) -> bool:
+        """Whether each is 1."""
 
 
 class DenseSteps:
@@ -231,24 +243,28 @@ def component_first(T: Sequence[Float[np.ndarray, "n n"]], K: Any) -> Float[np.n
     )
 
 
-def coordinates(link: Link, part: DensePart, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+def coordinates(link: Link, part: Coordinates, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
     """x of a state: T⁻¹ = Tᵀ m."""
+    if not part.T:
+        return np.ascontiguousarray(rows.T)
     return np.stack([part.T[c].T @ (link.mass[c] @ rows[:, c]) for c in range(link.d)])
 
 
-def work_on(part: DensePart, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
+def work_on(part: Coordinates, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:
     """Nodal forces on x."""
+    if not part.T:
+        return np.ascontiguousarray(rows.T)
     return np.stack([T.T @ rows[:, c] for c, T in enumerate(part.T)])
 
 
-def work_over_time(part: DensePart, rows: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T d n"]:
+def work_over_time(part: Coordinates, rows: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T d n"]:
     """Nodal forces on x over time."""
     if part.unit:
         return rows.transpose(0, 2, 1)
     return np.stack([rows[:, :, c] @ T for c, T in enumerate(part.T)], axis=1)
 
 
-def rows_of(link: Link, part: DensePart, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
+def rows_of(link: Link, part: Coordinates, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
     """States of x over time."""
     if part.unit:
         return np.array(x[:, : link.d, : link.n].transpose(0, 2, 1), order="C")

@@ -38,12 +38,12 @@ def held_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> HeldPart
 def held_substructure(part: Substructure) -> HeldPart:
     """A link condensed onto ports and anchors, seen from its ports."""
     q = len(part.attachment.keep)
-    Y = part.Y @ part.S[:, :q]
+    Y, rows = part.Y @ part.S[:, :q], np.ascontiguousarray(part.Y.T)
 
     def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
         y = part.solve(r)
         at_ports = part.S @ part.seen(y)
-        return y - (part.Y @ at_ports).reshape(y.shape), at_ports[:q]
+        return y - (at_ports @ rows).reshape(y.shape), at_ports[:q]
 
     return HeldPart(held, Y, part.S[:q, :q])
 

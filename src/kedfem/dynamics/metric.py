@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kedfem.dynamics.dense import DensePart
+from kedfem.dynamics.dense import Coordinates
 from kedfem.links.record import BeamElement, Link
 
 Tables = tuple[np.ndarray, ...]
@@ -40,7 +40,7 @@ class Elements(NamedTuple):
     pairs: Any
 
 
-def element_tables(links: Sequence[Link], parts: Sequence[DensePart]) -> Elements:
+def element_tables(links: Sequence[Link], parts: Sequence[Coordinates]) -> Elements:
     """Of all links that are elements of beams in space; in the coordinates of their parts."""
     which = [k for k, link in enumerate(links) if link.element is not None]
     number, width = np.full(len(links), -1), max(link.n for link in links)
@@ -62,7 +62,7 @@ def room_for(elements: Elements) -> Tables:
     return tuple(np.zeros(shape) for shape in shapes)
 
 
-def _own(link: Link, x: BeamElement, part: DensePart, width: int) -> Tables:
+def _own(link: Link, x: BeamElement, part: Coordinates, width: int) -> Tables:
     """Sizes and arrays of one element: rows of the position become rows of coordinates, y = T x, component first."""
     T, n, s = part.T[0], link.n, len(x.stiffness)
     sizes = np.array([len(x.tangents), len(x.directors), len(x.node), len(x.pairs)])

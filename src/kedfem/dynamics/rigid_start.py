@@ -19,8 +19,8 @@ from jaxtyping import Float
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.held import HeldPart, held_part, held_substructure
 from kedfem.dynamics.ports import port_rotation, port_values
-from kedfem.dynamics.start import mass_substructure
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf
+from kedfem.dynamics.substructure import mass_substructure
 from kedfem.links.record import Link, mass_times
 
 STIFFER = 1e6  # κ of a rigid link, of its mass over its stiffness

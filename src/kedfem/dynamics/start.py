@@ -7,14 +7,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.first_rows import FirstRows, interface_values
 from kedfem.dynamics.interface import Tie
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import Rotation
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
-from kedfem.dynamics.substructure import Substructure, coupled, factored, substructure
+from kedfem.dynamics.substructure import Substructure, coupled, factored, mass_substructure
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.initial import initial_twists
@@ -217,22 +216,6 @@ def _change(new: Sequence[NodalOf], old: Sequence[NodalOf]) -> tuple[float, floa
     """Largest change and largest value."""
     change = max(float(np.abs(x - y).max()) for x, y in zip(new, old, strict=True))
     return change, max(float(np.abs(x).max()) for x in new)
-
-
-def mass_substructure(link: Link, joint: Attachment) -> Substructure:
-    """The link condensed with A = M; the three components of a solid share one factor.
-
-    Conjugate gradients would spare it, but a heavy body on a bore costs them their convergence.
-    """
-    of = {id(m): Cholesky(m, f"links.{link.name}: mass") for m in {id(m): m for m in link.mass}.values()}
-
-    def solve(b: Nodal) -> Nodal:
-        return np.stack([np.array(of[id(m)].solve(b[:, k])) for k, m in enumerate(link.mass)], axis=1)
-
-    def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
-        return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
-
-    return substructure(joint, link.n, solve, solve_many)
 
 
 def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:

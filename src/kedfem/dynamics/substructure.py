@@ -153,6 +153,22 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     )
 
 
+def mass_substructure(link: Link, joint: Attachment) -> Substructure:
+    """The link condensed with A = M; the three components of a solid share one factor.
+
+    Conjugate gradients would spare it, but a heavy body on a bore costs them their convergence.
+    """
+    of = {id(m): Cholesky(m, f"links.{link.name}: mass") for m in {id(m): m for m in link.mass}.values()}
+
+    def solve(b: Nodal) -> Nodal:
+        return np.stack([np.array(of[id(m)].solve(b[:, k])) for k, m in enumerate(link.mass)], axis=1)
+
+    def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
+        return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
+
+    return substructure(joint, link.n, solve, solve_many)
+
+
 def _dense_factored(
     link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
 ) -> Substructure:

@@ -70,17 +70,16 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         every = (*actions(scene, model), *followers(model))
         return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
     every = actions(scene, model)
-    small = all(map(_is_small, model.links))
+    stresses = stiffening(model) if scene.analysis.stiffening else None
     damped = any(row.damping.any() for row in model.rows)  # which only the system's starts know
-    if (every or damped) and small and scene.analysis.solver != "literal" and not scene.analysis.stiffening:
+    if (every or damped) and stresses is None and scene.analysis.solver != "literal":
         system = nominal_system(scene, model)
         if system is not None:
             return SystemSteps(scene, system, model, scheme)
-    small = small and not every
+    small = all(map(_is_small, model.links)) and not every
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
     if scene.analysis.solver == "literal":
         solver = LiteralSteps
-    stresses = stiffening(model) if scene.analysis.stiffening else None
     made = solver(model.links, model.joints, scheme, model.damping, stresses)
     return made if isinstance(made, DenseSteps) or not every else ActedSteps(made, every)
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import coordinates
-from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body
+from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, mass_body
 from kedfem.dynamics.system.instant import Flat, Instant
 from kedfem.dynamics.system.internal import drawn, own, rows, turned_rate
 from kedfem.links.record import Link
@@ -34,9 +34,11 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
     of = now.of
     pure = [rigid_motions(now, k, u) if rigid else None for k in range(len(of.parts))]
     held = []
-    for P, part in zip(pure, of.parts, strict=True):
-        one = np.eye(part.W.shape[1])
-        held.append(held_body(one if P is None else P @ P.T + STIFFER * (one - P @ P.T), part.W))
+    for k, (P, part) in enumerate(zip(pure, of.parts, strict=True)):
+        if P is None:
+            held.append(mass_body(of, k))
+        else:
+            held.append(held_body(P @ P.T + STIFFER * (np.eye(len(P)) - P @ P.T), part.W))
     balance = Balance(of, held, now.R, asked)
     stress = np.zeros_like(r)
     turning = centripetal(now, u, v) if rigid else stress

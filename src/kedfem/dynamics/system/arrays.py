@@ -50,12 +50,26 @@ class Beams(NamedTuple):
     rigidity: Any
 
 
+class Masses(NamedTuple):
+    """Mass of sparse bodies, whose coordinates are nodal: matrices m of components, row by row, one after the other.
+
+    of : (i, 3) number of the matrix of each component; at : where its rows' ends begin in `row`
+    """
+
+    of: Any
+    at: Any
+    row: Any
+    column: Any
+    value: Any
+
+
 class Bodies(NamedTuple):
     """All bodies as flat arrays, constant; i counts bodies.
 
     at : (i + 1,) where the coordinates of each begin; functions, components : n and d; motion : number in the linkage
     frame, kind : NOMINAL, COROTATIONAL or TANGENTIAL; as `frames_kernel` counts kinds
-    dense : whether G and Y are here; passed : where its coordinates stand among those that passes change, −1 if none
+    dense : whether G is here; else a sparse factor gives G r and Yᵀ r, coordinates are nodal and `mass` counts
+    passed : where its coordinates stand among those that passes change, −1 if none
     port_at : (i + 1,) held components q; component : of each; group_at : (i + 2...) where interface points begin
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`
     column_at, columns : interface unknowns that each body knows; first : profile of their common matrix
@@ -92,6 +106,7 @@ class Bodies(NamedTuple):
     K: Any
     beams: Beams
     elements: Elements
+    mass: Masses
 
 
 class Ends(NamedTuple):
@@ -143,6 +158,7 @@ class State(NamedTuple):
     u, v, a : (N,) δ, δ', δ'' in coordinates, world components
     F, f : (N,) applied and internal force, world components
     damped : (3N,) per body (3, N): damping force without its rate, and its rates, in the nominal frame
+    momentum : (3N,) per sparse body (3, N): M δ, M δ', M δ'' in world components
     seen : (3N,) per co-rotational body (3, N): deformation g and its rates
     Q, angle : (bodies, 3, 3), (bodies,) the frames' rotation in the nominal one; of planar bodies its angle, with turns
     strain, direction, turn : of planar beams at their points, see `beams_kernel`
@@ -161,6 +177,7 @@ class State(NamedTuple):
     F: Any
     f: Any
     damped: Any
+    momentum: Any
     seen: Any
     Q: Any
     angle: Any
@@ -225,7 +242,8 @@ class Driving(NamedTuple):
 class Trial(NamedTuple):
     """The end of a step while it is sought; arrays as in `State`.
 
-    r : (N,) right-hand sides or residuals in the bodies' frames; reaction, w, force : (q,) at their interface points
+    r : (N,) right-hand sides or residuals in the bodies' frames; held : (N,) G r of sparse bodies
+    reaction, w, force : (q,) at their interface points
     Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B; H : (k, k) their common matrix, then factored
     mixing : room of `mixing_kernel`
     C, CH : (r, k) gradients, and these after the first half of a solution with H; G : (r, r); target, compliance, beside,
@@ -244,6 +262,7 @@ class Trial(NamedTuple):
     resisted: Any
     strained: Any
     r: Any
+    held: Any
     reaction: Any
     w: Any
     force: Any

@@ -10,16 +10,21 @@ W M = 1,
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, splu
 
+from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.ports import port_rotation
+from kedfem.dynamics.substructure import Substructure, mass_substructure
 from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.sparse import SparsePart, sparse_part
 from kedfem.errors import SolveError
+from kedfem.links.record import Link
 
 DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
 
@@ -43,9 +48,9 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class HeldBody:
-    """A body seen from its interface points, in its frame: G, Y, Ȳ, S as above; W (q, N)."""
+    """A body seen from its interface points, in its frame: G, Y, Ȳ, S as above, W (q, N); a sparse one's G acts."""
 
-    G: Float[np.ndarray, "N N"]
+    G: Any
     Y: Float[np.ndarray, "N q"]
     left: Float[np.ndarray, "N q"]
     S: Float[np.ndarray, "q q"]
@@ -72,6 +77,25 @@ def held_body(A: Float[np.ndarray, "N N"], W: Float[np.ndarray, "q N"]) -> HeldB
     M = V[:, :q] @ np.linalg.inv(L[:q]).T
     Y, left = M - G @ (A @ M), M - G.T @ (A.T @ M)
     return HeldBody(G, Y, left, left.T @ A @ Y, W)
+
+
+def sparse_body(link: Link, joint: Attachment, of: Substructure) -> HeldBody:
+    """A sparse body with the symmetric matrix that was factored."""
+    part = sparse_part(link, joint, of)
+
+    def applied(r: Flat) -> Flat:
+        return np.asarray(part.held(r.reshape(link.d, -1).T)[0].T).ravel()
+
+    G = LinearOperator((link.unknowns,) * 2, applied, dtype=float)
+    return HeldBody(G, part.Y, part.Y, part.S, part.W)
+
+
+def mass_body(of: Ready, k: int) -> HeldBody:
+    """Body k with its mass for a matrix, which is one in the coordinates of dense bodies."""
+    part, link, joint = of.parts[k], of.system.model.links[k], of.system.model.joints[k]
+    if isinstance(part, SparsePart):
+        return sparse_body(link, joint, mass_substructure(link, joint))
+    return held_body(np.eye(part.W.shape[1]), part.W)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,8 @@ def empty_state(bodies: Bodies, of: Constraints) -> State:
     direction[:] = bodies.beams.tangent
     return State(
         time=np.zeros(1), u=np.zeros(N), v=np.zeros(N), a=np.zeros(N), F=np.zeros(N), f=np.zeros(N),
-        damped=np.zeros(3 * N), seen=np.zeros(3 * N), Q=np.tile(np.eye(3), (L, 1, 1)), angle=np.zeros(L),
+        damped=np.zeros(3 * N), momentum=np.zeros(3 * N), seen=np.zeros(3 * N),
+        Q=np.tile(np.eye(3), (L, 1, 1)), angle=np.zeros(L),
         strain=np.zeros((3, b, 3, E)), direction=direction, turn=np.zeros((b, E)),
         port_force=np.zeros(int(bodies.port_at[-1])), z=np.zeros((3, k)), e=np.zeros((3, r)),
         turned=np.zeros(len(of.kind)), bearing=np.zeros(k), multiplier=np.zeros(r), pairs=np.zeros((2, DEPTH, moving)),
@@ -33,7 +34,8 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
     return Trial(
         u=like.u.copy(), f=like.u.copy(), damped=like.damped.copy(), seen=like.seen.copy(), Q=like.Q.copy(),
         angle=like.angle.copy(), base=np.zeros((b, 4, points)), resisted=np.zeros((b, 3, points)),
-        strained=np.zeros((b, 6, points)), r=like.u.copy(), reaction=np.zeros(q), w=np.zeros(q), force=np.zeros(q),
+        strained=np.zeros((b, 6, points)), r=like.u.copy(), held=like.u.copy(),
+        reaction=np.zeros(q), w=np.zeros(q), force=np.zeros(q),
         Rp=np.zeros((L, 3, 3)), RB=np.zeros(B), SRB=np.zeros(B), H=np.zeros((k, k)), H_rows=np.zeros((k, k)),
         z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(), C=np.zeros((r, k)), CH=np.zeros((r, k)),
         G=np.zeros((r, r)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), pivots=np.zeros(r),

@@ -19,12 +19,19 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     c_m, c_f = 1 - c.alpha_m, 1 - c.alpha_f
     n0, n1, n2 = c_m * c.acceleration[0], c_m * c.acceleration[1], c_m * c.acceleration[2] - c.alpha_m
+    N = last - first
+    if bodies.dense[i]:
+        for x in range(first, last):
+            room[x - first] = n0 * state.u[x] + n1 * state.v[x] + n2 * state.a[x]
+    else:
+        momentum = state.momentum[3 * first : 3 * last]
+        for x in range(N):
+            room[x] = n0 * momentum[x] + n1 * momentum[x + N] + n2 * momentum[x + 2 * N]
+    F0, f0 = state.F, state.f
     for x in range(first, last):
-        total = n0 * state.u[x] + n1 * state.v[x] + n2 * state.a[x] + c_f * F[x]
-        room[x - first] = total + c.alpha_f * (state.F[x] - state.f[x])
+        room[x - first] += c_f * F[x] + c.alpha_f * (F0[x] - f0[x])
     turned_back(R, d, room[: last - first], out[first:last])
     if c.alpha != 0.0 or c.beta != 0.0:
-        N = last - first
         for m in range(3):
             of = 3 * first + m * N
             for x in range(N):
@@ -32,20 +39,28 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
 
 
 @inner
-def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room):  # type: ignore[no-untyped-def]
+def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
     """End of the step of a body with the nominal frame, from g and its balance K g = r + Wᵀ λ = A g."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
     n0, n1, n2 = c.acceleration
     energy, damped = 0.0, c.alpha != 0.0 or c.beta != 0.0
+    if bodies.dense[i]:
+        copied(g[:N], Mg[:N])
+    else:
+        turned(R, d, g[:N], room[:N])
+        mass_times(bodies, i, room, Mg)
+        carried_on(c, Mg, state.momentum[3 * first : 3 * last])
+        turned_back(R, d, Mg[:N], room[:N])
+        copied(room[:N], Mg[:N])
     for x in range(N):
-        Kg[x] = (Kg[x] - c.c_M * g[x]) / c.c_K
+        Kg[x] = (Kg[x] - c.c_M * Mg[x]) / c.c_K
         energy += g[x] * Kg[x]
         room[x] = Kg[x]
         if damped:
             of = 3 * first + x
             y, y0, y1, y2 = (
-                c.alpha * g[x] + c.beta * Kg[x],
+                c.alpha * Mg[x] + c.beta * Kg[x],
                 state.damped[of],
                 state.damped[of + N],
                 state.damped[of + 2 * N],
@@ -63,6 +78,42 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room):  # type: ig
     history.energy[t, i] = 0.5 * energy
     frame_copied(R, history.R[t, i])
     copied(g[:N], history.g[t, first:last])
+
+
+@inner
+def mass_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
+    """out becomes M x of a sparse body, in whichever axes; a matrix that all three components share is read once."""
+    n, d, of = bodies.functions[i], bodies.components[i], bodies.mass
+    row, column, value = of.row, of.column, of.value
+    if d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]:
+        at = of.at[of.of[i, 0]]
+        for j in range(n):
+            x0, x1, x2 = 0.0, 0.0, 0.0
+            for m in range(row[at + j], row[at + j + 1]):
+                k, y = column[m], value[m]
+                x0 += y * x[k]
+                x1 += y * x[n + k]
+                x2 += y * x[2 * n + k]
+            out[j], out[n + j], out[2 * n + j] = x0, x1, x2
+        return
+    for b in range(d):
+        at = of.at[of.of[i, b]]
+        for j in range(n):
+            total = 0.0
+            for m in range(row[at + j], row[at + j + 1]):
+                total += value[m] * x[b * n + column[m]]
+            out[b * n + j] = total
+
+
+@inner
+def carried_on(c, x, state):  # type: ignore[no-untyped-def]
+    """Newmark's formulas for any quantity from x at the end of the step; state (3N,) has it and its rates."""
+    n0, n1, n2 = c.acceleration
+    N = len(state) // 3
+    for m in range(N):
+        before, rate = state[m + 2 * N], state[m + N]
+        second = n0 * (x[m] - state[m]) - n1 * rate - n2 * before
+        state[m], state[m + N], state[m + 2 * N] = x[m], rate + c.late * second + c.early * before, second
 
 
 @inner

@@ -9,22 +9,26 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.dense import work_on
 from kedfem.dynamics.mixing import Mixing
+from kedfem.dynamics.substructure import factored
 from kedfem.dynamics.system.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body
+from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body, sparse_body
 from kedfem.dynamics.system.instant import Flat, Instant, Motion
 from kedfem.dynamics.system.internal import own, rows, turned_rate
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
+from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.start import as_coordinates, begun
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 
 SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
+KRYLOV = 60
 CONVERGED = 1e-10  # change of a sweep, of the deflection
 SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a body that nothing else holds; taken out again by sweeps
 LATER = np.array([
@@ -166,7 +170,7 @@ def _balanced(
         f, R = bodies.still.forces(now.motion.R[0], u)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
-            change = Balance(of, bodies.held(R), R, _asked(now, u, z1)).solved(r).x
+            change = bodies.change(Balance(of, bodies.held(R), R, _asked(now, u, z1)), r)
         except SolveError:
             break
         if settled:  # once more: what is left of stiff hubs would be large accelerations
@@ -200,12 +204,17 @@ class _Held:
     def __init__(self, now: Instant, spins: Spins | None) -> None:
         self.now, self.spins, self._made = now, spins, list[HeldBody]()
         self.still = now.always.still
-        self.least = SOFTER * now.always.lowest
+        self.least = SOFTER * now.always.lowest()
 
     def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
         """All bodies, the inertia of those that turn as their frames first were: sweeps take out the rest."""
         for k in range(len(self._made), len(R)):
-            link = self.now.of.system.model.links[k]
+            link, joint = self.now.of.system.model.links[k], self.now.of.system.model.joints[k]
+            if isinstance(
+                self.now.of.parts[k], SparsePart
+            ):  # Krylov iterations put the inertia of turning in
+                self._made.append(sparse_body(link, joint, factored(link, joint, self.least, 1.0)))
+                continue
             A = self.still.K[k] + self.least * np.eye(len(self.still.K[k]))
             if self.spins is not None:
                 S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
@@ -213,10 +222,25 @@ class _Held:
             self._made.append(held_body(A, self.now.of.parts[k].W))
         return self._made
 
-    def inertia(self, u: Flat) -> Flat:
-        """M ([α]× + [ω]×²) u."""
+    def change(self, balance: Balance, r: Flat) -> Flat:
+        """What a residual asks for: of sparse bodies the inertia of turning is put in by GMRES."""
+        direct, sparse = balance.solved(r).x, [isinstance(part, SparsePart) for part in self.now.of.parts]
+        if self.spins is None or not any(sparse):
+            return direct
+        none = balance.solved(0 * r).x
+
+        def applied(x: Flat) -> Flat:
+            return np.asarray(x + balance.solved(self.inertia(x, sparse)).x - none)
+
+        whole = LinearOperator((len(r),) * 2, applied, dtype=float)
+        return np.asarray(gmres(whole, direct, rtol=CONVERGED, restart=KRYLOV, maxiter=4)[0])
+
+    def inertia(self, u: Flat, of_bodies: Sequence[bool] | None = None) -> Flat:
+        """M ([α]× + [ω]×²) u, of all bodies or of some."""
         of, out = self.now.of, np.zeros_like(u)
         for k, S in enumerate(self.spins if self.spins is not None else ()):
-            d = of.system.model.links[k].d
-            out[own(of, k)] = (S[:d, :d] @ u[own(of, k)].reshape(d, -1)).ravel()
+            if of_bodies is None or of_bodies[k]:
+                link, here = of.system.model.links[k], own(of, k)
+                turned = (S[: link.d, : link.d] @ u[here].reshape(link.d, -1)).ravel()
+                out[here] = momentum(link, turned) if isinstance(of.parts[k], SparsePart) else turned
         return out

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +24,7 @@ from kedfem.dynamics.system.record import (
     Spring,
     Stop,
 )
+from kedfem.dynamics.system.sparse import SparsePart, sparse_frequency
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
@@ -46,7 +48,7 @@ class Always:
     number: Int[np.ndarray, " k"]
     closed: Callable[[Flat], Flat]
     still: Still
-    lowest: float
+    lowest: Callable[[], float]
 
 
 class Instant:
@@ -124,11 +126,20 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
 
 def always(of: Ready) -> Always:
     """What starts of a system ask at every time."""
-    still, links = Still(of), of.system.model.links
-    pairs = zip(still.K, links, strict=True)
-    elastic = (np.linalg.eigvalsh(K)[3 if link.planar else 6] for K, link in pairs if K.any())
-    least = min(elastic, default=1.0)
-    return Always(renumbered(of), closure(of), still, float(least))
+    still = Still(of)
+    return Always(renumbered(of), closure(of), still, cache(lambda: _lowest(of, still)))
+
+
+def _lowest(of: Ready, still: Still) -> float:
+    """Least eigenvalue of free bodies that strain."""
+    out = []
+    for k, (K, link) in enumerate(zip(still.K, of.system.model.links, strict=True)):
+        rigid = 3 if link.planar else 6
+        if isinstance(of.parts[k], SparsePart):
+            out.append(sparse_frequency(link, rigid))
+        elif K.any():
+            out.append(float(np.linalg.eigvalsh(K)[rigid]))
+    return min(out, default=1.0)
 
 
 def closure(of: Ready) -> Callable[[Flat], Flat]:

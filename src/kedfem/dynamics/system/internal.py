@@ -1,8 +1,10 @@
 """What a body is inside where a march begins: internal force, frames and damped quantities from u and u'."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import component_first, coordinates, rows_of, work_on
@@ -14,6 +16,7 @@ from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import NOMINAL
+from kedfem.dynamics.system.sparse import SparsePart, component_order
 from kedfem.links.record import Link, mass_times
 
 Flat = Float[np.ndarray, " N"]
@@ -27,10 +30,11 @@ class Still:
 
     def __init__(self, of: Ready) -> None:
         self.of = of
-        self.K = [
-            component_first(part.T, link.K0)
+        self.K: list[Any] = [
+            sp.csr_array(link.K0)[order := component_order(link)][:, order] if isinstance(part, SparsePart)
+            else component_first(part.T, link.K0)
             for part, link in zip(of.parts, of.system.model.links, strict=True)
-        ]
+        ]  # fmt: skip
         none = (
             np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
         )

@@ -9,11 +9,12 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.dense import SMALL, component_first, coordinates, dense_part, work_on
 from kedfem.dynamics.metric import element_tables
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
+from kedfem.dynamics.substructure import factored as condensed
 from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.record import (
     COORDINATE,
@@ -34,6 +35,7 @@ from kedfem.dynamics.system.record import (
     Spring,
     Stop,
 )
+from kedfem.dynamics.system.sparse import Part, SparsePart, mass_tables, sparse_part
 from kedfem.links.record import BeamPoint, Link
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
@@ -91,7 +93,7 @@ def frame_of(link: Link) -> int:
 
 
 def body_arrays(
-    links: Sequence[Link], joints: Sequence[Attachment], numbers: Sequence[int], parts: Sequence[DensePart],
+    links: Sequence[Link], joints: Sequence[Attachment], numbers: Sequence[int], parts: Sequence[Part],
     number: Int[np.ndarray, " k"], first: Int[np.ndarray, " k"],
 ) -> Bodies:  # fmt: skip
     """All bodies as flat arrays, their parts factored.
@@ -111,16 +113,17 @@ def body_arrays(
         if frame != NOMINAL:
             passed[k], place = place, place + sizes[k]
     fits = [_fitted(link, part) for link, part in zip(links, parts, strict=True)]
+    dense = np.array([not isinstance(part, SparsePart) for part in parts], bool)
     stiff = [
-        component_first(part.T, link.K0) if frame == COROTATIONAL else np.zeros((n, n))
-        for link, part, frame, n in zip(links, parts, frames, sizes, strict=True)
+        component_first(part.T, link.K0) if frame == COROTATIONAL else np.zeros(part.G.shape)
+        for link, part, frame in zip(links, parts, frames, strict=True)
     ]
     return Bodies(
         at=at, functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
-        dense=np.ones(len(links), bool), passed=passed, port_at=_ends(ports),
+        dense=dense, passed=passed, port_at=_ends(ports),
         component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
-        G_at=_ends([n * n for n in sizes]), Y_at=_ends([q * n for q, n in zip(ports, sizes, strict=True)]),
+        G_at=_ends([x.G.size for x in parts]), Y_at=_ends([q * n for q, n in zip(ports, sizes, strict=True)]),
         S_at=_ends([q * q for q in ports]), B_at=_ends([q * len(c) for q, c in zip(ports, columns, strict=True)]),
         G=_flat([x.G for x in parts]), Y=_flat([x.Y.T for x in parts]), W=_flat([x.W for x in parts]),
         S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
@@ -132,11 +135,11 @@ def body_arrays(
             np.array([links[k].n for k in beams], int),
             *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
         ),
-        elements=element_tables(links, parts),
+        elements=element_tables(links, parts), mass=mass_tables(links, parts),
     )  # fmt: skip
 
 
-def _fitted(link: Link, part: DensePart) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _fitted(link: Link, part: Part) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rows = link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
     one = coordinates(link, part, np.repeat(link.one[:, None], link.d, axis=1))
     fit = np.zeros((link.d, link.n)) if link.fit is None else work_on(part, link.fit[:, : link.d])
@@ -144,7 +147,7 @@ def _fitted(link: Link, part: DensePart) -> tuple[np.ndarray, np.ndarray, np.nda
 
 
 def _beam_tables(
-    links: Sequence[Link], parts: Sequence[DensePart]
+    links: Sequence[Link], parts: Sequence[Part]
 ) -> tuple[Float[np.ndarray, "b 3 E n"], Float[np.ndarray, "b 2 E"], Float[np.ndarray, "b 3 E"]]:
     """Rows, tangents and rigidities of planar beams with strains at points, see `beams_kernel`."""
     E, n = max([1, *(len(points_of(link)) for link in links)]), max([1, *(link.n for link in links)])
@@ -232,10 +235,19 @@ def _rows(vectors: Sequence[np.ndarray]) -> Float[np.ndarray, "r 3"]:
 
 def factored(
     links: Sequence[Link], joints: Sequence[Attachment], c: Coefficients | None = None
-) -> list[DensePart]:
+) -> list[Part]:
     """All bodies with A = c_M M + c_K K0, or M alone."""
     c_M, c_K = (1.0, 0.0) if c is None else (c.c_M, c.c_K)
-    return [dense_part(link, joint, c_M, c_K) for link, joint in zip(links, joints, strict=True)]
+    return [
+        sparse_part(link, joint, condensed(link, joint, c_M, c_K)) if is_large(link)
+        else dense_part(link, joint, c_M, c_K)
+        for link, joint in zip(links, joints, strict=True)
+    ]  # fmt: skip
+
+
+def is_large(link: Link) -> bool:
+    """Whether a body has a sparse factor; those with frames of their own have none yet."""
+    return link.unknowns > SMALL and link.fit is None
 
 
 def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
@@ -248,7 +260,7 @@ def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
     return out
 
 
-def as_arrays(system: Any, parts: Sequence[DensePart]) -> tuple[Bodies, Ends, Constraints]:
+def as_arrays(system: Any, parts: Sequence[Part]) -> tuple[Bodies, Ends, Constraints]:
     """A system's flat arrays, its bodies factored."""
     model = system.model
     number, first = near_diagonal(groups(system), system.unknowns)

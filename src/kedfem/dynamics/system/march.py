@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import DensePart, rows_of, work_over_time
+from kedfem.dynamics.dense import rows_of, work_over_time
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.system.arrays import (
@@ -22,6 +22,7 @@ from kedfem.dynamics.system.arrays import (
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
+from kedfem.dynamics.system.sparse import Part, solver
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
@@ -37,7 +38,7 @@ class Ready:
     system: System
     scheme: Scheme
     c: Coefficients
-    parts: list[DensePart]
+    parts: list[Part]
     bodies: Bodies
     ends: Ends
     constraints: Constraints
@@ -89,9 +90,10 @@ def march(
     state, along, T, done = copied(state), driving(of, motion), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
+    solved = solver(of.parts, of.bodies.at, of.bodies.port_at, trial)
     while done < T:
         left = Driving(*(x[done:] for x in along)), History(*(x[done:] for x in history))
-        taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1])
+        taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
         done += int(taken)
         if done < T:
             last = float(motion.t[done])

@@ -11,11 +11,12 @@ from jaxtyping import Float
 from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import Asked, Balance, held_body
+from kedfem.dynamics.system.balance import Asked, Balance, mass_body
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
 from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.sparse import SparsePart, momentum
 
 
 def rest(of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None, time: float = 0.0) -> State:
@@ -63,6 +64,12 @@ def begun(now: Instant, u: Flat, v: Flat) -> State:
     state.a[:], state.port_force[:] = found.x, found.forces
     state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
     state.turned[:] = turned(now, z)
+    for k, part in enumerate(of.parts):
+        if isinstance(part, SparsePart):
+            here, link = own(of, k), of.system.model.links[k]
+            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(
+                [momentum(link, x[here]) for x in (u, v, found.x)]
+            )
     return state
 
 
@@ -72,6 +79,6 @@ def _closing(now: Instant, C: Float[np.ndarray, "r k"], open_: Flat) -> Flat:
     none = np.zeros(int(of.bodies.at[-1]))
     if not np.abs(open_).max(initial=0.0):
         return none
-    held = [held_body(np.eye(part.W.shape[1]), part.W) for part in of.parts]
+    held = [mass_body(of, k) for k in range(len(of.parts))]
     asked = Asked(C, -open_, np.zeros(len(C)), np.zeros(of.system.unknowns))
     return Balance(of, held, now.R, asked).solved(none).x

@@ -40,8 +40,13 @@ PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and coun
 
 
 @compiled
-def marched(c, bodies, ends, of, driving, state, trial, work, history):  # type: ignore[no-untyped-def]
-    """Take T steps in place; how many converged, and the body that moved most in the one that did not."""
+def marched(c, bodies, ends, of, driving, state, trial, work, history, solved):  # type: ignore[no-untyped-def]
+    """Take T steps in place; how many converged, and the body that moved most in the one that did not.
+
+    Parameters
+    ----------
+    solved : called with the number of a sparse body, see `sparse.solver`
+    """
     c, bodies, ends, of, driving = (
         reference(c),
         reference(bodies),
@@ -51,7 +56,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history):  # type:
     )
     state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
     for t in range(len(driving.t)):
-        begin(c, bodies, ends, of, driving, t, state, trial, work)
+        begin(c, bodies, ends, of, driving, t, state, trial, work, solved)
         converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work)
         if not converged:
             return t, worst
@@ -60,7 +65,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history):  # type:
 
 
 @inner
-def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
+def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The predictor, right-hand sides of bodies with nominal frames, the common matrix of z."""
     R, h = driving.R[t], c.h
     copied(state.turned, trial.turned)
@@ -72,8 +77,10 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[
         q, N = bodies.port_at[i + 1] - bodies.port_at[i], last - first
         if bodies.frame[i] == NOMINAL:
             frame_copied(R[bodies.motion[i]], trial.Rp[i])
-            if bodies.dense[i]:
-                right_hand_side(c, bodies, i, trial.Rp[i], driving.F[t], state, trial.r, work.room)
+            right_hand_side(c, bodies, i, trial.Rp[i], driving.F[t], state, trial.r, work.room)
+            if not bodies.dense[i]:
+                solved(i)
+            else:
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
                 product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             continue
@@ -217,12 +224,17 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
         q, N, of_ports = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.port_at[i]
         if bodies.frame[i] != NOMINAL:
             own_end(c, bodies, i, R, F, trial.u, state, trial, history, t, work)
-        elif bodies.dense[i]:
-            product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
+        else:
+            if bodies.dense[i]:
+                product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
+            else:
+                copied(trial.held[first:last], work.y[:N])
             add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
             copied(trial.r[first:last], work.turned[:N])
             add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
-            nominal_end(c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room)
+            nominal_end(
+                c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room, work.strained
+            )
         ports_turned(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], work.room)
         for r in range(q):
             x = (work.room[r] - c.alpha_f * state.port_force[of_ports + r]) / (1 - c.alpha_f)

@@ -1,0 +1,127 @@
+"""Large bodies of a system: a sparse factor seen from interface points, solved between what is compiled of a step.
+
+Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them is one
+call a step: G r and Yᵀ r of its right-hand side.
+"""
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from kedfem.dynamics.cholesky import Cholesky
+from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.dense import DensePart
+from kedfem.dynamics.held import held_substructure
+from kedfem.dynamics.ports import port_columns
+from kedfem.dynamics.state import Nodal
+from kedfem.dynamics.substructure import Substructure, mass_matrix
+from kedfem.dynamics.system.arrays import Masses, Trial
+from kedfem.links.record import Link
+
+SHIFT = 1e-9  # of the mean eigenvalue: what makes the stiffness of a free link definite
+Held = Callable[[Nodal], tuple[Nodal, Float[np.ndarray, " q"]]]
+
+
+@dataclass(frozen=True, slots=True)
+class SparsePart:
+    """A body held at its interface points by a sparse factor, in nodal coordinates, component first.
+
+    components : d; held : r (n, d) → G r (n, d), Yᵀ r (q,)
+    Y : (N, q); S : (q, q); W : (q, N)
+    T : none: coordinates are nodal rows; G : none
+    """
+
+    components: int
+    held: Held
+    Y: Float[np.ndarray, "N q"]
+    S: Float[np.ndarray, "q q"]
+    W: Float[np.ndarray, "q N"]
+    T: tuple[np.ndarray, ...] = ()
+    unit: bool = True
+    G: Float[np.ndarray, "_ _"] = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+Part = DensePart | SparsePart
+
+
+def sparse_part(link: Link, joint: Attachment, of: Substructure) -> SparsePart:
+    """A link whose matrix is factored and condensed onto its interface points, seen from these."""
+    seen, order = held_substructure(of), component_order(link)
+    return SparsePart(link.d, seen.held, seen.Y[order], seen.S, port_columns(joint, link.n)[order].T)
+
+
+def component_order(link: Link) -> Int[np.ndarray, " N"]:
+    """Where each component-first coordinate stands among nodal rows laid flat."""
+    return np.arange(link.unknowns).reshape(link.n, link.d).T.ravel()
+
+
+def momentum(link: Link, x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    """M x of a sparse body."""
+    return np.concatenate([m @ each for m, each in zip(link.mass, x.reshape(link.d, -1), strict=True)])
+
+
+def sparse_frequency(link: Link, rigid: int) -> float:
+    """Least eigenvalue of a free link that strains [1/s²], by Lanczos' method with the spectrum shifted."""
+    M = mass_matrix(link)
+    shift = SHIFT * float(link.K0.diagonal().sum() / M.diagonal().sum())
+    factor = Cholesky(sp.csr_array(link.K0 + shift * M), f"links.{link.name}")
+    inverse = LinearOperator(M.shape, lambda x: factor.solve(x.ravel()).copy(), dtype=float)
+    return float(eigsh(link.K0, rigid + 1, M, sigma=-shift, OPinv=inverse, v0=np.ones(len(M.indptr) - 1),
+                       return_eigenvectors=False, tol=1e-3).max())  # fmt: skip
+
+
+def mass_tables(links: Sequence[Link], parts: Sequence[Part]) -> Masses:
+    """Matrices m of all components of sparse bodies, each once, row by row."""
+    of, every = np.full((len(links), 3), -1), dict[int, tuple[int, Any]]()
+    for row, link, part in zip(of, links, parts, strict=True):
+        for c, m in enumerate(link.mass if isinstance(part, SparsePart) else ()):
+            row[c] = every.setdefault(id(m), (len(every), m.tocsr()))[0]
+    rows = [m for _, m in every.values()]
+    ends = np.cumsum([0, *(m.nnz for m in rows)])
+    none = np.zeros(1, int)
+    return Masses(
+        of,
+        np.cumsum([0, *(m.shape[0] + 1 for m in rows)]),
+        np.concatenate([none, *(m.indptr + end for m, end in zip(rows, ends, strict=False))])[1:],
+        np.concatenate([none, *(m.indices for m in rows)])[1:],
+        np.concatenate([np.zeros(1), *(m.data for m in rows)])[1:],
+    )
+
+
+def solver(
+    parts: Sequence[Part], at: Int[np.ndarray, " _"], ports: Int[np.ndarray, " _"], trial: Trial
+) -> Any:
+    """What a compiled step calls with the number of a sparse body: trial.held and trial.reaction from trial.r.
+
+    It must be kept as long as the step runs.
+    """
+    from numba.core import types
+    from numba.experimental import function_type  # noqa: F401  (makes numba know such arguments)
+
+    every = {
+        k: (part, slice(at[k], at[k + 1]), slice(ports[k], ports[k + 1]))
+        for k, part in enumerate(parts) if isinstance(part, SparsePart)
+    }  # fmt: skip
+
+    def solved(k: int) -> int:
+        part, here, there = every[k]
+        g, trial.reaction[there] = part.held(trial.r[here].reshape(part.components, -1).T)
+        trial.held[here].reshape(part.components, -1)[:] = g.T
+        return 0
+
+    class Called(types.WrapperAddressProtocol):
+        kept = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(solved)
+
+        def __wrapper_address__(self) -> int:
+            return int(ctypes.cast(self.kept, ctypes.c_void_p).value or 0)
+
+        def signature(self) -> Any:
+            return types.int64(types.int64)
+
+    return Called()
