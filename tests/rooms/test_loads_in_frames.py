@@ -79,17 +79,3 @@ def test_a_motor_on_a_slide_between_moving_links_is_refused_with_the_reason() ->
         SceneError, match=r"m.joint: must name a prismatic joint on the ground .*while the slide turns"
     ):
         scene_from(raw)
-
-
-def test_gears_without_a_drive_are_refused_with_the_reason() -> None:
-    links = {"one": bar("beam", (0, 0), (0.3, 0)), "two": bar("beam", (0.5, 0), (0.7, 0))}
-    joints = {
-        "A": {"kind": "revolute", "links": ["ground", "one"], "at": [0, 0]},
-        "B": {"kind": "revolute", "links": ["ground", "two"], "at": [0.5, 0]},
-    }
-    gears = {"g": {"joints": ["A", "B"], "teeth": [20, 40]}}
-    raw = {"links": links, "joints": joints, "gears": gears, "analysis": {"end_time": 0.1, "step": 1e-3}}
-    with pytest.raises(
-        SceneError, match=r"gears.g: must stand with a drive and nominal frames .*got no drive"
-    ):
-        scene_from(raw)

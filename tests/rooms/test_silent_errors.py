@@ -9,6 +9,7 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics import transient
 from kedfem.dynamics.loads import coarse_steps
+from kedfem.dynamics.system import layout
 from kedfem.dynamics.transient import _finite
 from kedfem.errors import SceneError, SolveError
 from kedfem.scene import scene_from
@@ -69,6 +70,7 @@ def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> N
 
     assert eased() == 0
     monkeypatch.setattr(transient, "CONVERGED", 1e-12)
+    monkeypatch.setattr(layout, "SMALLEST", 0.0)
     assert eased() > 0
 
 

@@ -191,14 +191,16 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
 
 def _remedy(found: GeometricError, error: float) -> str:
     """What is right where the linear equation is not."""
-    if found.model.rows:
-        of = dict.fromkeys(row.name for row in found.model.rows)
-        names = ", ".join(name if name.startswith("gears.") else f"joints.{name}" for name in of)
+    rows = found.model.rows
+    slots = [row.name for row in rows if any(side and side.stations for side in row.sides)]
+    if slots:
+        names = ", ".join(f"joints.{name}" for name in slots)
         return f"stiffer links or a slower drive help (frames that follow do not know {names} yet)"
     following = 'analysis.frames = "following"'
     if error >= MODERATE:
         return f"take {following}, which is right at any deflection"
-    stiffening = "analysis.stiffening = true leaves about a third of it, " if not found.stiffened else ""
+    known = found.stiffened or rows  # neither once more, nor with constraint equations
+    stiffening = "" if known else "analysis.stiffening = true leaves about a third of it, "
     return f"{stiffening}{following} is right at any deflection"
 
 

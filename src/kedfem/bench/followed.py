@@ -1,6 +1,6 @@
 """One run of the source's four-bar from rest: its curve of stress, and the processor time of its steps."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import process_time
 from typing import Any
@@ -13,9 +13,13 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.bench.scenes import four_bar_of
 from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.following_dense import FollowingDense
+from kedfem.dynamics.history import Forcing
+from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.transient import Steps, first_states, forcings, motions, steps_of, transient
+from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
-from kedfem.scene import Scene, scene_from
+from kedfem.scene import Scene, path_parameter, scene_from
 
 END, SAMPLES = 0.3, 600  # s; times at which curves are compared
 STRESS = "probes/stress/stress"
@@ -79,13 +83,13 @@ def run(scene: Scene, repeats: int) -> Ran:
 
 def stepping(ready: Prepared, solver: Any, steps: int) -> float:
     """Processor time of the solver's first steps alone [s]."""
-    scene, model, total = ready.scene, ready.model, 0.0
-    state: Any = solver.begin(first_states(scene, ready.linkage, ready.path, model))
+    scene, total = ready.scene, 0.0
+    state = first_state(ready, solver)
     for first, motion in motions(scene, ready.linkage, ready.path):
         part = motion.part(0, max(0, steps + 1 - first))
         if not len(part.t):
             break
-        total += _timed(solver, state, forcings(model, part), part)[0]
+        total += _timed(ready, solver, state, part)[0]
     return total
 
 
@@ -94,18 +98,41 @@ def cost(scene: Scene) -> tuple[float, Steps]:
     ready = meshed(scene)
     solver: Any = steps_of(scene, ready.model)
     times = []
-    states = first_states(scene, ready.linkage, ready.path, ready.model)
-    state: Any = solver.begin(states)
+    state = first_state(ready, solver)
     _, motion = next(motions(scene, ready.linkage, ready.path))
     for k in range(0, BLOCKS * POINTS, POINTS):
         part = motion.part(k, k + POINTS)
-        seconds, state = _timed(solver, state, forcings(ready.model, part), part)
+        seconds, state = _timed(ready, solver, state, part)
         times.append(seconds / POINTS)
     return min(times), solver
 
 
-def _timed(solver: Steps, state: Any, forcing: Any, motion: Any) -> tuple[float, Any]:
-    known = (forcing, motion) if isinstance(solver, FollowingDense | FollowingSteps) else (forcing,)
+def _motion_at(ready: Prepared) -> Motion:
+    """Nominal motion at given times."""
+    return lambda t: rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
+
+
+def first_state(ready: Prepared, solver: Any) -> Any:
+    """A solver's own state at the start."""
+    if isinstance(solver, CorotationalSteps):
+        return solver.begin(_motion_at(ready))
+    return solver.begin(first_states(ready.scene, ready.linkage, ready.path, ready.model))
+
+
+def advanced(
+    ready: Prepared, solver: Any, state: Any, forcing: Sequence[Forcing], motion: RigidMotion
+) -> Any:
+    """A solver's state after some steps."""
+    known: tuple[Any, ...] = (forcing,)
+    if isinstance(solver, FollowingDense | FollowingSteps | CorotationalSteps):
+        known = (forcing, motion)
+    if isinstance(solver, CorotationalSteps):
+        known = (forcing, motion, _motion_at(ready))
+    return solver.advance(state, *known)[-1]
+
+
+def _timed(ready: Prepared, solver: Any, state: Any, motion: RigidMotion) -> tuple[float, Any]:
+    forcing = forcings(ready.model, motion)
     since = process_time()
-    _, state = solver.advance(state, *known)
+    state = advanced(ready, solver, state, forcing, motion)
     return process_time() - since, state

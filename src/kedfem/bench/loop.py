@@ -1,5 +1,6 @@
 """The compiled loop of small links: microseconds a step, and the least that they could be."""
 
+from copy import deepcopy
 from time import perf_counter
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
+from kedfem.bench.followed import advanced, first_state
 from kedfem.bench.machine import seconds
 from kedfem.bench.scenes import mechanisms
 from kedfem.dynamics.dense import DenseSteps
@@ -14,7 +16,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import first_states, forcings, motions, steps_of
 from kedfem.results.recording import recording, rows
-from kedfem.scene import Scene, following, scene_from, time_grid
+from kedfem.scene import Scene, scene_from, time_grid
 
 
 def four_bar_with(functions: int) -> tuple[Prepared, Prepared]:
@@ -42,10 +44,13 @@ def loop_time(ready: Prepared, repeats: int = 9) -> float:
     solver: Any = steps_of(scene, model)
     _, motion = next(motions(scene, ready.linkage, ready.path))
     forcing = forcings(model, motion)
-    states = first_states(scene, ready.linkage, ready.path, model)
-    known = (forcing, motion) if following(scene) else (forcing,)
-    solver.advance(solver.begin(states), *known)  # compiled
-    return seconds(lambda: solver.advance(solver.begin(states), *known), repeats) / len(motion.t)
+    start = first_state(ready, solver)
+
+    def whole() -> None:
+        advanced(ready, solver, deepcopy(start), forcing, motion)
+
+    whole()  # compiled
+    return seconds(whole, repeats) / len(motion.t)
 
 
 def recorded_rate(ready: Prepared) -> float:

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.frames import mean_rotations
-from kedfem.dynamics.history import Block, LinkHistory, joined
+from kedfem.dynamics.history import Block, LinkHistory, exerted_together, joined
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import turned_vectors
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
@@ -172,7 +172,8 @@ class _Stream:
         if len(parts) < 2:
             return parts[0] if parts else None
         motion = motions_joined([x.motion for x in parts])
-        return Block(parts[0].step, motion, joined([list(x.links) for x in parts]))
+        exerted = exerted_together([x.exerted for x in parts], np.concatenate)
+        return Block(parts[0].step, motion, joined([list(x.links) for x in parts]), exerted=exerted)
 
     def _next(self) -> Block | None:
         if self.failed is not None:
@@ -253,7 +254,13 @@ class _Combination:
             now = [{n: x[n] - y[n] for n in LINEAR} for x, y in zip(combined, seen[-1], strict=True)]
             yield self._fine(taken[-1], strides[-1], now)
             self._corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
-        yield Block(first, motion, [self._history(k, x, motion) for k, x in enumerate(combined)], levels)
+        exerted = exerted_together([x.exerted for x in levels], self._weighted)
+        links = [self._history(k, x, motion) for k, x in enumerate(combined)]
+        yield Block(first, motion, links, levels, exerted=exerted)
+
+    def _weighted(self, parts: list[np.ndarray]) -> Float[np.ndarray, "..."]:
+        """The levels' values as one."""
+        return np.asarray(sum(w * x for w, x in zip(self.weights, parts, strict=True)))
 
     def _fine(self, finest: Block, stride: int, now: Sequence[Fields]) -> Block:
         """The finest level's time points; corrections are linear in time between common ones."""
@@ -267,7 +274,7 @@ class _Combination:
                 s = (share / stride).reshape(-1, *[1] * (x.ndim - 1))
                 own[name] = own[name] + (1 - s) * x[point] + s * x[after]
             links.append(self._history(k, own, finest.motion))
-        return Block(finest.step, finest.motion, links, fine=True)
+        return Block(finest.step, finest.motion, links, fine=True, exerted=finest.exerted)
 
     def _history(self, k: int, x: Fields, motion: RigidMotion) -> LinkHistory:
         """A link's combined state: its frame where its positions now are, energy of its deformation now."""

@@ -90,6 +90,7 @@ class Model:
     joints, loads : per link
     carried : rigid links that move with the drive
     rows : joints that hold by rows
+    cuts : where segments of a link meet, by `link_keys`
     """
 
     links: tuple[Link, ...]
@@ -100,6 +101,7 @@ class Model:
     damping: Rayleigh
     carried: tuple[Carried, ...] = ()
     rows: tuple[RowJoint, ...] = ()
+    cuts: tuple[SharedCut, ...] = ()
 
     @property
     def unknowns(self) -> int:
@@ -175,7 +177,7 @@ def elastic_model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
         joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
-        rows=held.rows,
+        rows=held.rows, cuts=tuple(cuts),
     )  # fmt: skip
 
 
@@ -255,16 +257,25 @@ def hub_of(scene: Scene, name: str) -> str | None:
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
     """The changed copy of a model whose links move in the span of given functions; None leaves a link as it is."""
     links, joints, loads = list(model.links), list(model.joints), list(model.loads)
-    sliders = list(model.sliders)
+    sliders, cuts, names = list(model.sliders), model.cuts, link_keys(model)
     for k, Q in enumerate(functions):
         if Q is not None:
             links[k] = link = reduced(model.links[k], Q)
+            cuts = tuple(_cut_on(cut, names[k], link) for cut in cuts)
             joints[k] = _joint_on(model.joints[k], link)
             loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
             sliders = [_slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
     return replace(
-        model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders)
+        model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders), cuts=cuts
     )
+
+
+def link_keys(model: Model) -> list[str]:
+    """A key for each link of a model; of a segment with its number in its link."""
+    names, out = [link.name for link in model.links], []
+    for k, name in enumerate(names):
+        out.append(name if names.count(name) == 1 else f"{name}/{names[: k + 1].count(name)}")
+    return out
 
 
 def segments(model: Model) -> dict[str, list[Link]]:
@@ -319,6 +330,16 @@ def _joint_on(joint: Attachment, link: Link) -> Attachment:
 
 def _load_on(load: Pattern, link: Link) -> Pattern:
     return replace(load, forces=on_functions(link).T @ load.forces)
+
+
+def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
+    """A cut, its weights on the functions of a link that has become a reduced one."""
+    if key not in cut.keys:
+        return cut
+    one, other = (
+        x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True)
+    )
+    return replace(cut, weights=(one, other))
 
 
 def _slider_on(slider: Slider, link: Link) -> Slider:

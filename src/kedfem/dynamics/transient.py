@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.acted import ActedSteps, Forces, loaded, still_forces
 from kedfem.dynamics.acting import first_forces
@@ -23,14 +24,16 @@ from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.segment import CONVERGED, EASIER, FREE, first_history
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState, Nodal
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.march import ConvergenceError
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.errors import SolveError
+from kedfem.errors import MeshError, SceneError, SolveError
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
@@ -42,11 +45,15 @@ from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_g
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
+LARGE = (
+    1500  # unknowns of a segment whose dense matrices, 18 MB each, joints by constraint equations can do with
+)
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-Steps = (
+ByLink = (
     CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | SystemSteps | FollowingSteps | FollowingDense
 )
+Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
 UNSETTLED = (
     ": the sweeps of stiffening do not settle, it is not a small term; "
@@ -64,11 +71,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if following(scene):
-        dense = all(link.unknowns <= SMALL for link in model.links)
-        follower = FollowingDense if dense else FollowingSteps
-        tolerance = FREE if scene.driven is None else CONVERGED
-        every = (*actions(scene, model), *followers(model))
-        return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
+        return _follower(scene, model, scheme)
     every = actions(scene, model)
     stresses = stiffening(model) if scene.analysis.stiffening else None
     damped = any(row.damping.any() for row in model.rows)  # which only the system's starts know
@@ -82,6 +85,47 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         solver = LiteralSteps
     made = solver(model.links, model.joints, scheme, model.damping, stresses)
     return made if isinstance(made, DenseSteps) or not every else ActedSteps(made, every)
+
+
+def _follower(scene: Scene, model: Model, scheme: Scheme) -> Steps:
+    """The solver of links with co-rotational frames.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If joints by constraint equations stand beside what the system does not know yet.
+    """
+    tolerance = FREE if scene.driven is None else CONVERGED
+    turning, large = followers(model), [link for link in model.links if link.unknowns > SMALL]
+    if model.rows:
+        _refuse_beside_rows(model, bool(turning))
+        return CorotationalSteps(scene, model, scheme, tolerance)
+    if not large and not turning:
+        try:
+            return CorotationalSteps(scene, model, scheme, tolerance)
+        except (
+            MeshError
+        ):  # a seat that does not tell how it turns as a whole: actions know one direction of it
+            pass
+    follower = FollowingSteps if large else FollowingDense
+    every = (*actions(scene, model), *turning)
+    return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
+
+
+def _refuse_beside_rows(model: Model, turning: bool) -> None:
+    """What co-rotational frames with joints by constraint equations do not know yet: loads that turn, large segments."""
+    names = ", ".join(x.name if x.name.startswith("gears.") else f"joints.{x.name}" for x in model.rows)
+    if turning:
+        raise SceneError(
+            f'loads: must have frame = "world" and no pressure beside {names} with frames that follow (which are held by '
+            "constraint equations), got ones that turn with their links: take nominal frames, or forces in the world"
+        )
+    for link in model.links:
+        if link.unknowns > LARGE:
+            raise SceneError(
+                f"links.{link.name}: must have at most {LARGE} unknowns in each segment beside {names} with frames that "
+                f"follow, got {link.unknowns}: give it more segments or larger elements, or reduced = true"
+            )
 
 
 def _is_small(link: Link) -> bool:
@@ -104,6 +148,9 @@ def transient(
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
+    if isinstance(solver, CorotationalSteps):
+        yield from _corotational(scene, linkage, along, model, solver, start)
+        return
     stresses = stresses_of(solver)
     states = started(scene, linkage, along, model, solver) if start is None else start
     drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
@@ -132,9 +179,38 @@ def transient(
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
 
 
+def _corotational(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: CorotationalSteps, start: Start | None
+) -> Iterator[Block]:
+    """All time points of a system with co-rotational frames; see `transient`."""
+
+    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
+        return rigid_motion(linkage, along, t, path_parameter(scene, t))
+
+    state = start if isinstance(start, State) else solver.begin(motion_at)
+    drawn, length = motion_at(np.zeros(1)), block_length(model)
+    links, exerted = solver.first(state, forcings(model, drawn), motion_at)
+    yield Block(0, drawn, links, exerted=exerted)
+    for first, motion in motions(scene, linkage, along):
+        for k in range(0, len(motion.t), length):
+            part = motion.part(k, k + length)
+            forcing = forcings(model, part)
+            try:
+                links, exerted, state = solver.advance(state, forcing, part, motion_at)
+            except ConvergenceError as failed:
+                if failed.taken:
+                    links, exerted = solver.handed_on(failed.history, forcing, part)
+                    yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
+                stuck = Stuck(failed.taken, [], failed.moves)
+                raise SolveError(_stuck(model, first + k + failed.taken, part, stuck)) from None
+            yield from _finite(Block(first + k, part, links, exerted=exerted), "")
+
+
 def stresses_of(solver: Steps) -> Stiffening | None:
     """Geometric stiffening that a solver knows, if any."""
-    return None if isinstance(solver, FollowingSteps | FollowingDense) else solver.stiffening
+    if isinstance(solver, FollowingSteps | FollowingDense | CorotationalSteps):
+        return None
+    return solver.stiffening
 
 
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
@@ -145,6 +221,8 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     SolveError
         If no quasi-static deflection is found.
     """
+    if isinstance(solver, CorotationalSteps):
+        return solver.begin(lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)))
     if not isinstance(solver, SystemSteps):
         return first_states(scene, linkage, along, model, stresses_of(solver))
     at_rest = scene.analysis.initial == "rest"
@@ -152,7 +230,7 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     return solver.start(at_rest, lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)), rates)
 
 
-def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, states: Start) -> Any:
+def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByLink, states: Start) -> Any:
     """A solver's state at the first time point."""
     if isinstance(states, State) or isinstance(solver, SystemSteps):
         return states
@@ -173,7 +251,7 @@ def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
     return None if rows is None else first_rows(rows, h)
 
 
-def _first(model: Model, solver: Steps, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
+def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
     """The first time point of all links, as their frames see it."""
     if isinstance(solver, SystemSteps) and isinstance(states, State):
         return solver.first(states, forcings(model, drawn), drawn)
@@ -197,12 +275,13 @@ def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge
 def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
     """What to do about a step that does not settle."""
     k, beams = stuck.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
+    moves = f"link '{stuck.link}'" if stuck.link else "a joint or force element"
     needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)" * (
         stuck.link in beams
     )
     return (
         f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
-        f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; link '{stuck.link}' moves most from "
+        f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; {moves} moves most from "
         "sweep to sweep: give it more elements or segments"
         + needed
         + ", take a smaller step, or more numerical damping "
@@ -212,7 +291,11 @@ def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     """A warning where iterations of steps were taken as converged at an eased tolerance."""
-    eased = sum(each.eased for each in solvers if isinstance(each, FollowingSteps | FollowingDense))
+    eased = sum(
+        each.eased
+        for each in solvers
+        if isinstance(each, FollowingSteps | FollowingDense | CorotationalSteps)
+    )
     if not eased:
         return ()
     return (

@@ -35,8 +35,12 @@ class Measured:
         """Force and moment about the world's origin (T, 3) of every end of all actions."""
         if self.every:
             self.of(block)
+        known = 0 if block.exerted is None else block.exerted.ends.shape[1]
         for i, action in enumerate(self.every):
             for e, end in enumerate(action.ends):
+                if block.exerted is not None and i < known:
+                    yield end, block.exerted.ends[:, i, e, 0], block.exerted.ends[:, i, e, 1]
+                    continue
                 x, f = self.places[:, i, e], self.forces[:, i, e]
                 if end.form == POINT:
                     yield end, f[:, 0], cross(x[:, 0], f[:, 0])
@@ -76,7 +80,18 @@ class Measured:
             x, v = vectors(self.every, block)
             self.places, self.forces, self.block = x, np.zeros_like(x), block
             evaluate_all(block.motion.t, x, v, self.turned, self.table, self.forces, self.values)
+            if block.exerted is not None:
+                self._taken(block.exerted.element)
         return self.values
+
+    def _taken(self, element: Float[np.ndarray, "T 3 A"]) -> None:
+        """Coordinates, rates and forces of motors and springs as the solver has them."""
+        known = element.shape[2]
+        stiffness, free = (
+            np.array([getattr(x, name) for x in self.every[:known]]) for name in ("stiffness", "free")
+        )
+        self.values[:, :known, :3] = element.transpose(0, 2, 1)
+        self.values[:, :known, 3] = 0.5 * stiffness * (element[:, 0] - free) ** 2
 
 
 def measured_actions(scene: Scene, model: Model) -> Measured:

@@ -151,9 +151,7 @@ class Account:
         """Energies and sums of one more block."""
         flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
-        springs = (
-            row_work(self.model, block, self._forces.of(block), self._springs) if self.model.rows else None
-        )
+        springs = row_work(self.model, block, self._mu(block), self._springs) if self.model.rows else None
         pushed = np.zeros(len(block))
         if springs is not None:
             # what springs push is no support's work: they store it or take it
@@ -190,6 +188,10 @@ class Account:
             "dissipated": total[:, :1], "neglected": (work[:, 2] + total[:, 1])[:, None], "residual": left[:, :1],
             "driven": driven,
         }  # fmt: skip
+
+    def _mu(self, block: Block) -> Rows:
+        """Forces of rows, unless the block knows those of springs."""
+        return np.zeros((len(block), 0)) if block.exerted is not None else self._forces.of(block)
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 8"]]:
         """Of all links, and what damping takes in each step."""

@@ -322,12 +322,12 @@ def _of_several(scene: Scene, driven: str) -> str:
 
 def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:
     """What gears exert on the first joint's link."""
-    row, here = of_joint(model.rows, f"gears.{name}")
+    row, _ = of_joint(model.rows, f"gears.{name}")
     share = row.plus[0][0]
     text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
     return Recorded(
         Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
-        lambda block: share * forces.rows.of(block)[:, here],
+        lambda block: share * forces.rows.between_gears(name, block)[:, None],
     )
 
 
@@ -336,6 +336,7 @@ def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recor
     joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
     on = next(link for link in joint.links if link != GROUND)
     sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
+    number = [each.name for each in model.rows].index(driven)
     quantity, unit = ("force", "N") if slide else ("torque", "N m")
     channel = Channel(
         f"drive/{_of_several(scene, driven)}{quantity}",
@@ -346,6 +347,8 @@ def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recor
     )
 
     def along(block: Block) -> Rows:
+        if block.exerted is not None:
+            return np.asarray(sign * block.exerted.effort[:, [number]])
         axis = block.motion.R[:, row.bodies[1]] @ row.axis
         effort = forces.rows.wrench(driven, block)[0 if slide else 1]
         return np.asarray(sign * (effort * axis).sum(axis=1, keepdims=True))

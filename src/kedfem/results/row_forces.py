@@ -34,12 +34,26 @@ class RowForces:
         self, name: str, block: Block
     ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
         """Force of a joint on its link i, moment about its point there, and that point; world components."""
+        if block.exerted is not None:
+            force, moment, point = np.moveaxis(block.exerted.wrench[:, self._number(name)], 1, 0)
+            return force, moment, point
         joint, rows = of_joint(self.model.rows, name)
         along, mu = directions(joint, block.motion), self.of(block)[:, rows]
         return np.einsum("tr,trk->tk", mu, along.gap), np.einsum("tr,trk->tk", mu, along.turn), along.point
 
+    def between_gears(self, name: str, block: Block) -> Float[np.ndarray, " T"]:
+        """Force along the coordinate of a pair of gears [N m or N]."""
+        if block.exerted is not None:
+            return np.asarray(block.exerted.effort[:, self._number(f"gears.{name}")])
+        return np.asarray(self.of(block)[:, of_joint(self.model.rows, f"gears.{name}")[1]][:, 0])
+
+    def _number(self, name: str) -> int:
+        return [joint.name for joint in self.model.rows].index(name)
+
     def on_ports(self, block: Block) -> Float[np.ndarray, "T m"]:
         """Forces on the ports of all rows, side by side, world components."""
+        if block.exerted is not None:
+            return block.exerted.ports
         mu, out, first = self.of(block), [], 0
         for joint in self.model.rows:
             here = mu[:, first : first + len(joint.gap)]

@@ -34,22 +34,33 @@ def row_work(
 
     Parameters
     ----------
-    mu : forces of all rows
+    mu : forces of all rows, where the block does not know what springs exert
     before : time, e and forces at the end of the block before
     """
-    rows = joint_rows(model.rows, block.motion)
-    if rows is None or not rows.soft.any():
+    found = _springs(model, block, mu)
+    if found is None:
         return None
-    e, t, force = deflections(model, block, rows)[:, rows.soft], block.motion.t, mu[:, rows.soft]
+    (e, force, k, c), t = found, block.motion.t
     t0, e0, f0 = before or (float(t[0]), e[0], force[0])
     change = np.diff(e, axis=0, prepend=e0[None])
     h = np.diff(t, prepend=t0)
     mean = 0.5 * (force + np.vstack([f0[None], force[:-1]]))
-    k, c = rows.stiffness[rows.soft], rows.damping[rows.soft]
     return RowWork(
         0.5 * (e**2) @ k, (change**2) @ c / np.where(h > 0, h, np.inf), (mean * change).sum(axis=1),
         (float(t[-1]), e[-1], force[-1]),
     )  # fmt: skip
+
+
+def _springs(model: Model, block: Block, mu: Float[np.ndarray, "T r"]) -> tuple[np.ndarray, ...] | None:
+    """Deflections and forces (T, s) of springs in joints, and their stiffness and damping; None without any."""
+    if block.exerted is not None:
+        of = block.exerted
+        return (of.spring[:, 0], of.spring[:, 1], of.stiffness, of.damping) if len(of.stiffness) else None
+    rows = joint_rows(model.rows, block.motion)
+    if rows is None or not rows.soft.any():
+        return None
+    soft = rows.soft
+    return deflections(model, block, rows)[:, soft], mu[:, soft], rows.stiffness[soft], rows.damping[soft]
 
 
 def deflections(model: Model, block: Block, rows: JointRows) -> Float[np.ndarray, "T r"]:

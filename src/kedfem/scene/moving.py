@@ -47,11 +47,8 @@ def moving_faults(parts: Parts) -> Iterator[str]:
         )
         if joint.record.bushing is not None:
             key, got = "bushing", "got one"
-        if any_following(parts):
-            wanted = "must be revolute, spherical, weld, or prismatic on the ground, and undriven,"
-            if key == "bushing":
-                wanted = "must be left out"
-            yield joint.fault(key, f'{wanted} with frames = "following", {got}')
+        if any_following(parts) and joint.word("kind") == "slot":
+            yield joint.fault("kind", 'must be another than slot with frames = "following", got a slot')
         if parts.analysis.raw.get("stiffening") is True:
             yield joint.fault(key, f"must stand without analysis.stiffening, {got}")
         if parts.analysis.record is not None and parts.analysis.record.rho_inf == 1.0:
@@ -68,14 +65,8 @@ def moving_faults(parts: Parts) -> Iterator[str]:
 
 
 def gear_frame_faults(parts: Parts) -> Iterator[str]:
-    """Gears where their constraint equations would be left out."""
+    """Gears where stiffening would leave their constraint equations out."""
     for gear in parts.gears.values():
-        if any_following(parts):
-            got = "frames that follow" if parts.driven else "no drive, so that frames follow"
-            yield line(
-                gear.where,
-                f"must stand with a drive and nominal frames (others do not hold gears), got {got}",
-            )
         if parts.analysis.raw.get("stiffening") is True:
             yield line(
                 gear.where, "must stand without analysis.stiffening (which does not hold gears), got it"

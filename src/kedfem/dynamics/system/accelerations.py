@@ -7,6 +7,7 @@ With P the motions of a body without strain, its acceleration is then a_c + b, a
 which closes in on b without strain by a factor s each time.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, mass_body
 from kedfem.dynamics.system.instant import Flat, Instant
 from kedfem.dynamics.system.internal import drawn, own, rows, turned_rate
+from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.links.record import Link
 from kedfem.motion.newton import cross_matrix
 
@@ -29,10 +31,11 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
     Parameters
     ----------
     u, v : (N,) displacements and rates
-    rigid : whether all bodies accelerate as rigid ones do where they are
+    rigid : whether all bodies accelerate as rigid ones do where they are; links that are stiff beside others always do
     """
     of = now.of
-    pure = [rigid_motions(now, k, u) if rigid else None for k in range(len(of.parts))]
+    stiff = [rigid or (link.rigid and link.fit is not None) for link in of.system.model.links]
+    pure = [rigid_motions(now, k, u) if each else None for k, each in enumerate(stiff)]
     held = []
     for k, (P, part) in enumerate(zip(pure, of.parts, strict=True)):
         if P is None:
@@ -41,14 +44,38 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
             held.append(held_body(P @ P.T + STIFFER * (np.eye(len(P)) - P @ P.T), part.W))
     balance = Balance(of, held, now.R, asked)
     stress = np.zeros_like(r)
-    turning = centripetal(now, u, v) if rigid else stress
-    for _ in range(AGAIN if rigid else 1):
+    turning = centripetal(now, u, v, stiff) if any(stiff) else stress
+    for _ in range(AGAIN if any(stiff) else 1):
         found = balance.solved(r - turning - stress, turning)
         for k, P in enumerate(pure):
             if P is not None:
                 x = balance.turned(k, found.x[own(of, k)], back=True)
                 stress[own(of, k)] += STIFFER * balance.turned(k, x - P @ (P.T @ x))
     return replace(found, x=found.x + turning)
+
+
+def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked) -> Solved:
+    """The same, but for what springs and motors do: A x = c_M Wᵀ λ with the matrix of a step.
+
+    Their whole force would at first accelerate next to no mass about their points: no step resolves that, and laws would
+    see its rates. What stands against it in that matrix, c_K/c_M K x, is internal force at the start, so that all
+    forces balance there. Large bodies, which are not stepped so, have their mass alone.
+    """
+    of, K, none = now.of, now.always.still.K, np.zeros_like(r)
+    share = of.c.c_K / of.c.c_M
+    alone = accelerations(now, r, u, v, replace(asked, known=0 * asked.known))
+    if not asked.known.any():
+        return alone
+    small = [not isinstance(part, SparsePart) for part in of.parts]
+    held = [
+        held_body(np.eye(K[k].shape[0]) + share * K[k], part.W) if small[k] else mass_body(of, k)
+        for k, part in enumerate(of.parts)
+    ]
+    balance = Balance(of, held, now.R, replace(asked, target=0 * asked.target))
+    more = balance.solved(none)
+    x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
+    f = np.concatenate([balance.turned(k, small[k] * share * (K[k] @ x[k])) for k in range(len(K))])
+    return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, f)
 
 
 def rigid_motions(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "N m"]:
@@ -75,10 +102,12 @@ def _position(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "n d"]:
     return np.asarray(out)
 
 
-def centripetal(now: Instant, u: Flat, v: Flat) -> Flat:
-    """([ω]² − [ω₀]²) X of bodies that turn at ω in all, ω₀ of it nominal; world components."""
+def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
+    """([ω]² − [ω₀]²) X of some bodies, that turn at ω in all, ω₀ of it nominal; world components."""
     out = np.zeros_like(v)
     for k, link in enumerate(now.of.system.model.links):
+        if not which[k]:
+            continue
         omega = cross_matrix(now.omega[k])
         spin = omega + own_spin(link, rows(now.of, k, v[own(now.of, k)]), now.R[k])
         moved = turned_rate(spin @ spin - omega @ omega, _position(now, k, u))

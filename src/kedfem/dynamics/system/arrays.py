@@ -220,6 +220,7 @@ class History(NamedTuple):
     z: Any
     e: Any
     multiplier: Any
+    rate: Any
 
 
 class Driving(NamedTuple):

@@ -100,12 +100,16 @@ def mass_body(of: Ready, k: int) -> HeldBody:
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """x (N,) of all bodies, z (k,), multipliers m (r,), forces (q,) on bodies at interface points; world components."""
+    """x (N,) of all bodies, z (k,), multipliers m (r,), forces (q,) on bodies at interface points; world components.
+
+    f : (N,) internal force that stands against x, if any
+    """
 
     x: Flat
     z: Flat
     m: Flat
     forces: Flat
+    f: Flat | None = None
 
 
 class Balance:

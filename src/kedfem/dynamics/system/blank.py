@@ -63,5 +63,5 @@ def empty_history(T: int, bodies: Bodies, of: Constraints) -> History:
     u, v, a, F, g = np.zeros((5, T, N))
     return History(
         u, v, a, F, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),
-        np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)),
+        np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)), np.zeros((T, r)),
     )  # fmt: skip

@@ -61,7 +61,7 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     R, p : (M, 3, 3), (M, 3) of all bodies of the linkage
-    y, w : (16,), (4, 3) room
+    y, w : (16,), (12, 3) room
     """
     x, Q, D, U = place
     for e in range(len(ends.form)):
@@ -115,7 +115,12 @@ def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
 
 @inner
 def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
-    """Q becomes the rotation of A = Σ D_k ⊗ e_k by Newton from an earlier one, U = Qᵀ A."""
+    """Q becomes the rotation of A = Σ D_k ⊗ e_k, U = Qᵀ A: by Newton from one as near as A is to a rotation."""
+    squared(D, w[4:7])
+    squared(e, w[7:10])
+    for b in range(3):
+        for m in range(3):
+            Q[b, m] = w[4, b] * w[7, m] + w[5, b] * w[8, m] + w[6, b] * w[9, m]
     for _ in range(TURNS):
         stretched(e, D, Q, U, w[0])
         w[1, 0], w[1, 1], w[1, 2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
@@ -131,6 +136,16 @@ def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
         if size <= 1e-8:
             break
     stretched(e, D, Q, U, w[0])
+
+
+@inner
+def squared(D, out):  # type: ignore[no-untyped-def]
+    """out becomes a right-handed triad: along D_0, in the plane of D_0 and D_1, and across both."""
+    cross(D[0], D[1], out[2])
+    cross(out[2], D[0], out[1])
+    size, across, up = np.sqrt(dot(D[0], D[0])), np.sqrt(dot(out[1], out[1])), np.sqrt(dot(out[2], out[2]))
+    for m in range(3):
+        out[0, m], out[1, m], out[2, m] = D[0, m] / size, out[1, m] / across, out[2, m] / up
 
 
 @inner

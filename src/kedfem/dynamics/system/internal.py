@@ -69,6 +69,7 @@ class Still:
 class Inside:
     """A body at one time: internal force f (N,) on its coordinates, world components; R (3, 3) its mean orientation.
 
+    g : (n, d) its displacement in the nominal frame [m]; energy : ½ gᵀ K0 g, as its frames see it [J]
     frames : what its frames see; damped : (3, n, d) damping force without its rate, and its rates, nominal frame
     """
 
@@ -76,6 +77,8 @@ class Inside:
     R: Float[np.ndarray, "3 3"]
     frames: list[Followed]
     damped: Float[np.ndarray, "3 n d"]
+    g: Nodal
+    energy: float
 
 
 def rows(of: Ready, k: int, x: Flat) -> Nodal:
@@ -120,10 +123,10 @@ def inside(
         if link.fit is None and damping.beta:
             damped[m] += damping.beta * (link.K0 @ each.ravel()).reshape(each.shape)
     frames = [seen_from(link, frame, y, g1) for frame in frames_of(link)]
-    f, _ = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
+    f, energy = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
     mean = R.copy()
     mean[:d, :d] = mean_orientation(link, x, R[:d, :d])
-    return Inside(work_on(of.parts[k], f).ravel(), mean, frames, damped)
+    return Inside(work_on(of.parts[k], f).ravel(), mean, frames, damped, g, energy)
 
 
 def remembered(of: Ready, k: int, found: Inside, state: State) -> None:

@@ -1,7 +1,7 @@
 """The public march of a system: from any state, over any stretch of its nominal motion, to the state at its end."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -33,7 +33,10 @@ Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A system made ready for steps of one length: all bodies factored once, everything as flat arrays."""
+    """A system made ready for steps of one length: all bodies factored once, everything as flat arrays.
+
+    halves : the same for steps half as long, once these have been needed
+    """
 
     system: System
     scheme: Scheme
@@ -42,6 +45,24 @@ class Ready:
     bodies: Bodies
     ends: Ends
     constraints: Constraints
+    halves: list["Ready"] = field(default_factory=list)
+
+
+class ConvergenceError(SolveError):
+    """Iterations of a step that do not converge, not in parts either.
+
+    state, history : what was reached before that step
+    taken : steps before it
+    moves : the body that changes most from one iteration to the next; empty: a constraint or force law does
+    """
+
+    def __init__(self, t: float, state: State, history: History, taken: int, moves: str) -> None:
+        name = f"link '{moves}'" if moves else "a joint or force element"
+        super().__init__(
+            f"analysis: the iterations of a step must converge, got none that do at t = {t:.6g} s; {name} moves most "
+            "from one to the next: take a smaller step, or more numerical damping (rho_inf)"
+        )
+        self.state, self.history, self.taken, self.moves = state, history, taken, moves
 
 
 def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
@@ -81,8 +102,8 @@ def march(
 
     Raises
     ------
-    SolveError
-        If the iterations of a step do not converge: with its time and the body that moves most.
+    ConvergenceError
+        If the iterations of a step do not: with its time, the body that moves most, and all that came before.
     """
     from kedfem.dynamics.system.step_kernel import marched
 
@@ -96,10 +117,14 @@ def march(
         taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
         done += int(taken)
         if done < T:
-            last = float(motion.t[done])
+            last, before = float(motion.t[done]), History(*(x[:done] for x in history))
             if between is None or not halvings:
-                raise SolveError(_unsettled(of, last, int(worst)))
-            state, parts = _in_parts(of, state, last, between, halvings)
+                moves = of.system.names[worst] if worst >= 0 else ""
+                raise ConvergenceError(last, state, before, done, moves)
+            try:
+                state, parts = _in_parts(of, state, last, between, halvings)
+            except ConvergenceError as failed:
+                raise ConvergenceError(last, state, before, done, failed.moves) from None
             for row, found in zip(history, parts, strict=True):
                 row[done] = found[-1]
             done += 1
@@ -108,17 +133,10 @@ def march(
 
 def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
     """One step in two, each of these in two again where it must be."""
-    finer = ready(of.system, replace(of.scheme, h=of.scheme.h / 2), of.c.tolerance)
+    if not of.halves:
+        of.halves.append(ready(of.system, replace(of.scheme, h=of.scheme.h / 2), of.c.tolerance))
+    finer = of.halves[0]
     return march(finer, state, between(last - finer.c.h * np.array([1.0, 0.0])), between, halvings - 1)
-
-
-def _unsettled(of: Ready, t: float, worst: int) -> str:
-    """What to do about a step whose iterations do not converge."""
-    name = f"link '{of.system.names[worst]}'" if worst >= 0 else "a joint or force element"
-    return (
-        f"analysis: the iterations of a step must converge, got none that do at t = {t:.6g} s; {name} moves most from "
-        "one to the next: take a smaller step, or more numerical damping (rho_inf)"
-    )
 
 
 def displacements(of: Ready, k: int, x: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T n d"]:

@@ -3,7 +3,7 @@
 Rates of constraints are exact (`rates`), the bars of rigid links among them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -11,15 +11,20 @@ from jaxtyping import Float
 from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import Asked, Balance, mass_body
+from kedfem.dynamics.system.balance import Asked, Balance, Solved, mass_body
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 
+Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
 
-def rest(of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None, time: float = 0.0) -> State:
+
+def rest(
+    of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None, time: float = 0.0,
+    accelerated: Accelerated = accelerations,
+) -> State:  # fmt: skip
     """The state at a time without elastic displacement.
 
     Parameters
@@ -27,10 +32,11 @@ def rest(of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None
     motion_at : nominal motion at given times
     rates : per body (n, d) δ', world components; none if not given. They are changed as little as can be, in kinetic
         energy, to keep all constraints
+    accelerated : accelerations under given forces, `accelerated_in_a_step` where springs or motors pull at once
     """
     now = Instant(of, motion_at, time)
     v = as_coordinates(of, rates or [])
-    return begun(now, np.zeros_like(v), v)
+    return begun(now, np.zeros_like(v), v, accelerated)
 
 
 def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
@@ -41,7 +47,7 @@ def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
     return out
 
 
-def begun(now: Instant, u: Flat, v: Flat) -> State:
+def begun(now: Instant, u: Flat, v: Flat, accelerated: Accelerated = accelerations) -> State:
     """The state with given displacements, and rates that are made to keep all constraints."""
     of = now.of
     z, none = now.interface(u), np.zeros(of.system.unknowns)
@@ -53,12 +59,14 @@ def begun(now: Instant, u: Flat, v: Flat) -> State:
     m = np.where(hard, 0.0, now.forces(e)[:, 0])
     asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
     inside = now.inside(u, v)
-    found = accelerations(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
+    found = accelerated(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
     m[hard] = found.m
     e[2] += C @ found.z
     state = empty_state(of.bodies, of.constraints)
     for k, each in enumerate(inside):
         remembered(of, k, each, state)
+    if found.f is not None:
+        state.f[:] += found.f
     state.time[0], state.F[:], state.u[:], state.v[:] = now.time, now.F, u, v
     state.z[:, now.always.number] = np.stack([z, z1, found.z])
     state.a[:], state.port_force[:] = found.x, found.forces

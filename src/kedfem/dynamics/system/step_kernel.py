@@ -31,7 +31,14 @@ from kedfem.dynamics.system.bodies_kernel import (
 )
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
-from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
+from kedfem.dynamics.system.interface_kernel import (
+    evaluated,
+    gathered,
+    interface_solved,
+    newmark_rate,
+    offset,
+    pushed,
+)
 from kedfem.dynamics.system.record import NOMINAL
 from kedfem.dynamics.system.reference import reference
 
@@ -261,14 +268,14 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     state.bearing[:] = 0.0
     for a in range(len(of.law)):
-        e = 0.0
+        e, rate = 0.0, 0.0
         if of.linear[a]:
             for m in range(len(trial.z)):
                 e += trial.C[a, m] * trial.z[m]
         else:
             trial.part[:] = 0.0
             nominal = (driving.R[t], driving.v[t], driving.omega[t])
-            e, _ = coordinate(
+            e, rate = coordinate(
                 ends, of, a, nominal, trial.moving, trial.turned, trial.part, work.end, work.vectors
             )
             if of.drive[a] >= 0:
@@ -276,6 +283,12 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
         second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]
         state.e[1, a] += c.late * second + c.early * state.e[2, a]
         state.e[0, a], state.e[2, a] = e, second
+        history.rate[t, a] = state.e[1, a]
+        if not of.linear[a] and of.drive[a] < 0:
+            history.rate[t, a] = rate
+            for m in range(len(trial.z)):
+                z0, z1, z2 = state.z[0, m], state.z[1, m], state.z[2, m]
+                history.rate[t, a] += trial.part[m] * newmark_rate(c, trial.z[m], z0, z1, z2)
         state.multiplier[a] = trial.m[a] / share
         for m in range(len(trial.z)):
             state.bearing[m] += state.multiplier[a] * trial.C[a, m]

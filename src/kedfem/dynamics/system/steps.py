@@ -118,7 +118,7 @@ class SystemSteps:
         found = History(
             u=state.u[None], v=state.v[None], a=state.a[None], F=state.F[None], g=g[None], strain=state.strain[:1],
             R=motion.R[:, bodies.motion], port_force=state.port_force[None], energy=np.zeros((1, len(self.links))),
-            z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None],
+            z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None], rate=state.e[1:2],
         )  # fmt: skip
         out = self._histories(found, forcing, motion)
         for k, (x, link) in enumerate(zip(out, self.links, strict=True)):

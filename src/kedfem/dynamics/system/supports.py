@@ -64,13 +64,13 @@ class Supports:
             for term in each.terms:
                 if body in {system.ends[term.i].body, system.ends[term.j].body}:
                     m = term.factor * self.history.multiplier[:, n, None]
-                    for end, x, f, t in self._exerted(each, term):
+                    for end, x, f, t in self.exerted(each, term):
                         if end.body == body:
                             force += m * f
                             moment += m * (t + cross(x - about, f))
         return force, moment
 
-    def _exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
+    def exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
         """Both ends of a term with their places, and force and moment there of a unit multiplier."""
         ends = [self.of.system.ends[n] for n in (term.i, term.j)]
         z = np.zeros_like(self.z) if each.linear else self.z
@@ -83,6 +83,12 @@ class Supports:
             return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
         turn = turning(term, Q_i, Q_j)
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
+
+    def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
+        """Where a point of the body of end n, as drawn, is as a constraint sees it."""
+        end = self.of.system.ends[n]
+        x, Q = poses(end, self.motion, np.zeros_like(self.z) if each.linear else self.z)
+        return np.asarray(x + Q @ (at - end.origin))
 
     def of_joint(self, k: int, joint: str, about: Vectors) -> Wrench:
         """What a joint of shared interface points exerts on body k of the model; these where the nominal motion has them.
@@ -125,7 +131,7 @@ class Supports:
         y = np.zeros((len(self.z), *end.onto.shape[:2]))
         for n, each in enumerate(self.of.system.constraints):
             for term in each.terms if each.name == name else ():
-                for other, _, f, t in self._exerted(each, term):
+                for other, _, f, t in self.exerted(each, term):
                     if same_end(other, end):
                         m = term.factor * self.history.multiplier[:, n, None, None]
                         z = np.zeros_like(self.z) if each.linear else self.z

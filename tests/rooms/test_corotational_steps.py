@@ -1,0 +1,172 @@
+"""Co-rotational frames by the system: as the loop that it replaces, and joints by constraint equations in them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kedfem.dynamics.transient as runs
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.following_dense import FollowingDense
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.segment import FREE
+from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.transient import Steps, steps_of, transient
+from kedfem.errors import SceneError
+from kedfem.results.audit import Account
+from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.recording import recording
+from kedfem.scene import scene_from, time_grid
+from tests.laws.test_following import slow_four_bar
+from tests.moving import bar, cardan, geared, inverted, turned, two_drives
+from tests.rooms.test_acted import four_bar
+from tests.spatial_joints import BEAMS
+
+Raw = dict[str, Any]
+Channels = dict[str, np.ndarray]
+REST = {"initial": "rest"}
+
+
+def channels(raw: Raw, solver_of: Any = steps_of) -> tuple[Steps, Channels, float]:
+    """All that a run records, over time; how far drives' efforts and their work are apart, of the energy."""
+    ready, _ = prepared(scene_from(raw))
+    solver = solver_of(ready.scene, ready.model)
+    account = Account(ready.model)
+    every = recording(ready.scene, ready.model, account, along=ready.path)
+    checks = CrossChecks(ready.scene, ready.linkage, [x.channel for x in every], account)
+    out: dict[str, list[np.ndarray]] = {x.channel.name: [] for x in every}
+    for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
+        rows = {x.channel.name: x.rows(block) for x in every}
+        checks.add(block, rows)
+        for name, x in rows.items():
+            out[name].append(x)
+    return solver, {name: np.concatenate(x) for name, x in out.items()}, checks.unworked
+
+
+def replaced(scene: Any, model: Any) -> FollowingDense:
+    """The loop of before."""
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    return FollowingDense(model.links, model.joints, scheme, model.damping, (), FREE)
+
+
+def alike(got: Channels, wanted: Channels, within: float) -> None:
+    """Of the largest value of all channels of the same kind."""
+    assert got.keys() == wanted.keys()
+    kinds = {
+        name: (name.partition("/")[0], name.rpartition("/")[2] * ("energy" not in name)) for name in wanted
+    }
+    for name, x in wanted.items():
+        size = max(np.abs(y).max() for like, y in wanted.items() if kinds[like] == kinds[name])
+        assert np.abs(got[name] - x).max() <= within * size, name
+
+
+OLD = {
+    "planar beams": lambda: four_bar("following", steps=72, analysis=REST),
+    "damped, rho_inf 0.8": lambda: four_bar(
+        "following", steps=72, damping={"beta": 1e-5, "alpha": 1.0}, analysis={**REST, "rho_inf": 0.8}
+    ),
+    "plane links": lambda: four_bar("following", "plane", steps=36, analysis=REST),
+    "beams in space": lambda: with_analysis(slow_four_bar(1.0, True), **REST),
+}  # fmt: skip
+
+
+def with_analysis(raw: Raw, **more: Any) -> Raw:
+    return {**raw, "analysis": {**raw["analysis"], **more}}
+
+
+@pytest.mark.parametrize("name", OLD)
+def test_all_that_is_recorded_is_as_by_the_loop_of_before(name: str, monkeypatch: Any) -> None:
+    """From rest, where both begin alike; both to the tolerance of scenes without a drive."""
+    monkeypatch.setattr(runs, "CONVERGED", FREE)
+    solver, got, _ = channels(OLD[name]())
+    assert isinstance(solver, CorotationalSteps)
+    alike(got, channels(OLD[name](), replaced)[1], 1e-7)
+
+
+def stiffer(raw: Raw, times: float) -> Raw:
+    """Links that bend so much less, and shafts that give so much less."""
+    steel = {"density": 7850, "youngs_modulus": 2.1e11 * times, "poisson_ratio": 0.3}
+    links = {k: {**x, "material": "m"} if "material" in x else x for k, x in raw["links"].items()}
+    raw = {**raw, "materials": {"m": steel}, "links": links}
+    shaft = raw.get("drive", {}).get("shaft_stiffness")
+    return raw if shaft is None else {**raw, "drive": {**raw["drive"], "shaft_stiffness": times * shaft}}
+
+
+def shorter(raw: Raw) -> Raw:
+    """Half of the time."""
+    return with_analysis(raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"turns", "end_time"}})
+
+
+DRIVEN = {
+    **{kind: make for kind, make in BEAMS.items() if kind not in {"slot", "bushings"}},
+    "sliding block": inverted, "shaft of universal joints": cardan, "gears": geared, "two drives": two_drives,
+}  # fmt: skip
+SOON = {"cylindrical", "screw", "sliding block", "gears"}
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(x, marks=[] if x in SOON else pytest.mark.long) for x in DRIVEN]
+)
+def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_nominal_frames(kind: str) -> None:
+    """Joint forces, drives, gears, energies: the rest falls with compliance. Efforts do the work."""
+    raw = with_analysis(stiffer(shorter(DRIVEN[kind]()), 100.0), rho_inf=0.8)
+    _, wanted, _ = channels(raw)
+    solver, got, unworked = channels(with_analysis(raw, frames="following"))
+    assert isinstance(solver, CorotationalSteps)
+    alike({k: x for k, x in got.items() if not k.startswith("energy/")},
+          {k: x for k, x in wanted.items() if not k.startswith("energy/")}, 0.01)  # fmt: skip
+    exchanged = np.abs(got["energy/work"]).max() + np.abs(got["energy/kinetic"]).max()
+    assert np.abs(got["energy/residual"]).max() < 3e-3 * exchanged
+    assert unworked < 1e-3
+
+
+def test_gears_hold_without_a_drive() -> None:
+    """Two arms geared 1 : −1, 1 N m on the first: T t²/2 over both inertias, m (L²/3 + w²/12) each; as far back."""
+    links = {"one": bar("beam", (0, 0), (0.3, 0), 1), "two": bar("beam", (0.5, 0), (0.8, 0), 1)}
+    joints = {
+        name: {"kind": "revolute", "links": ["ground", link], "at": [x, 0]}
+        for name, link, x in (("A", "one", 0.0), ("B", "two", 0.5))
+    }
+    raw: Raw = {
+        "links": links, "joints": joints, "gears": {"g": {"joints": ["A", "B"], "ratio": -1.0}},
+        "motors": {"m": {"joint": "A", "torque": 1.0}}, "analysis": {"end_time": 0.1, "step": 1e-3, "rho_inf": 0.8},
+    }  # fmt: skip
+    _, got, _ = channels(raw)
+    inertia = 2 * 7850 * 0.03 * 0.02 * 0.3 * (0.3**2 / 3 + 0.03**2 / 12)
+    one, two = (got[f"joints/{name}/angle"][-1, 0] for name in "AB")
+    assert one == pytest.approx(0.5 * 0.1**2 / inertia, rel=5e-4)
+    assert two == pytest.approx(-one, rel=5e-4)
+    torque = got["gears/g/torque"][50:, 0]  # half of the motor's goes into the second arm
+    assert np.abs(torque).mean() == pytest.approx(0.5, rel=0.02)
+    assert np.abs(got["energy/residual"]).max() < 1e-3 * np.abs(got["energy/work"]).max()
+
+
+def test_without_a_drive_the_same_whichever_way_the_scene_is_turned() -> None:
+    """Beams in space with a cross, let go under gravity: forces of all joints, and the account of energy."""
+    raw = BEAMS["universal"]()
+    raw = {key: x for key, x in raw.items() if key != "drive"}
+    analysis = {"end_time": 0.01, "step": 5e-4, "rho_inf": 0.8}
+    R = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    _, one, _ = channels({**raw, "analysis": analysis})
+    _, other, _ = channels(turned({**raw, "analysis": analysis}, R, (0.3, -0.2, 0.1)))
+    forces = [name for name in one if name.endswith("/force")]
+    assert len(forces) >= 3
+    for name in forces:
+        size = np.abs(one[name]).max()
+        assert np.abs(one[name] @ R.T - other[name]).max() < 1e-6 * size, name
+    assert np.abs(one["energy/residual"]).max() < 3e-3 * np.abs(one["energy/kinetic"]).max()
+
+
+def test_what_joints_by_constraint_equations_do_not_stand_beside_is_refused() -> None:
+    raw = with_analysis(inverted(), frames="following")
+    load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1.0], "frame": "link"}
+    ready, _ = prepared(scene_from({**raw, "loads": {"P": load}}))
+    with pytest.raises(
+        SceneError, match=r"loads: must have frame = \"world\" .* beside joints\.S with frames"
+    ):
+        steps_of(ready.scene, ready.model)
+    raw = with_analysis(inverted("plane"), frames="following")
+    raw["links"]["arm"] |= {"segments": 1, "mesh": {"elements": [100, 4]}}
+    ready, _ = prepared(scene_from(raw))
+    with pytest.raises(SceneError, match=r"links\.arm: must have at most 1500 unknowns .* joints\.S .* got"):
+        steps_of(ready.scene, ready.model)
