@@ -48,11 +48,6 @@ def test_segments_finer_than_the_mesh() -> None:
     assert said.endswith("got 6; take a finer mesh")
 
 
-def test_a_torque_on_the_joint_that_is_driven() -> None:
-    raw = arm() | {"motors": {"m": {"joint": "A", "torque": 3}}}
-    assert fault(raw) == "motors.m.joint: must name a joint that the drive does not move, got 'A'"
-
-
 def test_a_start_that_the_joints_do_not_allow() -> None:
     """The speed asked for is across the slide."""
     raw = arm()

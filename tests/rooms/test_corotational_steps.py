@@ -157,6 +157,46 @@ def test_without_a_drive_the_same_whichever_way_the_scene_is_turned() -> None:
     assert np.abs(one["energy/residual"]).max() < 3e-3 * np.abs(one["energy/kinetic"]).max()
 
 
+ON_SLIDE: dict[str, Raw] = {
+    "motor over travel": {
+        "motors": {"m": {"joint": "S", "force": {"over": "travel", "at": [-1, 1], "value": [1e3, -1e3]}}}
+    },
+    "spring and damper": {
+        "springs": {
+            "s": {"kind": "spring", "joint": "S", "stiffness": 2e4, "damping": 50.0, "preload": 300.0}
+        }
+    },
+}
+
+
+@pytest.mark.parametrize("acting", ON_SLIDE)
+def test_motors_and_springs_along_a_slide_that_turns(acting: str) -> None:
+    """A block on an arm about 0.4 m from its pivot: the drive's torque is that of rigid links, the work as counted."""
+    raw = with_analysis(stiffer(inverted(), 100.0), frames="following", rho_inf=0.8)
+    _, got, unworked = channels({**raw, **ON_SLIDE[acting]})
+    torque, rigid = got["drive/torque"], got["drive/rigid_torque"]
+    plain = channels(raw)[1]["drive/rigid_torque"]
+    assert np.abs(rigid - plain).max() > 0.5 * np.abs(rigid).max()  # N m, of the slide's force
+    assert np.abs(torque - rigid).max() < 0.01 * np.abs(rigid).max()
+    assert unworked < 1e-3
+    (travel,) = (x[:, 0] for name, x in got.items() if name.endswith("/travel"))
+    phi = np.linspace(0, np.pi / 2, len(travel))
+    drawn = np.hypot(0.1 * np.sin(phi), 0.3 + 0.1 * np.cos(phi)) - 0.4
+    assert np.abs(np.abs(travel) - np.abs(drawn)).max() < 1e-4
+
+
+def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
+    """Between crank and rod of a loop in space: as much from the drive as inverse dynamics says, in both frames."""
+    raw = with_analysis(stiffer(shorter(BEAMS["cylindrical"]()), 100.0), rho_inf=0.8)
+    (name,) = (key for key, joint in raw["joints"].items() if joint["kind"] == "cylindrical")
+    for frames in ("nominal", "following"):
+        acting = {"motors": {"m": {"joint": name, "torque": 40.0}}}
+        _, got, unworked = channels({**with_analysis(raw, frames=frames), **acting})
+        rigid = got["drive/rigid_torque"]
+        assert np.abs(got["drive/torque"] - rigid).max() < 0.02 * np.abs(rigid).max()
+        assert unworked < 1e-3
+
+
 def test_what_joints_by_constraint_equations_do_not_stand_beside_is_refused() -> None:
     raw = with_analysis(inverted(), frames="following")
     load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1.0], "frame": "link"}

@@ -10,6 +10,12 @@ from tests.moving import bar, channels, ran
 
 SPRING = {"kind": "spring", "stiffness": 1e4}
 ON_CRANK: dict[str, dict[str, Any]] = {
+    "torsion spring about the driven joint": {
+        "springs": {"k": {"kind": "torsion", "joint": "A", "stiffness": 5.0, "free_angle": 0.5}}
+    },
+    "motor on the driven joint": {
+        "motors": {"k": {"joint": "A", "torque": {"over": "angle", "at": [0, 2], "value": [5.0, 1.0]}}}
+    },
     "spring to the ground": {
         "springs": {
             "k": SPRING
@@ -55,7 +61,8 @@ def four_bar(crank: str, more: dict[str, Any], **analysis: Any) -> dict[str, Any
 
 
 @pytest.mark.parametrize(
-    ("crank", "frames"), [("beam", "nominal"), ("rigid", "nominal"), ("rigid", "following")]
+    ("crank", "frames"),
+    [("beam", "nominal"), ("rigid", "nominal"), ("rigid", "following"), ("beam", "following")],
 )
 @pytest.mark.parametrize("acting", list(ON_CRANK))
 def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(

@@ -73,9 +73,10 @@ def test_a_quasi_static_start_has_loads_that_turn_with_the_link() -> None:
     assert np.linalg.norm(tip(raw)) > 0.01  # m
 
 
-def test_a_motor_on_a_slide_between_moving_links_is_refused_with_the_reason() -> None:
+def test_a_motor_on_a_slide_between_moving_links_needs_frames_that_follow() -> None:
     raw = inverted() | {"motors": {"m": {"joint": "S", "force": 10.0}}}
     with pytest.raises(
-        SceneError, match=r"m.joint: must name a prismatic joint on the ground .*while the slide turns"
+        SceneError,
+        match=r"m.joint: must name a slide on the ground, or stand with frames .*while the slide turns",
     ):
         scene_from(raw)

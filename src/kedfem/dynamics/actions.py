@@ -206,11 +206,13 @@ def _hinge(find: _Ends | _RigidEnds, name: str, joint: str) -> Action:
 
 
 def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> Action:
-    """An action on the travel of a slide, without a force yet: the port of its link against the ground."""
+    """An action on the travel of a slide, without a force yet: the port of its link against the other."""
     at = np.asarray(find.scene.joints[joint].at)
     one, other = _ordered(find.scene.joints[joint].links)
-    ends = (_port(find, joint, one, at), find.point(f"joints.{joint}", other, at))
-    return Action(name, SLIDE, ends, axis=joint_axis(find.scene.joints[joint]))
+    axis, end = joint_axis(find.scene.joints[joint]), find.point(f"joints.{joint}", other, at)
+    if end.k < 0 and other != GROUND:  # it turns with what it is on
+        end = replace(end, X=np.array([at, axis]), weights=np.zeros((2, 0)))
+    return Action(name, SLIDE, (_port(find, joint, one, at), end), axis=axis)
 
 
 def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:

@@ -159,10 +159,10 @@ def followed(x, forms, numbers, gradient):  # type: ignore[no-untyped-def]
 
 @compiled
 def travel(x, numbers, gradient):  # type: ignore[no-untyped-def]
-    """Travel of the first end against the second along the axis, and its gradient."""
-    q = 0.0
+    """Travel of the first end against the second along the axis, and its gradient; along the second end's own, if any."""
+    q, own = 0.0, dot(x[1, 1], x[1, 1]) > 0.0
     for c in range(3):
-        n = numbers[AXIS + c]
+        n = x[1, 1, c] if own else numbers[AXIS + c]
         q += n * (x[0, 0, c] - x[1, 0, c])
         gradient[0, 0, c] = n
         gradient[1, 0, c] = -n

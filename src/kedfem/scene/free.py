@@ -15,6 +15,8 @@ from kedfem.scene.units import Quantity, si_number
 from kedfem.scene.wording import shown, unknown_name
 
 EVERY_JOINT = frozenset(get_args(Joint.model_fields["kind"].annotation))
+TURNED = ("revolute", "cylindrical", "screw")  # kinds with one turn, which a torque or torsion spring acts on
+SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
 
 
@@ -75,16 +77,20 @@ def motor_faults(parts: Parts) -> Iterator[str]:
         if joint is None:
             continue
         kind, key = joint.word("kind"), "torque" if motor.has("torque") else "force"
-        wanted = {"torque": "revolute", "force": "prismatic"}[key]
-        if kind in EVERY_JOINT - {wanted} and motor.has(key):
+        wanted = TURNED if key == "torque" else SLID
+        if kind in EVERY_JOINT - {*wanted} and motor.has(key):
             got = f"got {joint.name!r}, which is {kind}"
-            yield motor.fault("joint", f"must name a {wanted} joint for a {key}, {got}")
-        elif key == "force" and motor.has(key) and GROUND not in link_names(joint):
-            reason = "its force would keep the direction as drawn while the slide turns"
-            yield motor.fault(
-                "joint", f"must name a prismatic joint on the ground ({reason}), got {joint.name!r}"
-            )
-        yield from held_joint_faults(parts, motor, joint)
+            yield motor.fault("joint", f"must name a {' or '.join(wanted)} joint for a {key}, {got}")
+        elif key == "force" and motor.has(key):
+            yield from slide_faults(parts, motor, joint)
+
+
+def slide_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]:
+    """A motor or spring along a slide that turns, with frames that do not know how."""
+    if GROUND not in link_names(joint) and not any_following(parts):
+        wanted = 'must name a slide on the ground, or stand with frames = "following"'
+        reason = "with nominal ones its force would keep the direction as drawn while the slide turns"
+        yield entry.fault("joint", f"{wanted} ({reason}), got {joint.name!r}")
 
 
 def spring_faults(parts: Parts) -> Iterator[str]:
@@ -103,30 +109,24 @@ def spring_faults(parts: Parts) -> Iterator[str]:
 
 
 def joint_spring_faults(parts: Parts, spring: Entry) -> Iterator[str]:
-    """A torsion spring away from a hinge, one along what is no slide, or where it cannot move anything."""
+    """A torsion spring on a joint that has no turn, or one along what is no slide."""
     joint = joint_of(parts, spring)
     if joint is None:
         if spring.word("joint") and parts.joints:
             yield spring.fault("joint", unknown_name("a joint", str(spring.word("joint")), parts.joints))
         return
     kind = joint.word("kind")
-    wanted = "revolute" if spring.word("kind") == "torsion" else "prismatic"
-    if kind in EVERY_JOINT - {wanted}:
-        yield spring.fault("joint", f"must name a {wanted} joint, got {joint.name!r}, which is {kind}")
-    elif kind == "prismatic" and GROUND not in link_names(joint):
-        yield spring.fault("joint", f"must name a joint on the ground, got {joint.name!r}")
-    yield from held_joint_faults(parts, spring, joint)
+    wanted = TURNED if spring.word("kind") == "torsion" else SLID
+    if kind in EVERY_JOINT - {*wanted}:
+        kinds = " or ".join(wanted)
+        yield spring.fault("joint", f"must name a {kinds} joint, got {joint.name!r}, which is {kind}")
+    elif spring.word("kind") != "torsion":
+        yield from slide_faults(parts, spring, joint)
 
 
 def joint_of(parts: Parts, entry: Entry) -> Entry | None:
     """The joint that an entry names."""
     return parts.joints.get(entry.word("joint") or "")
-
-
-def held_joint_faults(parts: Parts, entry: Entry, joint: Entry) -> Iterator[str]:
-    """A motor or spring on a joint that the drive moves."""
-    if joint.name in parts.driven_joints:
-        yield entry.fault("joint", f"must name a joint that the drive does not move, got {joint.name!r}")
 
 
 def end_links(spring: Entry) -> list[str | None]:

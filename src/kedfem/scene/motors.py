@@ -73,7 +73,8 @@ class Motor(Record):
     """
 
     joint: str
-    """the joint: revolute or prismatic, not the one that is driven"""
+    """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force; between links that
+    both move a force needs frames that follow"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
     force: ForceOver | None = None

@@ -60,7 +60,8 @@ class LineSpring(_Elastic):
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
     joint: str | None = None
-    """a prismatic joint on the ground that it lies along, instead of two ends"""
+    """a prismatic or cylindrical joint that it lies along, instead of two ends; between links that both move it needs
+    frames that follow"""
     stiffness: Stiffness = 0.0
     """k"""
     damping: Damper = 0.0
@@ -106,7 +107,7 @@ class TorsionSpring(_Elastic):
 
     kind: Literal["torsion"] = "torsion"
     joint: str
-    """the hinge"""
+    """the hinge, cylindrical joint or screw"""
     stiffness: TorsionStiffness = 0.0
     """k"""
     damping: TorsionDamper = 0.0
