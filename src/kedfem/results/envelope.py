@@ -23,7 +23,8 @@ DECADES = 1e-4  # of the largest: singular values that one look at a Gram matrix
 SOME = 64  # steps of which new modes are made at a time
 SAMPLE = 1000  # points at which the stress of a mode is judged
 WAITING = 192_000_000  # bytes of histories, at most, that are looked at together
-STEPS = 1024  # and steps
+STEPS = 2048  # and steps
+HEAD = 1e-3  # of the largest: coordinates below, by what they make of stress, are bounded before they are summed up
 VON_MISES, LARGEST, SMALLEST = range(3)
 
 
@@ -110,11 +111,13 @@ class Envelope:
     model : whose steps they are
     recoveries : per link, then per prescribed rigid link
     worst : the instant of the highest stress so far
+    looked, evaluated : stresses at a point and a time that were looked at, and that all modes were summed up for
     """
 
     model: Model
     recoveries: Sequence[StressRecovery]
     worst: Snapshot | None = None
+    looked: int = 0
     evaluated: int = 0
     _modes: list[Modes | None] = field(default_factory=list, repr=False)
     _stress: list[Float[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
@@ -155,11 +158,15 @@ class Envelope:
     def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int) -> None:
         from kedfem.results.envelope_kernel import LEVELS, enveloped, residuals_of
 
-        C = np.ascontiguousarray(modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0)))))
-        residuals = np.zeros((LEVELS, -(-len(C) // 2), C.shape[1]))
-        residuals_of(C, residuals)
-        parts = np.ascontiguousarray(modes.parts)
-        self.evaluated += enveloped(parts, C, residuals, first, self._stress[i], self._step[i])
+        C = modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0))))
+        C, parts, m = leading(C, modes.parts)
+        residuals = np.zeros((LEVELS, -(-len(C) // 2), m + 1))
+        residuals_of(C, m, residuals)
+        heads = np.ascontiguousarray(parts[:, :, :m].transpose(0, 2, 1))
+        rest = np.sqrt((C[:, m:] ** 2).sum(axis=1))
+        looked, full = enveloped(heads, parts, C, rest, residuals, first, self._stress[i], self._step[i])
+        self.looked += looked
+        self.evaluated += full
 
     def _stressed(self) -> list[tuple[Float[np.ndarray, "3 p"], Int[np.ndarray, "3 p"]]]:
         every = zip(self._modes, self._stress, self._step, strict=True)
@@ -192,6 +199,33 @@ class Envelope:
     def when(self) -> Float[np.ndarray, "2 T"]:
         """Time [s] and position of the drive at every step that was looked at."""
         return np.concatenate(self._when, axis=1) if self._when else np.zeros((2, 0))
+
+
+def leading(
+    C: Float[np.ndarray, "T r"], parts: Float[np.ndarray, "p 6 r"]
+) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "p 6 r"], int]:
+    """Modes turned to their principal directions over some steps, by what they make of stress, the largest first.
+
+    Returns
+    -------
+    coordinates and stresses of the same steps, and how many modes make all stress but `HEAD` of it
+    """
+    seen = parts[:: 1 + len(parts) // SAMPLE]
+    gain = np.sqrt((seen**2).sum(axis=(0, 1)))
+    if not C.shape[1] or not gain.max() > 0:
+        return np.ascontiguousarray(C), np.ascontiguousarray(parts), C.shape[1]
+    gain = np.maximum(gain, NOTHING * gain.max())
+    _, size, V = np.linalg.svd(C * gain, full_matrices=False)
+    if len(V) < len(gain):  # fewer steps than modes
+        V = np.vstack([V, np.linalg.svd(V)[2][len(V) :]])
+    head = int((size > HEAD * size[0]).sum())
+    scale = np.zeros(len(gain))
+    scale[: len(size)] = size
+    unit = np.sqrt(
+        np.maximum(scale, NOTHING * size[0])
+    )  # the rest in units in which Cauchy and Schwarz says much
+    turned = (parts.reshape(-1, len(gain)) @ (V.T / gain[:, None] * unit)).reshape(parts.shape)
+    return np.ascontiguousarray((C * gain) @ V.T / unit), turned, head
 
 
 def peaks(
