@@ -16,6 +16,7 @@ from kedfem.links.build import bare_link, bare_links
 from kedfem.links.candidates import candidates
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid_functions
+from kedfem.links.rounds import rounds
 from kedfem.links.seats import Seat, face_seat, joint_seat, surface_weights
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
@@ -314,6 +315,20 @@ def test_faces_are_found_however_nodes_are_numbered() -> None:
 
 
 # -- what is said where there is none -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sides", range(3, 13))
+def test_a_prism_of_few_sides_is_no_journal_and_its_hole_no_bore(sides: int) -> None:
+    """Corners at one distance from the axis do not make a cylinder; seven flat facets around are one that is coarse."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    plane = 0.01 * np.concatenate([2 * ring, ring])
+    j = np.arange(sides)
+    quads = np.column_stack([j, (j + 1) % sides, sides + (j + 1) % sides, sides + j])[:, ::-1]
+    points = np.column_stack([np.tile(plane, (2, 1)), np.repeat([0.0, 0.01], len(plane))])
+    link = made(SolidMesh(points, np.column_stack([quads, quads + len(plane)])))
+    found = rounds(link, np.zeros(3), np.array([0.0, 0, 1]))
+    assert sorted(each.inward for each in found) == ([] if sides < 7 else [False, True])
 
 
 def test_an_axis_askew_is_told_with_its_angle() -> None:

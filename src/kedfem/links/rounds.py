@@ -22,6 +22,7 @@ CLOSED = (
 )
 LEVEL = 1e-3  # of a cylinder's length and radius: places along the axis that are the same
 MANY = 12  # facets at one distance from a point are not so by chance
+SUNK = 0.1  # of a cylinder's radius: how far within it its facets may sink; those of a prism of six sides sink by 0.13
 DOMED = (
     0.1  # of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
 )
@@ -52,7 +53,10 @@ class Round:
 
 
 def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]) -> list[Round]:
-    """All closed cylinders about an axis through a point, as far as they are near it along the axis."""
+    """All closed cylinders about an axis through a point, as far as they are near it along the axis.
+
+    Facets may be flat, seven or more of them around; a prism of fewer sides is none.
+    """
     facets, corners, normals = boundary(link)
     along = (corners - point) @ axis
     r = corners - point - along[..., None] * axis
@@ -62,6 +66,10 @@ def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3
     # a facet around the axis, whose corners are as far from it too, is no part of a bore
     round_ = (np.ptp(radii, axis=1) <= CYLINDER_TOLERANCE * mean) & (out > AROUND * mean)
     round_ &= mean > PLANE_TOLERANCE * np.ptp(link.X, axis=0).max()
+    some = np.flatnonzero(round_)
+    x = surface(link, facets[some]).x - point
+    within = np.linalg.norm(x - (x @ axis)[..., None] * axis, axis=2).min(axis=1)
+    round_[some] = within >= (1 - SUNK) * mean[some]
     facing = np.einsum("fk,fk->f", normals, middle)
     found = []
     for inward, side in ((True, facing < -0.5 * out), (False, facing > 0.5 * out)):
