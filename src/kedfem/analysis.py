@@ -21,31 +21,29 @@ from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.cost import factor_words
-from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.history import Block
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.loads import coarse_steps
-from kedfem.dynamics.model import Model, segments, ways
+from kedfem.dynamics.model import segments, ways
 from kedfem.dynamics.transient import Steps, eased_warning
-from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
-from kedfem.output.frames import link_fields
-from kedfem.output.picture import write_picture
-from kedfem.output.plots import remove_plots, write_plots
-from kedfem.output.vtu import (
-    AnimationWriter,
-    LinkField,
-    remove_animation,
-    write_cells,
-    write_frame,
-    write_points,
+from kedfem.output.derived import (
+    MESH,
+    STEM,
+    WORST,
+    fields,
+    peak_warning,
+    remove_derived,
+    write_derived,
+    write_envelope,
 )
-from kedfem.output.words import clock, moment, stress_at
-from kedfem.results import Channel, Peak, Results, ResultsWriter, add_notes, claimed, read_results, write_csv
+from kedfem.output.vtu import AnimationWriter, write_cells, write_frame
+from kedfem.results import Channel, Peak, Results, ResultsWriter, add_notes, claimed, read_results
 from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.doubtful import AWAY, doubtful, reason
+from kedfem.results.doubtful import doubtful
 from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.recorded import Recorded
 from kedfem.results.recording import recording, rows
@@ -53,8 +51,6 @@ from kedfem.results.undetermined import undetermined, undetermined_warning
 from kedfem.results.writer import add_peaks, drive_channel, mark_doubtful
 from kedfem.scene import Scene, time_grid, turn_steps
 
-STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
-WORST, ENVELOPE = "worst.vtu", "envelope.vtu"
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
 T = TypeVar("T")
@@ -111,30 +107,37 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
 
 
 def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
-    """The stages of a run, in a folder of its own."""
+    """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
+    plain = sizes(scene, ready.model)
+    notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stability_warning(scene)]
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed(
         "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
     )
-    recoveries = clock.timed("recovery", lambda: _recoveries(ready.model))
-    frequencies = clock.timed("frequencies", lambda: resolution(ready))
+    every = [*ready.model.links, *(carried.link for carried in ready.model.carried)]
+    recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
+    notices += resolution_warnings(clock.timed("frequencies", lambda: resolution(ready)))
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
     watched = _Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
     envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
+    notices += [*balance_warning(account.balance, scene.analysis.stiffening), *efforts.warnings()]
+    notices += [*undetermined_warning(untold), *watched.passes.warnings(), *eased_warning(solvers)]
+    notices += coarse_steps(scene)
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
-    known = step.errors if step.levels > 1 else None
-    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), known))
+    errors = step.errors if step.levels > 1 else None
+    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), errors))
+    notices += budget_warning(found, asked)
     step = replace(step, errors=found.step or step.errors)
     notes = attributes(found) | step.notes
     add_notes(folder / "results.h5", notes)
@@ -143,75 +146,14 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
     peak = highest(results.peaks)
-    _write_envelope(folder / ENVELOPE, envelope, doubts)
-    _write_worst(folder / WORST, ready, recoveries, envelope)
-    warnings = clock.timed("pictures", lambda: _written(scene, results, peak, folder))
-    _mesh_field(seen.strained, folder / MESH)
-    plain = sizes(scene, ready.model)
-    warnings = (
-        *size_warnings(scene, plain),
-        *assembly_warning(assembly),
-        *stability_warning(scene),
-        *budget_warning(found, asked),
-        *resolution_warnings(frequencies),
-        *balance_warning(account.balance, scene.analysis.stiffening),
-        *efforts.warnings(),
-        *undetermined_warning(untold),
-        *peak_warning(peak),
-        *watched.passes.warnings(),
-        *eased_warning(solvers),
-        *coarse_steps(scene),
-        *warnings,
-    )
-    return Run(
-        folder,
-        results,
-        peak,
-        folder / WORST,
-        clock.seconds,
-        warnings,
-        reduction,
-        plan,
-        account.balance,
-        found,
-        plain,
-        step,
-    )
-
-
-def peak_warning(peak: Peak | None) -> tuple[str, ...]:
-    """A warning where the highest stress is not what it seems, with the highest one elsewhere."""
-    if peak is None or not peak.near:
-        return ()
-    said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
-    away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
-    return (said + away,)
-
-
-def _write_envelope(file: FilePath, envelope: Envelope, doubts: list[list[str]]) -> None:
-    """Highest stresses at every point and when they occur, on the links as drawn, for ParaView."""
-    every = envelope.links()
-    time = envelope.when()[0]
-    drawn = [each.recovery.at_points((each.recovery.link.full or each.recovery.link).X) for each in every]
-    parts = [
-        (each.link, points, each.recovery.cells, each.recovery.cell_type)
-        for each, points in zip(every, drawn, strict=True)
-    ]
-    stress = np.concatenate([each.stress for each in every], axis=1)
-    when = np.where(np.isnan(stress), np.nan, time[np.concatenate([each.step for each in every], axis=1)])
-    values: dict[str, np.ndarray] = {}
-    for k, name in enumerate(("highest von Mises", "largest principal", "smallest principal")):
-        values |= {f"{name} stress [Pa]": stress[k], f"time of {name} stress [s]": when[k]}
-    values["depends on mesh or joint"] = np.array([float(bool(x)) for each in doubts for x in each])
-    write_points(file, parts, values)
-
-
-def _write_worst(
-    file: FilePath, ready: Prepared, recoveries: list[StressRecovery], envelope: Envelope
-) -> None:
-    """The frame of the highest stress, whether or not it is one of the animation."""
+    notices += peak_warning(peak)
+    write_envelope(folder, envelope, doubts)
     if envelope.worst is not None:
-        write_frame(file, envelope.worst.t, _fields(ready, recoveries, envelope.worst))
+        write_frame(folder / WORST, envelope.worst.t, fields(scene, ready.model, recoveries, envelope.worst))
+    notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
+    _mesh_field(seen.strained, folder / MESH)
+    return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
+               account.balance, found, plain, step)  # fmt: skip
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:
@@ -269,11 +211,6 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
 
 
-def _recoveries(model: Model) -> list[StressRecovery]:
-    links = [*model.links, *(carried.link for carried in model.carried)]
-    return [stress_recovery(link) for link in links]
-
-
 @dataclass(frozen=True, slots=True)
 class _Watched:
     """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
@@ -319,7 +256,7 @@ def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
                 for k in range(len(block)):
                     if block.step + k in wanted:
                         now = block.at(k)
-                        frames.add(now.t, _fields(ready, watched.recoveries, now))
+                        frames.add(now.t, fields(scene, model, watched.recoveries, now))
                 watch("steps", block.step + len(block) - 1, steps)
         finally:
             table.flush()
@@ -357,38 +294,4 @@ class _Table:
             first = self.writer.rows == 0
             self.writer.append(time, angle, block)
             if first:
-                _remove_derived(self.folder)
-
-
-def _remove_derived(folder: FilePath) -> None:
-    """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
-    for name in (TABLE, PICTURE, MESH, WORST, ENVELOPE):
-        (folder / name).unlink(missing_ok=True)
-    remove_plots(folder / PLOTS)
-    remove_animation(folder, STEM)
-
-
-def _fields(ready: Prepared, recoveries: list[StressRecovery], snapshot: Snapshot) -> list[LinkField]:
-    """What a frame shows of each link, deformed as the animation exaggerates it."""
-    animation = ready.scene.output.animation
-    return link_fields(ready.model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
-
-
-def _written(scene: Scene, results: Results, peak: Peak | None, folder: FilePath) -> tuple[str, ...]:
-    """Table, plots and picture; a picture that cannot be drawn is a warning."""
-    if scene.output.csv:
-        write_csv(results, folder / TABLE)
-    if scene.output.plots:
-        write_plots(results, folder / PLOTS)
-    if not (scene.output.picture and peak):
-        return ()
-    title = f"{scene.title or 'kedfem'}: highest stress {stress_at(peak)}, t = {peak.time:.4g} s"
-    if clock(scene) != "time":
-        title += f", drive {moment(scene, peak.time, peak.angle)}"
-    animation = scene.output.animation
-    scale = animation.exaggeration if animation else 1.0
-    try:
-        write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity)
-    except OutputError as err:
-        return (str(err),)
-    return ()
+                remove_derived(self.folder)

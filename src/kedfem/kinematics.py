@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
-from kedfem.analysis import PLOTS, STEM, TABLE, Clock, Watch, frame_steps
+from kedfem.analysis import Clock, Watch, frame_steps
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.places import slider_axis
 from kedfem.dynamics.transient import motions
@@ -20,6 +20,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.motion.transmission import LEAST
+from kedfem.output.derived import PLOTS, STEM, TABLE
 from kedfem.output.plots import write_plots
 from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.output.vtu import AnimationWriter, remove_animation
