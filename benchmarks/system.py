@@ -1,22 +1,25 @@
 """Steps a second of a system beside the solvers that it replaces, in one run: `python -m benchmarks.system`."""
 
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 from tests.moving import bar, rising
-from tests.rooms.test_system_steps import condensed
+from tests.rooms.test_acted import four_bar as hinged
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.actions import actions
+from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED
+from kedfem.dynamics.substructure import factored
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march, ready
+from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.start import rest
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.transient import forcings, motions, started, steps_of, transient
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import following, path_parameter, scene_from, time_grid
+from kedfem.scene import path_parameter, scene_from, time_grid
 
 STEPS, TURNS = 2000, 3
 
@@ -48,17 +51,14 @@ def with_spring() -> dict[str, Any]:
 
 
 def speeds(raw: dict[str, Any], few: int) -> tuple[float, float, float]:
-    """Steps a second of the solver that is replaced, over a few steps, and of the system to the same tolerance."""
+    """Steps a second of a run's solver, over a few steps, and of the system alone to the same tolerance."""
     scene = scene_from(raw)
     made = meshed(scene)
     grid = time_grid(scene)
     short = scene_from({**raw, "analysis": {**raw["analysis"], "end_time": few * grid.step}})
     old = []
     for _ in range(TURNS):
-        every = actions(short, made.model)
-        solver = (
-            condensed(short, made.model) if every and not following(short) else steps_of(short, made.model)
-        )
+        solver = steps_of(short, made.model)
         began = perf_counter()
         for _ in transient(short, made.linkage, made.path, made.model, solver):
             pass
@@ -78,21 +78,70 @@ def speeds(raw: dict[str, Any], few: int) -> tuple[float, float, float]:
     return few / min(old), STEPS / min(new[1:]), float(after.passes[0]) / STEPS
 
 
+SOLIDS = {  # elements of crank, coupler and rocker
+    "a solid link of 951 unknowns beside two reduced ones": ([4, 1, 1], [16, 2, 1], [4, 1, 1]),
+    "solids of 5,265 unknowns each": ([24, 4, 3],) * 3,
+    "solids of 9,792 unknowns each": ([24, 5, 5],) * 3,
+    "solids of 28,839 unknowns each": ([40, 8, 6],) * 3,
+}
+
+
+def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
+    """A four-bar of solid links; those of four elements reduced."""
+    raw = hinged("nominal", "solid", steps=360, analysis={"initial": "rest", "turns": 1})
+    for link, count in zip(raw["links"].values(), elements, strict=True):
+        link["mesh"] = {"elements": count}
+        link["fidelity"] = "reduced" if count[0] == 4 else "solid"
+    return raw
+
+
+def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
+    """Processor time of a step of the system, histories and all, and of the sparse links' triangular solves [µs]."""
+    made, _ = prepared(scene_from(raw))
+    scene, model = made.scene, made.model
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    solver = SystemSteps(scene, nominal_system(scene, model), model, scheme)
+    state = started(scene, made.linkage, made.path, model, solver)
+    _, motion = next(motions(scene, made.linkage, made.path))
+    motion, of = motion.part(0, count), solver.ready
+    large = [k for k, part in enumerate(of.parts) if isinstance(part, SparsePart)]
+    bare = [
+        (
+            factored(model.links[k], of.system.model.joints[k], of.c.c_M, of.c.c_K),
+            np.ones(model.links[k].X.shape),
+        )
+        for k in large
+    ]
+    steps, solves = [], []
+    for _ in range(TURNS + 1):
+        began = process_time()
+        solver.advance(state, forcings(model, motion), motion)
+        steps.append(process_time() - began)
+        began = process_time()
+        for _ in range(count):
+            for part, r in bare:
+                part.solve(r)
+        solves.append(process_time() - began)
+    return 1e6 * min(steps[1:]) / count, 1e6 * min(solves[1:]) / count
+
+
 def main() -> None:
-    """Print the table of docs/system.md."""
+    """Print the tables of docs/system.md."""
     cases = {
         "four-bar of beams, nominal": (four_bar(), STEPS),
-        "the same with one spring": (with_spring(), 100),
+        "the same with one spring, which runs on the system": (with_spring(), STEPS),
         "four-bar of beams, co-rotational": (
             four_bar(2, analysis={**four_bar()["analysis"], "frames": "following"}),
             STEPS,
         ),
     }
-    print(
-        "| scene | solver that it replaces, steps/s | system, steps/s | its passes a step |\n|---|---:|---:|---:|"
-    )
+    print("| scene | solver of a run, steps/s | system, steps/s | its passes a step |\n|---|---:|---:|---:|")
     for name, (raw, few) in cases.items():
         print("| {} | {:.0f} | {:.0f} | {:.1f} |".format(name, *speeds(raw, few)), flush=True)
+    print("\n| scene | step, µs | triangular solves, µs | ratio |\n|---|---:|---:|---:|")
+    for (name, elements), count in zip(SOLIDS.items(), (200, 60, 40, 20), strict=True):
+        step, solves = beside_solves(solid(elements), count)
+        print(f"| {name} | {step:.0f} | {solves:.0f} | {step / solves:.2f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from tests.spatial_joints import BEAMS
 from tests.systems import Begun, against_oracle, begun, marched, rows
 
 Raw = dict[str, Any]
-KINDS = [kind for kind in BEAMS if kind != "slot"]
+KINDS = list(BEAMS)
 STEPS = {"end_time": 0.005, "step": 5e-4, "rho_inf": 0.8}
 HINGE = {"kind": "revolute"}
 
@@ -109,6 +109,8 @@ def test_springs_and_motors_move_as_by_the_oracle(frames: str, driven: bool, wit
 def test_every_kind_of_joint_in_all_frames_moves_as_by_the_oracle(
     kind: str, frames: str, driven: bool, within: float
 ) -> None:
+    if kind == "slot" and frames == "following":
+        pytest.skip("the pin of a slot slides as the nominal motion tells")
     of = begun(BEAMS[kind](), frames, driven)
     assert (COROTATIONAL in of.ready.bodies.frame) == (frames == "following")
     assert against_oracle(of, 2) < within

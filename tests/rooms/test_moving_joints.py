@@ -255,9 +255,9 @@ def test_energy_is_kept_account_of_to_second_order(kind: str) -> None:
     assert_allclose(left[0] / left[1], 4, rtol=0.1)
 
 
-def test_what_numerical_damping_takes_from_damped_bushings_falls_as_the_cube_of_the_step() -> None:
-    """Vibration on bushings that steps hardly resolve loses energy to ρ∞ < 1, which counts as residual: a seventh to an
-    eighth of it is left with half the step, more than second order asks for, until the rest, a quarter, outweighs it.
+def test_numerical_damping_finds_nothing_to_take_from_damped_bushings() -> None:
+    """Quasi-static starts feel their dampers, so that nothing vibrates: ρ∞ = 0.5 takes less than the residual, a quarter
+    of that with half the step. With dampers left out of the start it took 2.2e-5 J beside 3.5e-6 J.
     """
     taken = []
     for steps in (1440, 2880):
@@ -266,7 +266,8 @@ def test_what_numerical_damping_takes_from_damped_bushings_falls_as_the_cube_of_
             for rho_inf in (0.5, 0.95)
         )
         taken.append(np.abs(much - little)[:: steps // 1440].max())
-    assert_allclose(taken[0] / taken[1], 8, rtol=0.1)
+        assert taken[-1] < np.abs(little).max()
+    assert_allclose(taken[0] / taken[1], 4, rtol=0.1)
 
 
 def test_two_rotors_on_shaft_and_bushing_swing_as_two_masses_on_springs() -> None:

@@ -13,13 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.action import TURN, Action, elastic_vectors, kernel_table, nominal_vectors
-from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
-from kedfem.dynamics.interface import RowState, Tie
-from kedfem.dynamics.joint_rows import JointRows
-from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal
-from kedfem.dynamics.tied import Begun, stepwise_tied
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
@@ -163,78 +157,6 @@ def solved(
 
 def _beside(answer: Answer, rows: Sequence[Nodal], more: Sequence[Nodal]) -> State:
     return answer([x + y for x, y in zip(rows, more, strict=True)])
-
-
-class ActedSteps:
-    """Steps of links with nominal frames under motors, springs and dampers."""
-
-    def __init__(self, inner: CondensedSteps | LiteralSteps, every: Sequence[Action]) -> None:
-        self.inner, self.links, self.stiffening = inner, inner.links, None
-        self.forces = Forces(every, inner.links, inner.scheme.h)
-        self._now: Found | None = None
-        self._slope: Float[np.ndarray, "A A"] | None = None
-        self._largest = np.zeros(len(every))
-
-    @property
-    def factorisations(self) -> int:
-        """Matrices factored so far."""
-        return self.inner.factorisations
-
-    def begin(self, states: Sequence[LinkState], rows: RowState | None = None) -> Begun:
-        """The state of the first time point."""
-        return self.inner.begin(states, rows)
-
-    def advance(
-        self, state: Begun, forcing: Sequence[Forcing], motion: RigidMotion, rows: JointRows | None = None
-    ) -> tuple[list[LinkHistory], Begun]:
-        """All time points of a block; see `DenseSteps.advance`.
-
-        Raises
-        ------
-        SolveError
-            If the sweeps of a step do not settle.
-        """
-        x, v = self.forces.nominal(motion)
-        laws = (self.forces.law(float(t), *each) for t, *each in zip(motion.t, x, v, strict=True))
-
-        def step(states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None = None) -> Taken:
-            return self._step(partial(self._taken, states, at, tie), states, next(laws))
-
-        if rows is not None:
-            return stepwise_tied(step, state, forcing, rows, self.inner.scheme)
-        links, last = stepwise(lambda states, at: step(states, at)[0], state.links, forcing)
-        return links, Begun(last)
-
-    def _taken(
-        self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None, rows: Sequence[Nodal]
-    ) -> Taken:
-        """What a step comes to under more forces on the rows."""
-        now = loaded(at, rows)
-        if tie is None:
-            return self.inner.step(states, now), np.zeros(0), np.zeros(0)
-        return self.inner.tied_step(states, now, tie)
-
-    def _step(
-        self, taken: Callable[[Sequence[Nodal]], Taken], states: Sequence[LinkState], law: Law
-    ) -> Taken:
-        """States of all links one step later."""
-        last: list[Taken] = []
-
-        def answer(rows: Sequence[Nodal]) -> State:
-            last[:] = [taken(rows)]
-            return [s.u for s in last[0][0]], [s.v for s in last[0][0]]
-
-        begin = self._now or law([s.u for s in states], [s.v for s in states])
-        found = solved(self.forces, law, answer, begin, self._slope, SETTLED * self._largest)
-        if found is None:
-            raise SolveError(
-                "springs, motors: the sweeps of a step must settle, got none that do: take a smaller step, or "
-                'analysis.frames = "following"'
-            )
-        self._now, _, self._slope = found
-        self._largest = np.maximum(self._largest, np.abs(self._now.Q))
-        self.forces.turned = self._now.q
-        return last[0]
 
 
 def loaded(at: Sequence[Nominal], rows: Sequence[Nodal]) -> list[Nominal]:

@@ -22,17 +22,20 @@ from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import port_weights, rigid_seat
-from kedfem.links.stations import stations
+from kedfem.links.stations import Stations, stations
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import LineSpring, Motor, Scene, Spring
 
 
 @dataclass(frozen=True, slots=True)
 class Ways:
-    """How far joints go: numbers of bodies in the linkage by name, and the way of each slot's pin along its line [m]."""
+    """How far joints go: numbers of bodies in the linkage by name, and the way of each slot's pin along its line [m].
+
+    Where its stations are known already, these in its place.
+    """
 
     bodies: Mapping[str, int]
-    slots: Mapping[str, tuple[float, float]]
+    slots: Mapping[str, tuple[float, float] | Stations]
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +189,9 @@ def _side(
     if slot:
         key, link = next((key, link) for key, link in links.items() if link.name == on)
         joint = scene.joints[name]
-        line = stations(link, where, np.asarray(joint.at), joint_axis(joint), ways.slots[name])
+        line = ways.slots[name]
+        if not isinstance(line, Stations):
+            line = stations(link, where, np.asarray(joint.at), joint_axis(joint), line)
         points, known = station_ports(line, link)
         side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line, points=points)
         weights = line.weights

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.acted import ActedSteps, Forces, loaded, still_forces
+from kedfem.dynamics.acted import Forces, loaded, still_forces
 from kedfem.dynamics.acting import first_forces
 from kedfem.dynamics.actions import actions, followers
 from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
@@ -50,9 +50,7 @@ LARGE = (
 )
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-ByLink = (
-    CondensedSteps | LiteralSteps | DenseSteps | ActedSteps | SystemSteps | FollowingSteps | FollowingDense
-)
+ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps | FollowingSteps | FollowingDense
 Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
 UNSETTLED = (
@@ -72,19 +70,16 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if following(scene):
         return _follower(scene, model, scheme)
-    every = actions(scene, model)
+    literal = scene.analysis.solver == "literal"
     stresses = stiffening(model) if scene.analysis.stiffening else None
     damped = any(row.damping.any() for row in model.rows)  # which only the system's starts know
-    if (every or damped) and stresses is None and scene.analysis.solver != "literal":
-        system = nominal_system(scene, model)
-        if system is not None:
-            return SystemSteps(scene, system, model, scheme)
-    small = all(map(_is_small, model.links)) and not every
+    if (scene.springs or scene.motors or damped) and stresses is None:
+        return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
+    small = all(map(_is_small, model.links))
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
-    if scene.analysis.solver == "literal":
+    if literal:
         solver = LiteralSteps
-    made = solver(model.links, model.joints, scheme, model.damping, stresses)
-    return made if isinstance(made, DenseSteps) or not every else ActedSteps(made, every)
+    return solver(model.links, model.joints, scheme, model.damping, stresses)
 
 
 def _follower(scene: Scene, model: Model, scheme: Scheme) -> Steps:
@@ -172,8 +167,6 @@ def transient(
                 forcing = forcings(model, part)
                 if isinstance(solver, SystemSteps):
                     links, state = solver.advance(state, forcing, part)
-                elif isinstance(solver, ActedSteps):
-                    links, state = solver.advance(state, forcing, part, joint_rows(model.rows, part))
                 else:
                     links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")

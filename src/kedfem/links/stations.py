@@ -34,9 +34,14 @@ class Stations:
     points: Float[np.ndarray, "k 3"]
     weights: Float[np.ndarray, "k n"]
 
-    def at(self, s: Float[np.ndarray, " T"]) -> Float[np.ndarray, "T k"]:
-        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline."""
-        return np.asarray(CubicSpline(self.s, np.eye(len(self.s)))(s))
+    def at(self, s: Float[np.ndarray, " T"], rate: int = 0) -> Float[np.ndarray, "T k"]:
+        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline.
+
+        Parameters
+        ----------
+        rate : their derivative by s of that order
+        """
+        return np.asarray(CubicSpline(self.s, np.eye(len(self.s)))(s, rate))
 
 
 def stations(

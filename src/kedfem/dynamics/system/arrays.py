@@ -110,7 +110,11 @@ class Bodies(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """All ends as flat arrays; see `End`."""
+    """All ends as flat arrays; see `End`.
+
+    line, line_at, full_at, full : ends on lines of slots, where their stations' weights begin, and what these stations
+        have of z: a step makes `onto` of them
+    """
 
     body: Any
     form: Any
@@ -123,6 +127,10 @@ class Ends(NamedTuple):
     columns: Any
     onto_at: Any
     onto: Any
+    line: Any
+    line_at: Any
+    full_at: Any
+    full: Any
 
 
 class Constraints(NamedTuple):
@@ -229,6 +237,7 @@ class Driving(NamedTuple):
     t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
     drives : (T, D)
     F : (T, N) P − M R0'' on the coordinates, world components
+    stations : (T, n) weights of the stations of all lines, where their pins are
     """
 
     t: Any
@@ -238,6 +247,7 @@ class Driving(NamedTuple):
     omega: Any
     drives: Any
     F: Any
+    stations: Any
 
 
 class Trial(NamedTuple):

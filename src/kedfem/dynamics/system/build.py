@@ -99,8 +99,11 @@ class _Builder:
             self.add(joint.name, terms, Held(), joint, first)
         elif kind in {"springs", "motors"}:
             self.element(joint, getattr(scene, kind)[name])
-        elif scene.joints[joint.name].kind == "slot":
-            raise SceneError(f"joints.{joint.name}.kind: must be another than slot here, got it")
+        elif scene.joints[joint.name].kind == "slot" and set(joint.bodies) & self.own:
+            raise SceneError(
+                f"joints.{joint.name}.kind: must be another than slot with co-rotational frames, got a slot, whose pin "
+                "slides as the nominal motion tells"
+            )
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)
@@ -238,7 +241,7 @@ class _Builder:
     def end(self, joint: RowJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
-        end = rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found)
+        end = rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found, joint)
         return self._numbered(end)
 
     def _numbered(self, end: End) -> int:

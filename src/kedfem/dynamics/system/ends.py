@@ -3,8 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.row_joints import Side
-from kedfem.dynamics.system.record import FACE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End
+from kedfem.dynamics.joint_rows import seen_from
+from kedfem.dynamics.row_joints import RowJoint, Side
+from kedfem.dynamics.system.record import FACE, LINE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End, Line
+from kedfem.motion.rigid import RigidMotion
 
 NOTHING = 1e-12  # entries of a selection that are rounding
 Vector = Float[np.ndarray, "3"]
@@ -29,10 +31,14 @@ def rigid_end(body: int, at: Vector, k: int) -> End:
     return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
 
 
-def end_of(side: Side) -> End:
-    """An end on a body, or on a slider that rides on one."""
+def end_of(side: Side, joint: RowJoint) -> End:
+    """An end on a body, on a slider that rides on one, or on a line along which the joint's pin slides."""
     onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
     p, d, _ = onto.shape
+    if side.stations is not None:
+        line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
+        onto = onto * np.atleast_1d(side.seat[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
+        return End(side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, onto, line)
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
     if known:
@@ -44,6 +50,14 @@ def end_of(side: Side) -> End:
         elif known == 2:
             directions[2] = np.cross(directions[0], directions[1])
     return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, onto)
+
+
+def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
+    """Weights of the stations of a line where its pin is, in the nominal motion."""
+    line = end.line
+    if line is None:
+        raise ValueError("an end must be on a line to have stations, got one that is not")
+    return line.stations.at(seen_from(motion, (line.pin, end.body), line.at) @ line.axis)
 
 
 def _form(side: Side, d: int, known: int) -> int:

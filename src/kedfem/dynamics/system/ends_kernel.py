@@ -84,6 +84,20 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
 
 
 @inner
+def on_lines(ends, weights):  # type: ignore[no-untyped-def]
+    """`onto` of ends on lines becomes what is at their pins, from the weights (n,) of all stations."""
+    for n in range(len(ends.line)):
+        at = ends.onto_at[ends.line[n]]
+        size = ends.onto_at[ends.line[n] + 1] - at
+        for m in range(size):
+            ends.onto[at + m] = 0.0
+        for p in range(ends.line_at[n], ends.line_at[n + 1]):
+            of = ends.full_at[n] + (p - ends.line_at[n]) * size
+            for m in range(size):
+                ends.onto[at + m] += weights[p] * ends.full[of + m]
+
+
+@inner
 def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
     """y becomes the displacements of an end's interface points, one after the other."""
     first, last = ends.column_at[e], ends.column_at[e + 1]

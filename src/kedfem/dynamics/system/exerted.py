@@ -104,7 +104,7 @@ def _on_ports(forces: Supports, joints: Sequence[RowJoint]) -> Float[np.ndarray,
     for joint in joints:
         for side in (*joint.sides, *(side for _, other in joint.plus for side in other.sides)):
             if side is not None and side.shared:
-                out.append(forces.on_end(joint.name, end_of(side)).reshape(len(forces.z), -1))
+                out.append(forces.on_end(joint.name, end_of(side, joint)).reshape(len(forces.z), -1))
     return np.concatenate(out, axis=1)
 
 
@@ -122,12 +122,12 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
                 continue
             if side.shared:
                 k, W = _placed(model.joints, model.bodies, row.name, side)
-                y = forces.on_end(row.name, end_of(side))
+                y = forces.on_end(row.name, end_of(side, row))
                 f = np.einsum("pn,tpd->tnd", W, y)
                 nodes = model.joints[k].nodes
             else:
                 k, weights = riders[side.body]
-                f = np.einsum("n,td->tnd", weights, _on_rider(forces, row.name, end_of(side)))
+                f = np.einsum("n,td->tnd", weights, _on_rider(forces, row.name, end_of(side, row)))
                 nodes = np.arange(len(weights))
             link = model.links[k]
             total = out.setdefault(k, np.zeros((len(forces.z), link.n, link.d)))

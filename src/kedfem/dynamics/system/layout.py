@@ -22,7 +22,9 @@ from kedfem.dynamics.system.record import (
     CURVE,
     DRIVEN,
     HELD,
+    LINE,
     NOMINAL,
+    POINT,
     SPRING,
     STOP,
     TANGENTIAL,
@@ -185,14 +187,20 @@ def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
 def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
     """All ends as flat arrays on the renumbered interface unknowns."""
     columns = [np.flatnonzero(end.onto.any(axis=(0, 1))) for end in ends]
-    onto = [end.onto[:, :, c] for end, c in zip(ends, columns, strict=True)]
+    every = [end.onto[:, :, c] for end, c in zip(ends, columns, strict=True)]
+    lines = [n for n, end in enumerate(ends) if end.form == LINE]
+    full = [every[n] for n in lines]
+    onto = [x[:1] if n in lines else x for n, x in enumerate(every)]
+    forms = [POINT if end.form == LINE else end.form for end in ends]
     return Ends(
-        body=np.array([end.body for end in ends], int), form=np.array([end.form for end in ends], int),
+        body=np.array([end.body for end in ends], int), form=np.array(forms, int),
         origin=_rows([end.origin for end in ends]),
         directions=np.array([end.directions for end in ends]).reshape(-1, 3, 3),
         lengths=_rows([end.lengths for end in ends]), known=np.array([end.known for end in ends], int),
         components=np.array([end.onto.shape[1] for end in ends], int), column_at=_ends([len(c) for c in columns]),
         columns=_flat([number[c] for c in columns], int), onto_at=_ends([x.size for x in onto]), onto=_flat(onto),
+        line=np.array(lines, int), line_at=_ends([len(x) for x in full]), full_at=_ends([x.size for x in full]),
+        full=_flat(full),
     )  # fmt: skip
 
 

@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import CubicSpline
 
 from kedfem.dynamics.system.record import (
     ANGLE,
     DISTANCE,
     FACE,
+    LINE,
     PLANAR,
     PLANAR_BEAM,
     POINT,
@@ -61,19 +63,25 @@ class Pose:
 def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     """Where an end is: of a surface the rotation nearest to its directions, by singular values."""
     _, d, k = end.onto.shape
+    pin = R[end.line.pin] if end.line is not None else None
     R, x = R[end.body], p[end.body] + R[end.body] @ end.origin
     by_x, by_Q = np.zeros((3, k)), np.zeros((3, k))
     if end.form == RIGID:
         return Pose(x, R, by_x, by_Q)
-    u = end.onto @ z
+    onto = end.onto
+    if end.line is not None:  # the pin's place in the frame of the line
+        away = p[end.line.pin] + pin @ end.line.at - p[end.body]
+        s = float((away @ R - end.line.at) @ end.line.axis)
+        onto = np.einsum("p,pdk->dk", CubicSpline(end.line.stations.s, np.eye(len(onto)))(s), onto)[None]
+    u = onto @ z
     flat = 2 if end.form == PLANAR_BEAM else d
     x[:flat] += u[0, :flat]
-    by_x[:flat] = end.onto[0, :flat]
+    by_x[:flat] = onto[0, :flat]
     if end.form == PLANAR_BEAM:
         c, s = np.cos(u[0, 2]), np.sin(u[0, 2])
         by_Q[2] = end.onto[0, 2]
         return Pose(x, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R, by_x, by_Q)
-    if end.form == POINT:
+    if end.form in (POINT, LINE):
         return Pose(x, R, by_x, by_Q)
     D, by = np.zeros((3, 3)), np.zeros((3, 3, k))  # direction, component
     for n in range(end.known):

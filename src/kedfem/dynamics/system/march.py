@@ -20,6 +20,7 @@ from kedfem.dynamics.system.arrays import (
     copied,
 )
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
+from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
@@ -87,7 +88,11 @@ def driving(of: Ready, motion: RigidMotion) -> Driving:
     ]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     drives = np.ascontiguousarray(drives)
-    return Driving(motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1))
+    stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
+    weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
+    return Driving(
+        motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), weights
+    )
 
 
 def march(

@@ -19,6 +19,7 @@ from kedfem.dynamics.system.record import (
     DISTANCE,
     FACE,
     GAP,
+    LINE,
     PLANAR,
     PLANAR_BEAM,
     POINT,
@@ -26,6 +27,7 @@ from kedfem.dynamics.system.record import (
     TURN,
     Constraint,
     End,
+    Line,
     System,
     Term,
 )
@@ -143,15 +145,26 @@ def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
     if end.form == RIGID:
         return x, R
     u = np.einsum("pdk,tk->tpd", end.onto, z)
+    if end.line is not None:
+        u = _at_pin(end, end.line, at, u)
     flat = 2 if end.form == PLANAR_BEAM else end.onto.shape[1]
     x = x + 0 * u[0, 0, 0]
     x[:, :flat] += u[:, 0, :flat]
-    if end.form == POINT:
+    if end.form in (POINT, LINE):
         return x, R
     if end.form == PLANAR_BEAM:
         return x, product(np.matmul, _about_z(u[:, 0, 2]), R)
     A = np.einsum("tka,kb->tab", _directions(end, R, u), end.directions)
     return x, _rotation(A)
+
+
+def _at_pin(end: End, line: Line, at: Places, u: Series) -> Series:
+    """Displacement (3, 1, d) where a pin is on a line, from those of its stations; nominal motion tells where that is."""
+    apart = at.p[:, line.pin] + at.R[:, line.pin] @ line.at - at.p[:, end.body]
+    s = product(np.dot, apart, at.R[:, end.body] @ line.axis)
+    N, first, second = (line.stations.at(s[:1] - line.at @ line.axis, k)[0] for k in range(3))
+    weights = np.stack([N, first * s[1], second * s[1] ** 2 + first * s[2]])
+    return product(np.dot, weights, u)[:, None]
 
 
 def _about_z(psi: Series) -> Series:

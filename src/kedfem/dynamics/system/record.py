@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.links.stations import Stations
+
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
 TIME, RATE, COORDINATE = range(3)
 GAP, TURN, ANGLE, DISTANCE = range(4)
-RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID = range(6)
+RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, COROTATIONAL, TANGENTIAL = range(3)
 
 Vector = Float[np.ndarray, "3"]
@@ -66,12 +68,26 @@ Law = Held | Driven | Spring | Curve | Stop
 
 
 @dataclass(frozen=True, slots=True)
+class Line:
+    """The line of a slot on a body: its stations, its direction as drawn, and the body whose pin slides along it.
+
+    at : (3,) the pin as drawn [m]
+    """
+
+    stations: Stations
+    axis: Vector
+    pin: int
+    at: Vector
+
+
+@dataclass(frozen=True, slots=True)
 class End:
     """What a constraint or force law has on one body: a point, and the orientation of the surface there.
 
     body : number in the linkage
     form : RIGID: moves with the nominal motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
-        PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are known
+        PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are
+        known; LINE: the place of a pin among the stations of a line, in the nominal motion
     origin : (3,) its point as drawn [m]
     directions : (3, 3) rows e_k as drawn, of which the first `known` are followed by interface points
     lengths : (3,) how far off the origin these points are [m]
@@ -85,6 +101,7 @@ class End:
     lengths: Vector
     known: int
     onto: Float[np.ndarray, "p d k"]
+    line: Line | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from kedfem.dynamics.system.bodies_kernel import (
     right_hand_side,
 )
 from kedfem.dynamics.system.constraints_kernel import coordinate
-from kedfem.dynamics.system.ends_kernel import placed
+from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,
     gathered,
@@ -103,6 +103,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
                 orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
     gathered(bodies, trial)
     if of.linear.any():
+        on_lines(ends, driving.stations[t])
         trial.part[:] = 0.0
         placed(ends, R, driving.p[t], trial.part, trial.fixed, work.end, work.vectors)
 

@@ -21,11 +21,13 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.deflected import quasi_static
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.instant import Motion
+from kedfem.dynamics.system.literal import Now
+from kedfem.dynamics.system.literal_steps import literal_march, oracle
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
-from kedfem.errors import MeshError
+from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
@@ -33,23 +35,33 @@ from kedfem.scene import Scene
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def nominal_system(scene: Scene, model: Model) -> System | None:
+def nominal_system(scene: Scene, model: Model) -> System:
     """The system of a scene whose links have nominal frames.
 
-    None with slots, which it does not know yet, and where a force element's seat does not tell how it turns as a whole.
+    Raises
+    ------
+    MeshError
+        If a force element finds no seat on its link that tells how it turns.
     """
-    kinds = {joint.kind for joint in scene.joints.values()}
-    names = [link.name for link in model.links]
-    if "slot" in kinds or len(set(names)) < len(names):
-        return None
-    rigid = linkage(scene)
-    ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, {})
-    try:
-        held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
-    except MeshError:
-        return None
+    names, rigid = [link.name for link in model.links], linkage(scene)
+    ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
+    held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
     here = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
     return system_of(scene, rigid, model=here)
+
+
+def _lines(model: Model) -> dict[str, Stations]:
+    """Stations of all slots on the links that carry them."""
+    out = {}
+    for row in model.rows:
+        side = row.sides[1]
+        if side is not None and side.stations is not None:
+            k = model.bodies.index(side.body)
+            weights = np.zeros((len(side.points), model.links[k].n))
+            own = [name == row.name for name in model.joints[k].joints]
+            weights[:, model.joints[k].nodes] = model.joints[k].weights[own]
+            out[row.name] = replace(side.stations, weights=weights)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +87,22 @@ class SystemSteps:
     Parameters
     ----------
     model : of the links whose states are handed on, without interface points for force elements
+    literal : whether the oracle takes the steps
+
+    Raises
+    ------
+    SolveError
+        If links are too large for the oracle.
     """
 
     stiffening = None
 
-    def __init__(self, scene: Scene, system: System, model: Model, scheme: Scheme) -> None:
+    def __init__(
+        self, scene: Scene, system: System, model: Model, scheme: Scheme, literal: bool = False
+    ) -> None:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme)
+        self.oracle = oracle(self.ready) if literal else None
         self.factorisations = len(self.ready.parts)
         every = list(zip(model.links, model.joints, system.model.joints, strict=True))
         bodies = linkage(scene).bodies
@@ -127,8 +148,8 @@ class SystemSteps:
         return out
 
     def advance(
-        self, state: State, forcing: Sequence[Forcing], motion: RigidMotion
-    ) -> tuple[list[LinkHistory], State]:
+        self, state: State | Now, forcing: Sequence[Forcing], motion: RigidMotion
+    ) -> tuple[list[LinkHistory], State | Now]:
         """All time points of a block; see `DenseSteps.advance`.
 
         Raises
@@ -136,6 +157,11 @@ class SystemSteps:
         SolveError
             If the iterations of a step do not converge.
         """
+        if self.oracle is not None:
+            later, found = literal_march(self.ready, self.oracle, state, motion)
+            return self._histories(found, forcing, motion), later
+        if not isinstance(state, State):
+            raise ValueError("a march must begin with a state of the system, got one of the oracle")
         state, found = march(self.ready, state, motion)
         return self._histories(found, forcing, motion), state
 
@@ -188,7 +214,7 @@ def _bearing(
     for c in range(bears):
         columns[:, c, :, c] = weights.T
     to_ports = inverse[k] @ columns.reshape(link.n * link.d, -1)
-    return Bearing(row.name, k, end_of(on), nodes, weights[:, nodes], bears, to_ports)
+    return Bearing(row.name, k, end_of(on, row), nodes, weights[:, nodes], bears, to_ports)
 
 
 def _turned_back(joint: Attachment, force: Float[np.ndarray, "T q"], R: Rows) -> Float[np.ndarray, "T q"]:

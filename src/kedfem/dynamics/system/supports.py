@@ -12,7 +12,7 @@ from jaxtyping import Float
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Carried
 from kedfem.dynamics.system.arrays import History
-from kedfem.dynamics.system.ends import corners, end_of, same_end
+from kedfem.dynamics.system.ends import corners, end_of, line_weights, same_end
 from kedfem.dynamics.system.instant import renumbered
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import (
@@ -20,6 +20,7 @@ from kedfem.dynamics.system.record import (
     DISTANCE,
     FACE,
     GAP,
+    LINE,
     PLANAR,
     PLANAR_BEAM,
     POINT,
@@ -119,11 +120,11 @@ class Supports:
         """What all constraints and laws exert on interface points of their own, side by side as `coupling` has them."""
         out = []
         for row in self.of.system.model.rows:
-            sides = [*row.sides, *(side for _, other in row.plus for side in other.sides)]
-            for side in sides:
-                if side is not None and side.shared:
-                    ends = corners(side) if row.name.startswith("rigid.") else [end_of(side)]
-                    out += [self.on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
+            for joint in (row, *(other for _, other in row.plus)):
+                for side in joint.sides:
+                    if side is not None and side.shared:
+                        ends = corners(side) if row.name.startswith("rigid.") else [end_of(side, joint)]
+                        out += [self.on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
         return np.concatenate(out, axis=1)
 
     def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
@@ -222,9 +223,11 @@ def poses(
         return x, R
     d = end.onto.shape[1]
     u = np.einsum("pdk,tk->tpd", end.onto, z)
+    if end.line is not None:
+        u = np.einsum("tp,tpd->td", line_weights(end, motion), u)[:, None]
     flat = 2 if end.form == PLANAR_BEAM else d
     x[:, :flat] += u[:, 0, :flat]
-    if end.form == POINT:
+    if end.form in (POINT, LINE):
         return x, R
     if end.form == PLANAR_BEAM:
         c, s, Q = np.cos(u[:, 0, 2]), np.sin(u[:, 0, 2]), np.zeros_like(R)
@@ -267,6 +270,8 @@ def point_forces(
     y = np.zeros((len(z), p, d))
     flat = 2 if end.form == PLANAR_BEAM else d
     y[:, 0, :flat] = force[:, :flat]
+    if end.line is not None:
+        return np.asarray(np.einsum("tp,td->tpd", line_weights(end, motion), y[:, 0]))
     if end.form == PLANAR_BEAM:
         y[:, 0, 2] = moment[:, 2]
     if end.form in (POINT, PLANAR_BEAM):
