@@ -1,19 +1,24 @@
-"""What an accuracy chooses by trial runs: frames, elements of beams, the step, meshes of solid and plane links."""
+"""What an accuracy chooses by trial runs: frames, elements of beams, the step."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kedfem.accuracy.estimates import Strained, link_errors, mesh_errors
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepEstimate, cheapest, single_level
-from kedfem.accuracy.trials import TRIAL_STEPS, Trials, shortened
-from kedfem.accuracy.variants import refinable, refined, with_analysis, with_links, with_steps
+from kedfem.accuracy.trials import Trials
+from kedfem.accuracy.variants import (
+    TRIAL_STEPS,
+    shortened,
+    with_analysis,
+    with_links,
+    with_steps,
+)
 from kedfem.dynamics.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, time_grid, turn_steps
+from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps
 
 FOLLOWED = (
     0.5  # of the accuracy: nominal frames that err by more give way to frames that follow, in scenes of beams
@@ -39,10 +44,8 @@ LEAST = 12  # steps of the coarsest level of a trial
 MOST_STEPS = 200_000  # of the analysis
 TRIES = 5  # steps tried
 SHORTER, PATIENCE = 2.0, 2  # by which steps are made shorter that do not resolve what vibrates, and how often
+LEAP = 4  # times the steps of a trial, the next one has at most: what a coarse one foretells is not believed further
 CLOSE = 0.15  # of the steps: as many more are not worth another trial
-MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
-FACTOR = 2.0  # by which elements are made smaller at most in one go
-UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 
 
 def open_frames(scene: Scene) -> bool:
@@ -63,17 +66,8 @@ def open_beams(scene: Scene) -> list[str]:
     return [
         name
         for name, link in scene.links.items()
-        if _elastic(link, "beam") and "mesh" not in link.model_fields_set
+        if elastic(link, "beam") and "mesh" not in link.model_fields_set
     ]
-
-
-def open_meshes(scene: Scene) -> list[str]:
-    """Names of the elastic solid and plane links whose mesh it leaves open."""
-    return [
-        name for name, link in scene.links.items()
-        if (_elastic(link, "solid") or _elastic(link, "plane")) and "mesh" not in link.model_fields_set
-        and not isinstance(link.shape, MeshFile)
-    ]  # fmt: skip
 
 
 def beams_only(scene: Scene) -> bool:
@@ -83,7 +77,8 @@ def beams_only(scene: Scene) -> bool:
     )
 
 
-def _elastic(link: LinkScene, family: str) -> bool:
+def elastic(link: LinkScene, family: str) -> bool:
+    """Whether a link is elastic and of a family, stated so."""
     return link.shape is not None and link.fidelity not in {"rigid", "auto"} and link.family == family
 
 
@@ -191,7 +186,9 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
             wanted, patience = max(wanted, math.ceil(SHORTER * steps)), patience - 1
         elif wanted <= steps * (1 + CLOSE) and choice.h <= SHORTER * found.h:
             break
-        if COARSER * wanted * whole / span > MOST_STEPS or COARSER * wanted > TRIAL_STEPS or wanted == steps:
+        most = int(min(TRIAL_STEPS, MOST_STEPS * span / whole)) // COARSER
+        wanted = min(wanted, LEAP * steps, max(most, steps))
+        if wanted == steps:
             break
         steps = wanted
     left = {name: min(1.0, found.differences[name][0]) for name in slow}
@@ -250,37 +247,3 @@ def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:
         f"the error of the time step stays at {error:.2g} with {steps} steps in {names}: the motion excites vibration "
         "beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping would help"
     )
-
-
-def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[str]) -> tuple[Scene, float]:
-    """The scene with finer meshes of its open solid and plane links where their indicator asks for it, and the error.
-
-    One trial run on the usual meshes: elements are made smaller by what its error is beyond the allowed one.
-    """
-    names = [name for name in open_meshes(scene) if name not in auto and refinable(scene.links[name])]
-    if not names:
-        return scene, 0.0
-    ready = search.ready(shortened(scene))
-    strained = Strained(ready.model)
-    base = histories(ready, look=strained.add)
-    found = strained.indicators
-    eta = link_errors(ready.model, found)
-    error = worst(mesh_errors(ready, base, {name: eta[name] for name in names if name in eta}))
-    if error <= allowed:
-        return scene, error
-    factor = min((error / allowed) ** (1 / MESH_ORDER), FACTOR)
-    worst_links = [name for name in names if eta.get(name, 0.0) >= 0.3 * max(eta.values())]
-    unknowns = sum((link.full or link).unknowns for link in ready.model.links)
-    if unknowns * factor**3 > UNKNOWNS:
-        search.notes.append(
-            f"finer meshes would be needed, and have too many unknowns: their error is about {error:.2g}"
-        )
-        return scene, error
-    finer = with_links(scene, {name: refined(scene.links[name], factor) for name in worst_links})
-    return finer, error / factor**MESH_ORDER
-
-
-def distinct(meshes: list[tuple[float, Scene]]) -> list[tuple[float, Scene]]:
-    """Without those that are like the one before: few elements become more by whole numbers only."""
-    pairs = zip(meshes, [None, *meshes], strict=False)
-    return [now for now, before in pairs if before is None or now[1].links != before[1].links]

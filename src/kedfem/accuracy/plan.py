@@ -19,14 +19,12 @@ from kedfem.accuracy.choices import (
     beams_only,
     chosen_beams,
     chosen_frames,
-    chosen_meshes,
     chosen_step,
-    distinct,
     open_beams,
     open_frames,
-    open_meshes,
     open_step,
 )
+from kedfem.accuracy.meshes import chosen_meshes, distinct, open_functions, open_meshes, with_functions
 from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
@@ -43,6 +41,7 @@ from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
+VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose fidelity is open
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
@@ -128,6 +127,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
 def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     search = Trials(asked, stage)
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
+    functions = open_functions(scene)
     scene = _opened(scene, left_open)
     shares: list[Share] = []
     stage("plan: frames")
@@ -148,21 +148,24 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     cut = SEGMENTS if open_segments(scene) else 0.0  # of the mesh's share
     loose = max(asked, step / STEP)
     scene, mesh, finer = _with_mesh(search, scene, left_open, (MESH - cut) * loose)
-    scene, meshes = chosen_meshes(search, scene, MESH * loose, left_open)
+    scene, meshes = chosen_meshes(search, scene, MESH * (asked if step < VAIN else loose), left_open)
     segments = 0.0
     if cut:
         stage("plan: segments")
         scene, segments = with_segments(search, scene, SEGMENTS * loose)
     stage("plan: simpler links")
     scene, model = _with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
-    scene = with_analysis(scene, reduction=REDUCTION * asked, accuracy="quick")
+    scene = with_functions(search, scene, functions)
+    if "reduction" not in scene.analysis.model_fields_set:
+        scene = with_analysis(scene, reduction=REDUCTION * asked)
+    scene = with_analysis(scene, accuracy="quick")
     reduced = any(link.reduced for link in scene.links.values())
     mesh += beams + meshes
     shares += [
         Share("time step", step, STEP * asked), Share("mesh", mesh, (MESH - cut) * asked),
         *([Share("segments", segments, SEGMENTS * asked)] if cut else []),
         Share("simpler links", model, max(MODEL, MESH - cut + MODEL - mesh / asked) * asked),
-        Share("reduction", REDUCTION * asked if reduced else 0.0, REDUCTION * asked),
+        Share("reduction", scene.analysis.reduction if reduced else 0.0, REDUCTION * asked),
     ]  # fmt: skip
     plan = Plan(scene, asked, finer, tuple(shares), ())
     return replace(plan, notes=(*search.notes, *_limits(plan)))
@@ -201,8 +204,6 @@ def _with_mesh(
 ) -> tuple[Scene, float, float]:
     """The scene with the coarsest mesh of links whose fidelity is open whose error is allowed, that error, and by what
     it is finer.
-
-    Where the step's error is beyond its share the mesh need not be better.
     """
     open_links = [
         name

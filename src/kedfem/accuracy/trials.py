@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.accuracy.reduction import first_reduced
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.accuracy.variants import with_analysis
+from kedfem.accuracy.variants import shortened
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.transient import drive_range
 from kedfem.links.build import bare_link
@@ -19,11 +19,9 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.results.recording import recording
-from kedfem.scene import Ramp, Scene, spatial_beams, time_grid, turn_steps
+from kedfem.scene import Scene, spatial_beams
 
 TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
-TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
-TURNS = 2  # of a trial run
 
 Stage = Callable[[str], None]
 
@@ -104,19 +102,6 @@ class Trials:
             if link.Q is not None and not link.rigid:
                 self.functions[text] = link.Q
         return ready
-
-
-def shortened(scene: Scene) -> Scene:
-    """The beginning of an analysis that is too long for trials: TURNS of a drive that turns, after it has sped up."""
-    grid, turn = time_grid(scene), turn_steps(scene)
-    span = grid.end
-    if turn is not None:
-        rises = scene.motion.time if isinstance(scene.motion, Ramp) else 0.0
-        span = min(span, rises + TURNS * turn * grid.step)
-    span = min(span, TRIAL_STEPS * grid.step)
-    if span >= grid.end * (1 - 1e-9):
-        return scene
-    return with_analysis(scene, end_time=span, turns=None, step=grid.step, steps_per_turn=None)
 
 
 def _texts(full: Prepared) -> list[str]:
