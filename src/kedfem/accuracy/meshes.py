@@ -26,12 +26,16 @@ def open_meshes(scene: Scene) -> list[str]:
 
 
 def open_functions(scene: Scene) -> list[str]:
-    """Names of the elastic solid and plane links that do not say whether they are reduced, where the step is open too."""
+    """Names of the elastic solid and plane links that do not say whether they are reduced, where a step or a mesh is open
+    too: what is chosen for these makes steps in full dear."""
+    if not open_step(scene) and not open_meshes(scene):
+        return []
     return [
-        name for name, link in scene.links.items()
-        if open_step(scene) and (elastic(link, "solid") or elastic(link, "plane"))
+        name
+        for name, link in scene.links.items()
+        if (elastic(link, "solid") or elastic(link, "plane"))
         and not link.model_fields_set & {"reduced", "functions"}
-    ]  # fmt: skip
+    ]
 
 
 def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[str]) -> tuple[Scene, float]:
