@@ -25,6 +25,10 @@ app = typer.Typer(
 )
 out, err = terminal(), terminal(stderr=True)
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
+Quick = Annotated[
+    bool,
+    typer.Option("--quick", help="Plain defaults for what the scene leaves open."),
+]
 
 
 @app.callback(invoke_without_command=True)
@@ -43,12 +47,7 @@ def _root(
 @app.command()
 def run(
     scene: ScenePath,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick", help="Plain defaults for what the scene leaves open; says how exact they are."
-        ),
-    ] = False,
+    quick: Quick = False,
 ) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
@@ -78,7 +77,7 @@ def run(
 
 
 @app.command()
-def check(scene: ScenePath) -> None:
+def check(scene: ScenePath, quick: Quick = False) -> None:
     """Show what would be modelled and its cost; solve nothing."""
     from kedfem.accuracy.plan import plan_for
     from kedfem.accuracy.reduction import prepared
@@ -87,7 +86,7 @@ def check(scene: ScenePath) -> None:
     from kedfem.report import assembly_tables, check_tables, size_line
     from kedfem.scene import read_scene
 
-    loaded, assembly = assembled(read_scene(scene))
+    loaded, assembly = assembled(_quick(read_scene(scene)) if quick else read_scene(scene))
     with _progress() as watch:
 
         def stage(name: str) -> None:
