@@ -1,8 +1,7 @@
-"""Motors, springs and dampers on links with nominal frames: their forces where the links are, deflection and all.
+"""Motors, springs and loads that turn with links, on quasi-static starts of co-rotational frames beside the system's.
 
-Their laws are those of frames that follow, Q(t, q, q') of a coordinate q of nominal positions + δ; only K keeps to the
-nominal motion. As δ is linear in the few numbers Q, a step finds them by Newton's method: Q = law(δ(Q)), its slope from
-the links' answers to unit forces, kept from step to step and mended by Broyden's formula (Broyden, 1965).
+As δ is linear in the few forces Q, Newton's method finds them: Q = law(δ(Q)), its slope from the links' answers to unit
+forces, kept from instant to instant and mended by Broyden's formula (Broyden, 1965).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.action import TURN, Action, elastic_vectors, kernel_table, nominal_vectors
-from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal
+from kedfem.dynamics.state import Nodal, NodalOf, Nominal
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
@@ -29,8 +28,6 @@ Each = Float[np.ndarray, " A"]
 Law = Callable[[Sequence[NodalOf], Sequence[NodalOf]], "Found"]
 State = tuple[Sequence[NodalOf], Sequence[NodalOf]]
 Answer = Callable[[Sequence[Nodal]], State]
-Taken = tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]
-"""A step: the states of all links, interface unknowns and forces of the rows of joints, if there are any."""
 Deflection = Callable[[int, Sequence[Nodal]], list[NodalOf]]
 
 

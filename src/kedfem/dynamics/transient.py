@@ -347,7 +347,10 @@ def first_states(
     scene: Scene, linkage: Linkage, along: Path, model: Model,
     stresses: Stiffening | None = None,
 ) -> list[LinkState]:  # fmt: skip
-    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants."""
+    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants.
+
+    Motors and springs are those of links with frames that follow: others begin by the system.
+    """
     at_rest = scene.analysis.initial == "rest"
     grid = time_grid(scene)
     h = min(grid.step, grid.end / (INSTANTS - 1))
@@ -359,9 +362,6 @@ def first_states(
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
         forces = first_forces((*every, *followers(model)), model.links, motion, [(x.u, x.v) for x in start])
         rows = rows_at_start(scene, linkage, along, model)
-        if every and not following(scene):
-            at = loaded(moments[0].at, forces)
-            return initial_states(model.links, model.joints, at, model.damping, start, rows)
         states = initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
         states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
