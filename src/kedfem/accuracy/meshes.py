@@ -28,7 +28,7 @@ def open_meshes(scene: Scene) -> list[str]:
 def open_functions(scene: Scene) -> list[str]:
     """Names of the elastic solid and plane links that do not say whether they are reduced, where a step or a mesh is open
     too: what is chosen for these makes steps in full dear."""
-    if not open_step(scene) and not open_meshes(scene):
+    if scene.analysis.solver == "literal" or not (open_step(scene) or open_meshes(scene)):
         return []
     return [
         name
