@@ -27,8 +27,11 @@ def at(raw: Raw, frames: str | None = None, **more: Any) -> Begun:
     return begun(raw, frames, **more)
 
 
-@pytest.mark.parametrize("frames", ["nominal", "following"])
-@pytest.mark.parametrize("kind", ["screw", "gears, rack", "springs"])
+@pytest.mark.parametrize(
+    ("kind", "frames"),
+    [("slot", "nominal")]
+    + [(kind, frames) for kind in ("screw", "gears, rack", "springs") for frames in ("nominal", "following")],
+)
 def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) -> None:
     """Differences of fourth order over values; gradients too. Errors of differences: h⁴ and rounding/h², 1e-8."""
     of = at(four_bar(**elements()) if kind == "springs" else BEAMS[kind](), frames)
