@@ -120,7 +120,7 @@ class CorotationalSteps:
             If the iterations of a step do not, in parts neither; `handed_on` tells what was done before.
         """
         before = state.passes.copy()
-        state, found = march(self.ready, state, motion, motion_at)
+        state, found = march(self.ready, state, motion, motion_at, loads=[each.F for each in forcing])
         self.sweeps += int(state.passes[0] - before[0])
         self.eased += int(state.passes[1] - before[1])
         return (*self._handed_on(found, forcing, motion), state)

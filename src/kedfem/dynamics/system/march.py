@@ -1,6 +1,6 @@
 """The public march of a system: from any state, over any stretch of its nominal motion, to the state at its end."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,13 +79,22 @@ def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready
     return Ready(system, scheme, c, parts, *as_arrays(system, parts))
 
 
-def driving(of: Ready, motion: RigidMotion) -> Driving:
-    """The nominal motion and loads on all coordinates over the times of a motion."""
+Loads = Sequence[Float[np.ndarray, "T _ _"]]
+"""P − M R0'' of all bodies over time, world components."""
+
+
+def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Driving:
+    """The nominal motion and loads on all coordinates over the times of a motion.
+
+    Parameters
+    ----------
+    loads : if they are there already
+    """
     model = of.system.model
-    F = [
-        work_over_time(part, applied(link, loads, motion, body)).reshape(len(motion.t), -1)
-        for part, link, loads, body in zip(of.parts, model.links, model.loads, model.bodies, strict=True)
-    ]
+    if loads is None:
+        every = zip(model.links, model.loads, model.bodies, strict=True)
+        loads = [applied(link, each, motion, body) for link, each, body in every]
+    F = [work_over_time(part, x).reshape(len(motion.t), -1) for part, x in zip(of.parts, loads, strict=True)]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     drives = np.ascontiguousarray(drives)
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
@@ -96,14 +105,16 @@ def driving(of: Ready, motion: RigidMotion) -> Driving:
 
 
 def march(
-    of: Ready, state: State, motion: RigidMotion, between: Motion | None = None, halvings: int = HALVINGS
-) -> tuple[State, History]:
+    of: Ready, state: State, motion: RigidMotion, between: Motion | None = None, halvings: int = HALVINGS,
+    loads: Loads | None = None,
+) -> tuple[State, History]:  # fmt: skip
     """All steps to the times of a motion, one after the other; the state that is given stays as it is.
 
     Parameters
     ----------
     motion : at the ends of the steps
     between : nominal motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts
+    loads : see `driving`
 
     Raises
     ------
@@ -113,7 +124,7 @@ def march(
     from kedfem.dynamics.system.step_kernel import marched
 
     arrays = of.bodies, of.ends, of.constraints
-    state, along, T, done = copied(state), driving(of, motion), len(motion.t), 0
+    state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
     solved = solver(of.parts, of.bodies.at, of.bodies.port_at, trial)
