@@ -1,5 +1,6 @@
 """Co-rotational frames by the system: as the loop that it replaces, and joints by constraint equations in them."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,11 @@ def alike(got: Channels, wanted: Channels, within: float) -> None:
         assert np.abs(got[name] - x).max() <= within * size, name
 
 
+def first_alone(every: Mapping[str, Any]) -> list[Any]:
+    """The first of some cases, and the others where long ones run."""
+    return [pytest.param(name, marks=[pytest.mark.long] * bool(k)) for k, name in enumerate(every)]
+
+
 OLD = {
     "planar beams": lambda: four_bar("following", steps=72, analysis=REST),
     "damped, rho_inf 0.8": lambda: four_bar(
@@ -74,7 +80,7 @@ def with_analysis(raw: Raw, **more: Any) -> Raw:
     return {**raw, "analysis": {**raw["analysis"], **more}}
 
 
-@pytest.mark.parametrize("name", OLD)
+@pytest.mark.parametrize("name", first_alone(OLD))
 def test_all_that_is_recorded_is_as_by_the_loop_of_before(name: str, monkeypatch: Any) -> None:
     """From rest, where both begin alike; both to the tolerance of scenes without a drive."""
     monkeypatch.setattr(runs, "CONVERGED", FREE)
@@ -97,11 +103,21 @@ def shorter(raw: Raw) -> Raw:
     return with_analysis(raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"turns", "end_time"}})
 
 
+def off_its_seat(raw: Raw) -> Raw:
+    """The slide's first link is the arm, whose face has its middle 30 mm from the joint's point."""
+    slide = {**raw["joints"]["S"], "links": ["arm", "block"]}
+    return {**raw, "joints": {**raw["joints"], "S": slide}}
+
+
 DRIVEN = {
     **{kind: make for kind, make in BEAMS.items() if kind not in {"slot", "bushings"}},
-    "sliding block": inverted, "shaft of universal joints": cardan, "gears": geared, "two drives": two_drives,
-}  # fmt: skip
-SOON = {"cylindrical", "screw", "sliding block", "gears"}
+    "sliding block": inverted,
+    "sliding block of plane links": lambda: off_its_seat(with_analysis(inverted("plane"), turns=0.02)),
+    "shaft of universal joints": cardan,
+    "gears": geared,
+    "two drives": two_drives,
+}
+SOON = {"screw", "sliding block of plane links", "gears"}
 
 
 @pytest.mark.parametrize(
@@ -169,7 +185,7 @@ ON_SLIDE: dict[str, Raw] = {
 }
 
 
-@pytest.mark.parametrize("acting", ON_SLIDE)
+@pytest.mark.parametrize("acting", first_alone(ON_SLIDE))
 def test_motors_and_springs_along_a_slide_that_turns(acting: str) -> None:
     """A block on an arm about 0.4 m from its pivot: the drive's torque is that of rigid links, the work as counted."""
     raw = with_analysis(stiffer(inverted(), 100.0), frames="following", rho_inf=0.8)
@@ -185,6 +201,7 @@ def test_motors_and_springs_along_a_slide_that_turns(acting: str) -> None:
     assert np.abs(np.abs(travel) - np.abs(drawn)).max() < 1e-4
 
 
+@pytest.mark.long
 def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
     """Between crank and rod of a loop in space: as much from the drive as inverse dynamics says, in both frames."""
     raw = with_analysis(stiffer(shorter(BEAMS["cylindrical"]()), 100.0), rho_inf=0.8)
