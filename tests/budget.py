@@ -27,11 +27,17 @@ Raw = dict[str, Any]
 
 @dataclass(frozen=True)
 class Case:
-    """A run, and the finest one that it is judged by."""
+    """A run, and the finest one that it is judged by; meshed links reduced as tightly as the truth needs, or in full."""
 
     name: str
     raw: Raw
     fine: Raw
+    full: bool = False
+
+    def ready(self, raw: Raw) -> Prepared:
+        """The run or its finest one, before its steps."""
+        every = meshed(scene_from(raw))
+        return every if self.full else first_reduced(every, 1e-4)
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,7 @@ FINE = beams("beam5", 4)
 
 
 def cases() -> Iterator[Case]:
-    """Thirty: beams, quadrilaterals, hexahedra; nominal and following; 60 to 600 rpm; smooth and sudden."""
+    """Thirty: beams, quadrilaterals, hexahedra; nominal and following; 60 to 600 rpm; smooth and sudden. Then in full."""
     for speed in (60, 150, 300, 600):
         fine = four_bar(speed, 4320, FINE, frames="following")
         for element, count in (("beam3", 1), ("beam5", 1), ("beam5", 3)):
@@ -126,25 +132,40 @@ def cases() -> Iterator[Case]:
                 f"arm {word}, {count} beam3, {frames}", arm(1000, beams("beam3", count), sudden, frames), fine
             )
 
+    yield from in_full()
+
+
+def in_full() -> Iterator[Case]:
+    """Six with hexahedra that are not reduced, meshes small."""
+    for speed in (60, 150):
+        fine = four_bar(speed, 1440, solids(16, 2), 0.5, frames="following" if speed > 60 else "nominal")
+        for along in (4, 8):
+            raw = four_bar(speed, 720, solids(along, 1), 0.5)
+            yield Case(f"{speed} rpm, solid {along} × 1 a link, in full", raw, fine, full=True)
+    for sudden in (False, True):
+        fine = arm(4000, solids(20, 2), sudden, "following")
+        raw = arm(1000, solids(8, 1), sudden, "nominal")
+        yield Case(f"arm {'struck' if sudden else 'swung'}, solid 8 × 1, in full", raw, fine, full=True)
+
+
+def solids(along: int, across: int) -> Raw:
+    return {"fidelity": "solid", "mesh": {"elements": [along, across, 1]}}
+
 
 def judged(case: Case, known: dict[str, Any] | None = None) -> Judged:
-    """Run a case and its finest one; solids on functions, as tight as the truth needs."""
-    ready = _small(case.raw)
+    """Run a case and its finest one."""
+    ready = case.ready(case.raw)
     seen = watcher(ready)
     base = histories(ready, look=seen.add)
     found = budget(ready, seen, None, base)
-    key = repr(case.fine)
+    key = repr((case.full, case.fine))
     if known is None or key not in known:
-        fine = histories(_small(case.fine))
+        fine = histories(case.ready(case.fine))
         if known is not None:
             known[key] = fine
     else:
         fine = known[key]
     return Judged(case.name, found, by_kind(relative_errors(base, fine)))
-
-
-def _small(raw: Raw) -> Prepared:
-    return first_reduced(meshed(scene_from(raw)), 1e-4)
 
 
 def page(found: list[Judged]) -> str:

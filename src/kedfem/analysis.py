@@ -127,8 +127,8 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = _Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
-    envelope, seen, step = clock.timed("steps", lambda: _stepped(ready, solvers, watched, folder, watch))
+    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
+    envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch))
     notices += [*balance_warning(account.balance, scene.analysis.stiffening), *efforts.warnings()]
     notices += [*undetermined_warning(untold), *watched.passes.warnings(), *eased_warning(solvers)]
     notices += coarse_steps(scene)
@@ -212,7 +212,7 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Watched:
+class Watched:
     """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
 
     recorded: list[Recorded]
@@ -222,7 +222,7 @@ class _Watched:
     passes: SingularPasses
 
 
-def _stepped(ready: Prepared, solvers: list[Steps], watched: _Watched,
+def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
              folder: FilePath, watch: Watch) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps

@@ -5,11 +5,13 @@ from typing import Any
 import pytest
 
 from kedfem.accuracy.prepared import meshed
+from kedfem.analysis import frame_steps, stepped
 from kedfem.dynamics import cost
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.dynamics.transient import steps_of
+from kedfem.report import check
 from kedfem.report.check import forecast
-from kedfem.scene import scene_from
+from kedfem.scene import scene_from, time_grid
 
 from .test_dynamics import four_bar
 
@@ -39,3 +41,22 @@ def test_what_is_too_large_to_be_tried_is_forecast_by_its_sizes(monkeypatch: pyt
     monkeypatch.setattr(cost, "TRIED", ready.model.unknowns - 1)
     assert forecast(ready).tried == 0
     assert cost.estimated_cost(ready.scene, ready.model).steps > 0
+
+
+def test_a_forecast_holds_all_that_a_run_makes_of_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It tries the loop of the run itself, and the frames of the animation are counted, not those of the trial."""
+    raw = sprung(steps_per_turn=120)
+    for link in raw["links"].values():
+        link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
+    raw["output"] = {"animation": {"frames_per_turn": 30}}
+    ready, tried = meshed(scene_from(raw)), []
+
+    def counted(now: Any, *told: Any) -> Any:
+        tried.append((len(frame_steps(now.scene)), time_grid(now.scene).steps))
+        return stepped(now, *told)
+
+    monkeypatch.setattr(check, "stepped", counted)
+    monkeypatch.setattr(check, "_frame", lambda *told: 100.0)
+    assert 3100 <= forecast(ready).steps < 3200
+    assert tried[:2] == [(0, 4), (0, 4)]
+    assert all(frames == 0 and steps <= 120 for frames, steps in tried)

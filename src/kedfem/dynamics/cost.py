@@ -8,12 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import SMALL
-from kedfem.dynamics.history import Block
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.levels import level_steps
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.transient import Steps
 from kedfem.mesh.room import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
-from kedfem.motion.linkage import Linkage
-from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
@@ -23,9 +21,12 @@ OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probe
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
-FIRST, MOST = 4, 400  # steps that are tried: first a few, then as many as take about ENOUGH, at most these
-ENOUGH = 0.3  # seconds
-TIMES = 6.0  # of the first few steps, at least: the start takes its time too
+FIRST, MORE, MOST = (
+    4,
+    4,
+    1024,
+)  # steps that are tried: a few, then so many times as many until they take ENOUGH more
+ENOUGH = 0.2  # seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +80,12 @@ def _fill(model: Model) -> Float[np.ndarray, " L"]:
     return np.asarray(_unknowns(model) ** 1.5 * thin)
 
 
-def tried_cost(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, look: Callable[[Block], object]
-) -> Cost:
+def tried_cost(scene: Scene, model: Model, run: Callable[[Scene, list[Steps]], None]) -> Cost:
     """Cost from some real steps of the solver that the run will have; of large models from their sizes.
 
     Parameters
     ----------
-    look : what a run does with the steps beside solving them, recording their channels
+    run : takes all steps of a scene, with all that is made of them
 
     Raises
     ------
@@ -104,16 +103,17 @@ def tried_cost(
 
     def seconds(steps: int) -> float:
         first = perf_counter()
-        for block in leveled(_begun(scene, steps), linkage, along, model, solvers):
-            look(block)
+        run(_begun(scene, steps), solvers)
         return perf_counter() - first
 
-    few = min(FIRST, total)
+    few = tried = min(FIRST, total)
     seconds(few)  # compiled code is loaded
-    once = seconds(few)
-    more = int(min(max(ENOUGH / max(once, 1e-6), TIMES) * few, MOST, total))  # beside what a start takes
-    step = once / few if more <= few else max(seconds(more) - once, 0.0) / (more - few)
-    return replace(cost, factor=factor, steps=once + step * (total - few), tried=max(more, few))
+    once = took = seconds(few)
+    while tried < min(MOST, total) and took - once < ENOUGH:  # beside what a start takes
+        tried = min(MORE * tried, MOST, total)
+        took = seconds(tried)
+    step = max(took - once, 0.0) / (tried - few) if tried > few else once / few
+    return replace(cost, factor=factor, steps=once + step * (total - few), tried=tried)
 
 
 def _begun(scene: Scene, steps: int) -> Scene:

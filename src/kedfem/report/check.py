@@ -1,5 +1,10 @@
 """What a check shows: what would be modelled, how it moves, what it would cost."""
 
+from dataclasses import replace
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
 import numpy as np
 from rich.table import Table
 
@@ -7,20 +12,29 @@ from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
-from kedfem.analysis import frame_steps
+from kedfem.accuracy.singular import SingularPasses
+from kedfem.analysis import Watched, frame_steps, stepped
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost, tried_cost
+from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.transient import Steps
 from kedfem.errors import KedfemError
+from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.freedom import of_joints
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
+from kedfem.output.derived import fields
+from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
 from kedfem.report.links import link_table, way_tables
 from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
-from kedfem.results.recording import recording, rows
+from kedfem.results.acting import measured_actions
+from kedfem.results.audit import Account
+from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.recording import recording
 from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
 
@@ -46,14 +60,47 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
 
 
 def forecast(ready: Prepared) -> Cost:
-    """Cost of a run: a few steps are taken and recorded as a run does; from sizes alone where they cannot be taken."""
-    recorded = recording(ready.scene, ready.model, None, ready.path, ready.linkage)
+    """Cost of a run: a few steps are taken with all that a run makes of them, and one frame of the animation.
+
+    From sizes alone where they cannot be taken.
+    """
+    scene, model = ready.scene, ready.model
+    every = [*model.links, *(carried.link for carried in model.carried)]
+    recoveries = [stress_recovery(link) for link in every]
+    seen: list[Snapshot] = []
+
+    def run(begun: Scene, solvers: list[Steps]) -> None:
+        still = begun.model_copy(update={"output": begun.output.model_copy(update={"animation": None})})
+        account = Account(model, measured_actions(still, model))
+        recorded = recording(still, model, account, ready.path, ready.linkage)
+        efforts = CrossChecks(still, ready.linkage, [each.channel for each in recorded], account)
+        watched = Watched(recorded, {}, efforts, recoveries, SingularPasses(ready))
+        with TemporaryDirectory() as folder:
+            told = replace(ready, scene=still), solvers, watched, FilePath(folder), _unwatched
+            worst = stepped(*told)[0].worst
+        seen.extend([worst] if worst else [])
+
     try:
-        return tried_cost(
-            ready.scene, ready.linkage, ready.path, ready.model, lambda block: rows(recorded, block)
-        )
+        cost = tried_cost(scene, model, run)
     except KedfemError:  # the run will say why
-        return estimated_cost(ready.scene, ready.model)
+        return estimated_cost(scene, model)
+    frames = len(frame_steps(scene))
+    return replace(cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])) if seen else cost
+
+
+def _unwatched(stage: str, done: int, total: int) -> None:
+    """Nobody is told of the progress of a trial."""
+
+
+def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
+    """Seconds that a frame of the animation takes."""
+    with TemporaryDirectory() as folder:
+        for k in range(2):  # the first time prepares
+            since = perf_counter()
+            write_frame(
+                FilePath(folder) / f"{k}.vtu", now.t, fields(ready.scene, ready.model, recoveries, now)
+            )
+    return perf_counter() - since
 
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
