@@ -136,6 +136,14 @@ def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_nomi
     assert unworked < 1e-3
 
 
+def test_the_effort_of_a_drive_is_its_work_where_links_bend() -> None:
+    """A crank and an arm on which a block slides, half a turn: ∫ T dφ is the work of supports, bent arm and all."""
+    raw = with_analysis(inverted(), frames="following", turns=0.5, steps_per_turn=480, rho_inf=0.8)
+    _, got, unworked = channels(raw)
+    assert np.abs(got["energy/work"][:, 1]).max() > 5.0  # J
+    assert unworked < 1e-5
+
+
 def test_gears_hold_without_a_drive() -> None:
     """Two arms geared 1 : −1, 1 N m on the first: T t²/2 over both inertias, m (L²/3 + w²/12) each; as far back."""
     links = {"one": bar("beam", (0, 0), (0.3, 0), 1), "two": bar("beam", (0.5, 0), (0.8, 0), 1)}

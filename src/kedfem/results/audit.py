@@ -128,7 +128,8 @@ class Account:
     def rows(self, block: Block) -> dict[str, Rows]:
         """The channels over a block; the same block again is not counted twice.
 
-        Beside them `driven`: work of the supports on the nominal motion, which is that of the drives alone.
+        Beside them `driven`: work of the drives alone, that of the supports on the nominal motion; all of it where
+        constraints go with displaced bodies.
         """
         if block is not self._block:
             if block.step != self._next:
@@ -169,6 +170,8 @@ class Account:
         work, total = self._sums.add(block.motion.t, rates, taken)
         work, driven = work[:, :12], work[:, 1:2] - work[:, 12:]
         work = work - total[:, 8:] * (np.arange(12) == 1)
+        if block.exerted is not None:  # constraints along directions of displaced bodies do no work in all
+            driven = work[:, 1:2]
         change = state - self._start
         left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
         left += np.column_stack(
