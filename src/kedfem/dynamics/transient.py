@@ -72,7 +72,9 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         return _follower(scene, model, scheme)
     literal = scene.analysis.solver == "literal"
     stresses = stiffening(model) if scene.analysis.stiffening else None
-    damped = any(row.damping.any() for row in model.rows)  # which only the system's starts know
+    # dampers of bushings only the system's starts know; stiff hubs of beams in space cost their rates too many digits
+    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
+    damped = not hubs and any(row.damping.any() for row in model.rows)
     if (scene.springs or scene.motors or damped) and stresses is None:
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))
