@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kedfem.accuracy.free_step import free_step
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.stability import fewest_steps
@@ -171,6 +172,8 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
                 f"the scene states its step; its error is about {error:.2g}{_with_levels(scene)}"
             )
         return scene, error
+    if not scene.driven_joints:
+        return free_step(search, scene, allowed)
     span, whole = time_grid(trial).end, time_grid(scene).end
     least = math.ceil(max(_least(trial), LEAST))
     longest, levels = span / max(_fewest_rows(trial), least), _possible_levels(search, scene)

@@ -23,6 +23,7 @@ from kedfem.accuracy.choices import (
     open_beams,
     open_frames,
     open_step,
+    with_beams,
 )
 from kedfem.accuracy.meshes import chosen_meshes, distinct, open_functions, open_meshes, with_functions
 from kedfem.accuracy.segments import open_segments, with_segments
@@ -43,6 +44,7 @@ STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked f
 SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
 VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose fidelity is open
+ROUGH = "beam5", 2  # elements of beams where the first step of a motion without a drive is looked for
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
 )
@@ -88,8 +90,7 @@ class Plan:
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     """The plan of a scene that leaves something open; None of one that asks for plain defaults.
 
-    Of scenes without a drive those of beams and rigid links: solids that move freely are not reduced, and trials of them
-    would be as dear as the run.
+    Of solid and plane links that move freely the step alone: they are not reduced; each trial is as dear as a run.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     """
     if scene.analysis.accuracy == "quick" or not anything_open(scene):
         return None
-    if not scene.driven_joints and not beams_only(scene):
+    if not scene.driven_joints and not beams_only(scene) and not open_step(scene):
         return None
     return planned(scene, stage)
 
@@ -126,6 +127,8 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
 
 def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     search = Trials(asked, stage)
+    if not scene.driven_joints and not beams_only(scene):
+        return _step_alone(search, scene)
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
     functions = open_functions(scene)
     scene = _opened(scene, left_open)
@@ -141,7 +144,15 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
                 with_analysis(scene, accuracy="quick"), asked, 1.0, tuple(shares), tuple(search.notes)
             )
     stage("plan: beams")
+    free = (
+        open_step(scene) and not scene.driven_joints
+    )  # beams are compared in a step that a rough model is given
+    analysis = scene.analysis
+    if free and open_beams(scene):
+        rough, _ = chosen_step(search, with_beams(scene, open_beams(scene), ROUGH), MESH / 2 * asked)
+        scene = with_analysis(scene, step=rough.analysis.step)
     scene, beams = chosen_beams(search, scene, MESH / 2 * asked)
+    scene = scene.model_copy(update={"analysis": analysis}) if free else scene
     stage("plan: step")
     scene, step = chosen_step(search, scene, STEP * asked)
     stage("plan: mesh")
@@ -168,6 +179,15 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
         Share("reduction", scene.analysis.reduction if reduced else 0.0, REDUCTION * asked),
     ]  # fmt: skip
     plan = Plan(scene, asked, finer, tuple(shares), ())
+    return replace(plan, notes=(*search.notes, *_limits(plan)))
+
+
+def _step_alone(search: Trials, scene: Scene) -> Plan:
+    """Of solid and plane links that move freely: they keep the meshes that they have."""
+    search.stage("plan: step")
+    chosen, step = chosen_step(search, scene, STEP * search.asked)
+    share = Share("time step", step, STEP * search.asked)
+    plan = Plan(with_analysis(chosen, accuracy="quick"), search.asked, 1.0, (share,), ())
     return replace(plan, notes=(*search.notes, *_limits(plan)))
 
 

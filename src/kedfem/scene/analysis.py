@@ -66,7 +66,7 @@ class Analysis(Record):
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
     it by short trial runs: frames, elements, mesh sizes, segments, functions, step and levels in time, and fidelities
-    that are `"auto"`. Without a drive elements of beams are; the step is then stated. `"quick"`: plain defaults are taken
+    that are `"auto"`. Without a drive elements of beams and the step are. `"quick"`: plain defaults are taken
     instead, which `kedfem run --quick` means too"""
     reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
     """relative error that reduced links may cause there"""

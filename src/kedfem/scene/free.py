@@ -195,8 +195,6 @@ def undriven_faults(parts: Parts) -> Iterator[str]:
     for key, instead in (("turns", "end_time"), ("steps_per_turn", "step")):
         if analysis.has(key):
             yield analysis.fault(key, f"needs a drive (else {instead} [s]), got a scene without one")
-    if analysis.raw and not analysis.has("step") and not analysis.has("steps_per_turn"):
-        yield analysis.fault("step", "is required in a scene without a drive [s], got nothing")
     if analysis.word("initial") == "quasi-static":
         yield analysis.fault("initial", "must be 'rest' in a scene without a drive, got 'quasi-static'")
     drawn = parts.animation.record

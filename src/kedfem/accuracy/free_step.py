@@ -1,0 +1,119 @@
+"""The step of a scene without a drive: marches in successively halved steps, until what they differ by shows it.
+
+Nothing tells beforehand how fast such a scene moves, so nothing is taken from frequencies or from a coarse forecast:
+a step is chosen among those that were marched, over the whole analysis; its error is what the last halvings show.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kedfem.accuracy.histories import Histories, counted, histories, relative_errors
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.step_estimate import LEAST_ORDER, SURE
+from kedfem.accuracy.trials import Trials
+from kedfem.accuracy.variants import with_analysis, with_steps
+from kedfem.errors import KedfemError
+from kedfem.scene import Scene
+
+FIRST = 200  # steps of the first march
+MOST = 51_200  # of the last one
+WORK = 2e7  # its steps times the unknowns of the model, at most: a minute or so
+PAIRS = 3  # of marches that are compared before anything is claimed: two ratios, so that a chance agreement is seen
+
+
+@dataclass(frozen=True, slots=True)
+class _Halved:
+    """The march in the shortest steps so far, and what marches differ by, of a channel's peak, the finest pair last."""
+
+    steps: int
+    coarse: Histories
+    fine: Histories
+    pairs: tuple[Mapping[str, float], ...]
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Channel → error of the march in the shortest steps."""
+        return {name: _error([pair.get(name, 1.0) for pair in self.pairs]) for name in counted(self.fine)}
+
+
+def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
+    """The scene in the longest step whose error is allowed, of one level, and that error.
+
+    Where no march reaches it, as in chaotic motion, the shortest step that was tried; until when marches agree is told.
+
+    Raises
+    ------
+    SolveError
+        If no march ends.
+    """
+    single = with_analysis(scene, levels=scene.analysis.levels or 1)
+    unknowns = max(1, meshed(with_steps(single, FIRST)).model.unknowns)
+    most = max(FIRST * 2**PAIRS, min(MOST, int(WORK / unknowns)))
+    steps, found, before = FIRST, None, None
+    pairs: list[Mapping[str, float]] = []
+    error = 1.0
+    while steps <= most:
+        try:
+            now = histories(meshed(with_steps(single, steps)))  # rigid links are as stiff as the step bears
+        except KedfemError:  # too long for its iterations
+            if 2 * steps > most:
+                raise
+            before, pairs = None, []
+        else:
+            if before is not None:
+                pairs.append(relative_errors(before, now))
+                found = _Halved(steps, before, now, tuple(pairs[-PAIRS:]))
+                error = max(found.errors.values(), default=0.0)
+            if len(pairs) >= PAIRS and error <= SURE * allowed:
+                longer = max(0.5, math.sqrt(error / (SURE * allowed)))  # between two steps that were marched
+                return with_steps(single, math.ceil(steps * longer)), error / longer**2
+            before = now
+        steps *= 2
+    if found is None:
+        return with_steps(single, steps // 2), 1.0
+    until = _agree_until(found, search.asked)
+    if until < found.coarse.time[-1]:  # nothing is promised of what falls there
+        error = min(1.0, max(max(pair.values(), default=0.0) for pair in found.pairs))
+    search.notes.append(_unreached(found, search.asked, until, error))
+    return with_steps(single, found.steps), error
+
+
+def _error(differences: Sequence[float]) -> float:
+    """Of the finest march, from what successive ones differ by: by the order that they show, at most 2."""
+    D = np.maximum(differences, 1e-300)
+    if len(D) < PAIRS or not np.isfinite(D).all():
+        return 1.0
+    orders = np.log2(D[:-1] / D[1:])
+    falls = orders.min() >= LEAST_ORDER
+    left = D[-1] / (2 ** min(2.0, float(orders.mean())) - 1) if falls else D.max()
+    return min(1.0, float(left))
+
+
+def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
+    errors = found.errors
+    name = max(errors, key=errors.__getitem__)
+    said = (
+        f"the step's error stays at {100 * error:.2g} % in {name} with {found.steps:,} steps, the most that are "
+        "tried"
+    )
+    if until >= found.coarse.time[-1]:
+        return said
+    return (
+        f"{said}: {found.steps // 2:,} and {found.steps:,} steps agree within {100 * asked:.3g} % until t = {until:.3g} "
+        "s only. The motion is sensitive to the smallest differences (chaotic), or holds vibration that these steps do "
+        "not resolve: damping, a smoother start or a shorter analysis would help"
+    )
+
+
+def _agree_until(found: _Halved, asked: float) -> float:
+    """Time until which the two finest marches agree in every channel that counts [s]."""
+    time, until = found.coarse.time, math.inf
+    for name, size in counted(found.fine).items():
+        coarse, fine = found.coarse.channels[name][1], found.fine.channels[name][1][::2]
+        apart = np.linalg.norm(coarse - fine[: len(coarse)], axis=1) > asked * size
+        if apart.any():
+            until = min(until, float(time[max(int(apart.argmax()) - 1, 0)]))
+    return until if until < math.inf else float(time[-1])
