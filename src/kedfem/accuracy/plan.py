@@ -149,7 +149,9 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     )  # beams are compared in a step that a rough model is given
     analysis = scene.analysis
     if free and open_beams(scene):
-        rough, _ = chosen_step(search, with_beams(scene, open_beams(scene), ROUGH), MESH / 2 * asked)
+        rough, _ = chosen_step(
+            Trials(asked, stage), with_beams(scene, open_beams(scene), ROUGH), MESH / 2 * asked
+        )
         scene = with_analysis(scene, step=rough.analysis.step)
     scene, beams = chosen_beams(search, scene, MESH / 2 * asked)
     scene = scene.model_copy(update={"analysis": analysis}) if free else scene
