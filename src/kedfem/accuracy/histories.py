@@ -15,7 +15,7 @@ from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 
 FAINT = (
-    1e-4  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
+    3e-3  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
 )
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 

@@ -36,6 +36,7 @@ from kedfem.results.row_work import row_work
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
+LITTLE = 1e-3  # of the kinetic energy: where less is exchanged, shares of it would be of next to nothing
 UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
@@ -182,7 +183,7 @@ class Account:
         self._impulse = float(passed[-1])
         self._watch(
             np.vstack([flow.sizes[:2], passed]),
-            np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1]]),
+            np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1], LITTLE * flow.kinetic]),
             left,
             work,
         )
@@ -233,7 +234,7 @@ class Account:
     def _watch(
         self,
         sizes: Float[np.ndarray, "3 T"],
-        exchanged: Float[np.ndarray, "T 5"],
+        exchanged: Float[np.ndarray, "T 6"],
         left: Float[np.ndarray, "T 7"],
         work: Float[np.ndarray, "T 12"],
     ) -> None:
