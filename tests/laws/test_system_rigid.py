@@ -21,8 +21,8 @@ SOLID = [0.03, 0.05, 0.06, 0.0, 0.0, 0.0]
 
 
 def top(inertia: list[float], spin: list[float], step: float = 1e-3, **more: Any) -> Begun:
-    """A body of 2 kg on a ball joint at its centre, on a carrier of next to no mass."""
-    link = {**bar("rigid", (-0.1, 0), (0.1, 0)), "material": "nothing"}
+    """A body of 2 kg on a ball joint at its centre, the middle of a face of its carrier of next to no mass."""
+    link = {**bar("rigid", (-0.1, 0, -0.01), (0.1, 0, -0.01)), "material": "nothing"}
     body = {"kind": "rigid_body", "link": "body", "at": [0, 0, 0], "mass": 2.0, "centre": [0, 0, 0]}
     raw: dict[str, Any] = {
         "links": {"body": link},

@@ -407,7 +407,9 @@ def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, ar
     assert results.reason in last
 
 
-def test_an_arm_that_rings_from_a_sudden_start_is_warned_of_and_no_more(run_kedfem: Command, arm: Path) -> None:
+def test_an_arm_that_rings_from_a_sudden_start_is_warned_of_and_no_more(
+    run_kedfem: Command, arm: Path
+) -> None:
     """Energy exchanged, and torque, are next to nothing beside the kinetic energy and the force in its joint."""
     text = arm.read_text("utf-8").replace('initial = "quasi-static"', "").replace("gravity = [0, -9.81]", "")
     arm.write_text(text, encoding="utf-8")
