@@ -13,8 +13,10 @@ from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.start import initial_rates
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.internal import own
 from kedfem.dynamics.system.layout import groups, near_diagonal
 from kedfem.dynamics.system.literal import Literal, Now
+from kedfem.dynamics.system.literal_steps import nodal_forces
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.start import rest
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -85,11 +87,14 @@ def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
     u, v, a = (rows(of.ready, x[None])[0] for x in (start.u, start.v, start.a))
     at = of.motion(np.zeros(1))
     none = [np.zeros((3, link.n, link.d)) for link in links]
+    internal = np.concatenate(
+        [nodal_forces(of.ready, k, start.f[own(of.ready, k)]).ravel() for k in range(len(links))]
+    )
     seen = [[(0.0, x.copy()) for _ in frames_of(link)] for link, x in zip(links, none, strict=True)]
     z = np.linalg.lstsq(solver.B, solver.W @ u, rcond=None)[0]
     C = solver._coordinates(z, start.turned.copy(), at)[1]
     now = Now(
-        u, v, a, np.zeros_like(u), solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
+        u, v, a, internal, solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
         C.T @ start.multiplier, none, in_order(of.ready, start.z),
     )  # fmt: skip
     along, out = of.steps(count), []

@@ -66,10 +66,13 @@ def test_a_speed_at_the_start_of_the_joint_that_is_driven() -> None:
 def test_stiffening_beside_frames_that_follow() -> None:
     assert fault(arm(stiffening=True)) == (
         "analysis.stiffening: must stand with nominal frames (those that follow know all of it), "
-        "got it with frames that follow"
+        "got it with frames that follow: leave stiffening out"
     )
 
 
 def test_the_literal_solver_with_frames_that_follow() -> None:
     said = fault(arm(solver="literal"))
-    assert said == "analysis.solver: must be 'condensed' for frames that follow, got 'literal'"
+    assert said == (
+        "analysis.solver: must be 'condensed' for frames that follow (the literal solver of scenes knows nominal ones "
+        "alone), got 'literal': leave it out, or take frames = \"nominal\""
+    )

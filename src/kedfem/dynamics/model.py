@@ -37,6 +37,7 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
+from kedfem.scene.capabilities import SLIDERS
 
 T = TypeVar("T")
 
@@ -419,10 +420,7 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     guide = slider_guide(scene, name)
     for key, joint in joints.items():
         if key != guide and needs_rows(scene, key):
-            raise SceneError(
-                f"joints.{key}.links: must join links with a shape by a {joint.kind} joint that moves with both, "
-                f"got '{name}', a rigid slider: give it a shape"
-            )
+            raise SceneError(SLIDERS.said({"where": f"joints.{key}", "kind": joint.kind, "name": name}))
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:

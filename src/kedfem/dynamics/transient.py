@@ -41,6 +41,7 @@ from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
+from kedfem.scene.capabilities import LARGE_SEGMENTS, TURNING_LOADS
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
@@ -113,16 +114,16 @@ def _refuse_beside_rows(model: Model, turning: bool) -> None:
     """What co-rotational frames with joints by constraint equations do not know yet: loads that turn, large segments."""
     names = ", ".join(x.name if x.name.startswith("gears.") else f"joints.{x.name}" for x in model.rows)
     if turning:
-        raise SceneError(
-            f'loads: must have frame = "world" and no pressure beside {names} with frames that follow (which are held by '
-            "constraint equations), got ones that turn with their links: take nominal frames, or forces in the world"
-        )
+        raise SceneError(TURNING_LOADS.said({"names": names}))
     for link in model.links:
         if link.unknowns > LARGE:
-            raise SceneError(
-                f"links.{link.name}: must have at most {LARGE} unknowns in each segment beside {names} with frames that "
-                f"follow, got {link.unknowns}: give it more segments or larger elements, or reduced = true"
-            )
+            words = {
+                "where": f"links.{link.name}",
+                "most": str(LARGE),
+                "names": names,
+                "count": str(link.unknowns),
+            }
+            raise SceneError(LARGE_SEGMENTS.said(words))
 
 
 def _is_small(link: Link) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from pydantic_core import PydanticCustomError
 
@@ -15,7 +15,7 @@ from kedfem.scene.analysis import ELASTIC
 from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.faults import either, line, place
 from kedfem.scene.files import sketched
-from kedfem.scene.links import DIRECTED, GROUND, SQUARE, JointKind
+from kedfem.scene.links import DIRECTED, GROUND, SQUARE
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
 
@@ -267,9 +267,6 @@ def drive_faults(parts: Parts) -> Iterator[str]:
         kind = joint.word("kind")
         if kind in {"revolute", "prismatic"}:
             yield from law_faults(drive, str(kind))
-        elif kind in get_args(JointKind):
-            wanted = "must name a revolute or prismatic joint"
-            yield drive.fault("joint", f"{wanted}, got {joint.name!r}, which is {kind}")
 
 
 def law_faults(drive: Entry, kind: str) -> Iterator[str]:
@@ -291,25 +288,16 @@ def law_faults(drive: Entry, kind: str) -> Iterator[str]:
 
 
 def gear_faults(parts: Parts) -> Iterator[str]:
-    """Gears on joints that do not exist or do not turn."""
+    """Gears on joints that do not exist."""
     for gear in parts.gears.values():
         names = gear.raw.get("joints")
         if not isinstance(names, (list, tuple)) or len(names) != 2:
             continue
         if names[0] == names[1]:
             yield gear.fault("joints", f"must be two different joints, got {names[0]!r} twice")
-        rack = gear.has("radius")
-        for i, (name, wanted) in enumerate(
-            zip(names, ("revolute", "prismatic" if rack else "revolute"), strict=True)
-        ):
-            joint = parts.joints.get(name) if isinstance(name, str) else None
-            if joint is None:
-                if parts.joints:
-                    yield gear.fault("joints", unknown_name("a joint", str(name), parts.joints), i)
-            elif joint.word("kind") in get_args(JointKind) and joint.word("kind") != wanted:
-                noun = f"the {('first', 'second')[i]} joint of a rack" if rack else "joints of gears"
-                got = f"got {joint.name!r}, which is {joint.word('kind')}"
-                yield gear.fault("joints", f"{noun} must be {wanted}, {got}", i)
+        for i, name in enumerate(names):
+            if parts.joints and not (isinstance(name, str) and name in parts.joints):
+                yield gear.fault("joints", unknown_name("a joint", str(name), parts.joints), i)
 
 
 def load_faults(parts: Parts) -> Iterator[str]:
@@ -319,20 +307,8 @@ def load_faults(parts: Parts) -> Iterator[str]:
         kind = load.word("kind")
         if link is None:
             continue
-        yield from factor_faults(load, parts)
-        meshed = fidelity(link) in {"solid", "plane"} or (fidelity(link) == "rigid" and link.has("shape"))
-        if kind in {"surface", "pressure"} and not meshed:
-            got = f"got {link.name!r}, which is {fidelity(link)}"
-            what = "surface load" if kind == "surface" else "pressure"
-            yield load.fault("link", f"must name a solid or a plane link for a {what}, {got}")
-        if kind == "torque" and fidelity(link) == "rigid" and not link.has("shape"):
-            got = f"got {link.name!r}, a slider"
-            yield load.fault("link", f"must name a link with a shape for a torque, {got}")
         if kind == "torque" and load.word("joint") is not None and parts.joints:
             yield from torque_joint_faults(load, parts)
-        if kind == "body" and fidelity(link) == "rigid" and not link.has("shape"):
-            got = f"got {link.name!r}, which is rigid"
-            yield load.fault("link", f"must name a link with a shape for a body load, {got}")
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
         if link is not None and fidelity(link) == "rigid" and quantity in {"stress", "deflection"}:
@@ -344,12 +320,6 @@ def load_faults(parts: Parts) -> Iterator[str]:
             yield probe.fault("quantity", f"must be {wanted} {why}, got {quantity!r}")
     for body in parts.bodies.values():
         yield from flywheel_faults(body, parts)
-
-
-def factor_faults(load: Entry, parts: Parts) -> Iterator[str]:
-    """A factor over the angle of a drive that is not there."""
-    if load.word("factor", "over") == "angle" and not parts.driven:
-        yield load.fault("factor", "needs a drive over its angle, got a scene without one", "over")
 
 
 def torque_joint_faults(load: Entry, parts: Parts) -> Iterator[str]:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator
 
 from kedfem.errors import SceneError
-from kedfem.scene.checks import NOUNS, fidelity, link_names
+from kedfem.scene.checks import NOUNS, fidelity
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.laws import table_noise
 from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import FLAT, leaving, off_plane, rigid_in_space, spring_ends, vector
+from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
 from kedfem.scene.shapes import Bar, Cad, MeshFile, Part
 from kedfem.scene.timing import turning_speed
 
@@ -40,25 +40,7 @@ def planar_faults(parts: Parts) -> Iterator[str]:
         shape = getattr(link.record, "shape", None)
         if fidelity(link) == "plane" and isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
             yield link.fault("shape", f"must be along z in {here}, got {vector(shape.upward)}", "up")
-    yield from mixed_faults(parts)
     yield from plane_faults(parts, here)
-
-
-def mixed_faults(parts: Parts) -> Iterator[str]:
-    """Joints other than hinges between plane links and others: a rigid link in space may slide on a plane one too."""
-    for joint in parts.joints.values():
-        held = [parts.links[name] for name in link_names(joint) if name in parts.links]
-        kinds = [NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS]
-        mixed = len(set(kinds)) == 2 and NOUNS["plane"] in kinds
-        if mixed and joint.word("kind") in {"weld", "prismatic"}:
-            names = " and ".join(f"{link.name!r}, a {kind}" for link, kind in zip(held, kinds, strict=True))
-            wanted = "must be revolute or spherical between a plane link and another"
-            yield joint.fault("kind", f"{wanted}, got {joint.word('kind')!r} of {names}")
-        rigid = [link.name for link in held if rigid_in_space(parts, link)]
-        if rigid and NOUNS["plane"] in kinds and joint.word("kind") == "weld":
-            plane = next(link.name for link in held if fidelity(link) == "plane")
-            wanted = "must be revolute or spherical between a plane link and a rigid one that moves freely"
-            yield joint.fault("kind", f"{wanted}, got 'weld' of {plane!r} and {rigid[0]!r}")
 
 
 def plane_faults(parts: Parts, here: str) -> Iterator[str]:

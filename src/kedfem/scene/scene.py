@@ -26,6 +26,7 @@ from kedfem.scene.checks import (
     load_faults,
     reference_faults,
 )
+from kedfem.scene.combinations import combination_faults
 from kedfem.scene.damping import Damping
 from kedfem.scene.doubts import bare_numbers
 from kedfem.scene.drives import Drive, Gear, MotionLaw
@@ -38,7 +39,6 @@ from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
-from kedfem.scene.moving import gear_frame_faults, moving_faults
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
@@ -226,7 +226,6 @@ def cross_faults(parts: Parts) -> list[str]:
         spring_faults,
         initial_faults,
         undriven_faults,
-        moving_faults,
-        gear_frame_faults,
+        combination_faults,
     )
     return [fault for check in checks for fault in check(parts)]

@@ -38,6 +38,7 @@ from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
 from kedfem.motion.rows import CONSTRAINED, perpendiculars
 from kedfem.scene import LineSpring, Motor, Scene
+from kedfem.scene.capabilities import SLOTS
 
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
 Vector = Float[np.ndarray, "3"]
@@ -100,10 +101,7 @@ class _Builder:
         elif kind in {"springs", "motors"}:
             self.element(joint, getattr(scene, kind)[name])
         elif scene.joints[joint.name].kind == "slot" and set(joint.bodies) & self.own:
-            raise SceneError(
-                f"joints.{joint.name}.kind: must be another than slot with co-rotational frames, got a slot, whose pin "
-                "slides as the nominal motion tells"
-            )
+            raise SceneError(SLOTS.said({"where": f"joints.{joint.name}"}))
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)

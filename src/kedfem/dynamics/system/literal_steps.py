@@ -72,13 +72,13 @@ def begun(of: Ready, solver: Literal, state: State, motion: RigidMotion) -> Now:
         np.concatenate([displacements(of, k, x[None])[0].ravel() for k in range(len(links))])
         for x in (state.u, state.v, state.a)
     )
-    f, F = (np.concatenate([_forces(of, k, x[own(of, k)]).ravel() for k in range(len(links))])
+    f, F = (np.concatenate([nodal_forces(of, k, x[own(of, k)]).ravel() for k in range(len(links))])
             for x in (state.f, state.F))  # fmt: skip
     number, damped = renumbered(of), []
     for k in range(len(links)):
         here = own(of, k)
         rates = np.split(state.damped[3 * here.start : 3 * here.stop], 3)
-        damped.append(np.stack([_forces(of, k, x) for x in rates]))
+        damped.append(np.stack([nodal_forces(of, k, x) for x in rates]))
     return Now(
         u, v, a, f, F, [[] for _ in links], state.z[0, number], state.e.copy(), state.turned.copy(),
         state.bearing[number], damped, state.z[:, number], state.multiplier.copy(), state.port_force.copy(),
@@ -89,7 +89,7 @@ def _coordinates(of: Ready, k: int, link: Link, rows: Float[np.ndarray, "n d"]) 
     return coordinates(link, of.parts[k], rows).ravel()
 
 
-def _forces(of: Ready, k: int, x: Float[np.ndarray, " N"]) -> Float[np.ndarray, "n d"]:
+def nodal_forces(of: Ready, k: int, x: Float[np.ndarray, " N"]) -> Float[np.ndarray, "n d"]:
     """Nodal forces from those on coordinates, T⁻ᵀ = m T."""
     link, T = of.system.model.links[k], of.parts[k].T
     each: Sequence[np.ndarray] = list(x.reshape(link.d, link.n))

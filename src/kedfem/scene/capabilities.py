@@ -1,0 +1,176 @@
+"""The table of capabilities: combinations of options that are refused, with the reason and what to take instead.
+
+What no line of `REFUSALS` meets is allowed. The checks of scenes, docs/capabilities.md (`capability_page`) and tests read
+this one table: a refusal that is lifted is a line taken out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+from kedfem.scene.links import JointKind
+
+Facts = Mapping[str, str]
+"""Level of each factor that is known of a part of a scene."""
+
+KINDS: tuple[str, ...] = get_args(JointKind)
+TURNED = ("revolute", "cylindrical", "screw")  # kinds with one turn, which a torque or torsion spring acts on
+SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
+DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive prescribes
+CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
+SHARED = "shared points"  # and one that holds points of its links together for good
+MIXED = "plane link and another"  # what a joint joins
+BESIDE = "plane link and a rigid one"  # of which the rigid one moves freely in space
+
+
+def others(*kinds: str) -> tuple[str, ...]:
+    """All kinds of joint but these."""
+    return tuple(kind for kind in KINDS if kind not in kinds)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A combination that is refused; its texts may hold {words} of the part of a scene that meets it.
+
+    of : section of the scene whose parts may meet it
+    when : levels of factors, all of which are met
+    where : place that the message names
+    must, why, got, take : what is required, the reason, what was given, what to take instead
+    """
+
+    of: str
+    when: Mapping[str, tuple[str, ...]]
+    where: str
+    must: str
+    why: str
+    got: str
+    take: str
+
+    def meets(self, facts: Facts) -> bool:
+        """Whether a part of a scene is such a combination."""
+        return all(facts.get(factor) in levels for factor, levels in self.when.items())
+
+    def said(self, words: Mapping[str, str]) -> str:
+        """The message."""
+        text = f"{self.where}: must {self.must} ({self.why}), got {self.got}: {self.take}"
+        return text.format_map(words)
+
+
+SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("following",)}, "{where}.kind",
+    'be another than slot with frames = "following"', "the pin of a slot slides as the nominal motion tells",
+    "a slot", 'take frames = "nominal", or a slide with a hinge')  # fmt: skip
+TURNING_LOADS = Refusal("model", {"enforced": (CONSTRAINED,), "frames": ("following",), "load": ("turns with its link",)},
+    "loads", 'have frame = "world" and no pressure beside {names} with frames that follow',
+    "which are held by constraint equations", "ones that turn with their links",
+    "take nominal frames, or forces in the world")  # fmt: skip
+LARGE_SEGMENTS = Refusal("model", {"enforced": (CONSTRAINED,), "frames": ("following",),
+    "unknowns": ("too many for dense matrices",)},
+    "{where}", "have at most {most} unknowns in each segment beside {names} with frames that follow",
+    "which are held by constraint equations", "{count}",
+    "give it more segments or larger elements, or reduced = true")  # fmt: skip
+SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
+    "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",
+    "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
+REFUSALS = (
+    SLOTS,
+    TURNING_LOADS,
+    LARGE_SEGMENTS,
+    SLIDERS,
+    Refusal("joints", {"enforced": (CONSTRAINED,), "stiffening": ("on",)}, "{where}.{key}",
+        "stand without analysis.stiffening", "which knows no constraint equations", "{noun}",
+        'take frames = "following", which know all of it'),
+    Refusal("joints", {"enforced": (CONSTRAINED,), "rho_inf": ("1",)}, "analysis.rho_inf",
+        "be less than 1 with {where}", "its force would swing from step to step, and grow", "1", "take 0.95"),
+    Refusal("joints", {"joint": ("spherical", "slot"), "bushing": ("against turns",)},
+        "{where}.bushing.turning_stiffness", "be given for a joint that holds turns",
+        "there is none that it could resist", "a {kind} joint, which leaves all free",
+        "leave it out, or take another kind of joint"),
+    Refusal("joints", {"joint": ("weld", "prismatic"), "partners": (MIXED,)}, "{where}.kind",
+        "be revolute or spherical between a plane link and another", "a plane link holds no turn out of its plane",
+        "'{kind}' of {names}", "give both the same fidelity"),
+    Refusal("joints", {"joint": ("weld",), "partners": (BESIDE,)}, "{where}.kind",
+        "be revolute or spherical between a plane link and a rigid one that moves freely",
+        "a plane link holds no turn out of its plane", "'weld' of {names}",
+        "take a hinge, or two links of one kind"),
+    Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", "name a revolute or prismatic joint",
+        "a drive prescribes the one motion of a joint", "{name!r}, which is {kind}",
+        "drive a hinge or a slide beside it, or take a motor"),
+    Refusal("drives", {"joint": ("prismatic",), "shaft": ("given",)}, "{where}.shaft_stiffness",
+        "be given for a hinge", "a shaft gives as it is twisted", "{name!r}, which is prismatic",
+        "take a bushing, or a spring along the slide"),
+    Refusal("gears", {"stiffening": ("on",)}, "{where}", "stand without analysis.stiffening",
+        "which knows no constraint equations", "it", 'take frames = "following", which know all of it'),
+    Refusal("gears", {"element": ("gear",), "joint": others("revolute")}, "{where}",
+        "be revolute, as joints of gears are", "these couple turns", "{name!r}, which is {kind}", "take hinges"),
+    Refusal("gears", {"element": ("rack",), "joint": others("prismatic")}, "{where}",
+        "be prismatic as the second joint of a rack", "a rack slides", "{name!r}, which is {kind}",
+        "take a slide, or a ratio instead of the radius"),
+    Refusal("motors", {"element": ("torque",), "joint": others(*TURNED)}, "{where}.joint",
+        "name a revolute or cylindrical or screw joint for a torque", "no other joint has one turn",
+        "{name!r}, which is {kind}", "take loads of kind torque on its links"),
+    Refusal("motors", {"element": ("force",), "joint": others(*SLID)}, "{where}.joint",
+        "name a prismatic or cylindrical joint for a force", "no other joint has one travel",
+        "{name!r}, which is {kind}", "take loads of kind force on its links"),
+    Refusal("springs", {"element": ("torsion",), "joint": others(*TURNED)}, "{where}.joint",
+        "name a revolute or cylindrical or screw joint", "no other joint has one turn",
+        "{name!r}, which is {kind}", "take a bushing with turning_stiffness"),
+    Refusal("springs", {"element": ("along",), "joint": others(*SLID)}, "{where}.joint",
+        "name a prismatic or cylindrical joint", "no other joint has one travel",
+        "{name!r}, which is {kind}", "take a spring between two points"),
+    *(Refusal(of, {"element": (element,), "joint": SLID, "slide": ("between links",), "frames": ("nominal",)},
+        "{where}.joint", 'name a slide on the ground, or stand with frames = "following"',
+        "with nominal ones its force would keep the direction as drawn while the slide turns", "{name!r}",
+        'take frames = "following"') for of, element in (("motors", "force"), ("springs", "along"))),
+    Refusal("analysis", {"drive": ("none",), "frames": ("nominal",)}, "{where}.frames",
+        "be 'following' in a scene without a drive", "there is no nominal motion", "'nominal'",
+        "leave it out, or give a drive"),
+    Refusal("links", {"drive": ("none",), "frames": ("nominal",)}, "{where}.frames",
+        "be 'following' in a scene without a drive", "there is no nominal motion", "'nominal'",
+        "leave it out, or give a drive"),
+    Refusal("analysis", {"stiffening": ("on",), "frames": ("following",)}, "{where}.stiffening",
+        "stand with nominal frames", "those that follow know all of it", "it with frames that follow",
+        "leave stiffening out"),
+    Refusal("analysis", {"stiffening": ("on",), "element": ("motor or spring",)}, "{where}.stiffening",
+        "stand without motors and springs", "whose stresses it does not know", "{elements}",
+        'take frames = "following", which know all of it'),
+    Refusal("analysis", {"solver": ("literal",), "frames": ("following",)}, "{where}.solver",
+        "be 'condensed' for frames that follow", "the literal solver of scenes knows nominal ones alone", "'literal'",
+        'leave it out, or take frames = "nominal"'),
+    *(Refusal("analysis", {"frames": ("nominal",), "start": (key,)}, f"{{where}}.{key}",
+        'stand with frames = "following"', "nominal ones begin as the drive moves them", "{given} with nominal ones",
+        'take frames = "following"') for key in ("initial_speeds", "initial_motions")),
+    Refusal("analysis", {"drive": ("none",), "start": ("quasi-static",)}, "{where}.initial",
+        "be 'rest' in a scene without a drive", "no motion is known that the deflection could go with", "'quasi-static'",
+        "leave it out"),
+    *(Refusal("analysis", {"drive": ("none",), "time": (key,)}, f"{{where}}.{key}", "stand with a drive",
+        "it counts the drive's turns", "a scene without one", f"take {instead} [s]")
+        for key, instead in (("turns", "end_time"), ("steps_per_turn", "step"))),
+    Refusal("damping", {"drive": ("none",), "damping": ("in proportion to mass",)}, "{where}.{key}",
+        "be given as beta alone in a scene without a drive, such as beta = {beta} [s]",
+        "alpha resists the motion as a whole", "alpha = {alpha} 1/s", "leave alpha out"),
+    *(Refusal("loads", {"element": (kind,), "link": ("beam", "slider")}, "{where}.link",
+        f"name a solid or a plane link for a {noun}", "a beam and a slider have no faces",
+        "{name!r}, which is {noun}", "take loads of kind force or torque")
+        for kind, noun in (("surface", "surface load"), ("pressure", "pressure"))),
+    Refusal("loads", {"element": ("torque",), "link": ("slider",)}, "{where}.link",
+        "name a link with a shape for a torque", "a slider without a shape has no turn", "{name!r}, a slider",
+        "give it a shape"),
+    Refusal("loads", {"element": ("body",), "link": ("slider",)}, "{where}.link",
+        "name a link with a shape for a body load", "a slider without a shape has no volume",
+        "{name!r}, which is rigid", "take a load of kind force, or give it a shape"),
+    Refusal("loads", {"factor": ("angle",), "drive": ("none",)}, "{where}.factor.over",
+        "stand with a drive over whose angle it is", "no other angle is prescribed", "a scene without one",
+        "take a factor over time"),
+)  # fmt: skip
+
+
+def refusals(of: str, facts: Facts) -> Iterator[Refusal]:
+    """All lines of the table that a part of a scene meets.
+
+    Parameters
+    ----------
+    of : its section
+    """
+    return (each for each in REFUSALS if each.of == of and each.meets(facts))

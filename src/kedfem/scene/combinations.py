@@ -1,0 +1,184 @@
+"""What a scene combines, in the factors of the table of capabilities: its refusals as fault lines, for its validation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from kedfem.scene.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
+from kedfem.scene.checks import NOUNS, fidelity, link_names
+from kedfem.scene.damping import rayleigh
+from kedfem.scene.faults import place
+from kedfem.scene.frames import default_frames
+from kedfem.scene.links import GROUND
+from kedfem.scene.moving import moving_joints
+from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.planes import rigid_in_space
+from kedfem.scene.wording import shown
+
+Told = tuple[str, Facts, Mapping[str, str]]
+"""Section, factors and words of a part of a scene."""
+
+
+def combination_faults(parts: Parts) -> Iterator[str]:
+    """All combinations of the scene that the table of capabilities refuses."""
+    common = common_facts(parts)
+    for told in (joints, drives, gears, elements, analysis, links, loads):
+        for of, facts, words in told(parts):
+            for refusal in refusals(of, {**common, **facts}):
+                yield refusal.said(words)
+
+
+def frames_of(parts: Parts, link: Entry | None = None) -> str:
+    """Frames of a link, or of the analysis, as given or left open."""
+    own = None if link is None else link.word("frames")
+    return own or parts.analysis.word("frames") or default_frames(parts.driven)
+
+
+def any_following(parts: Parts) -> bool:
+    """Whether any link has frames that follow it."""
+    return any(frames_of(parts, link) == "following" for link in parts.links.values())
+
+
+def common_facts(parts: Parts) -> dict[str, str]:
+    """What the whole scene says."""
+    record = parts.analysis.record
+    return {
+        "frames": "following" if any_following(parts) else "nominal",
+        "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
+        "drive": "given" if parts.driven else "none",
+        "rho_inf": "1" if record is not None and record.rho_inf == 1.0 else "below 1",
+        "solver": parts.analysis.word("solver") or "condensed",
+    }
+
+
+def joints(parts: Parts) -> Iterator[Told]:
+    """Good joints: how each is enforced, and what it joins."""
+    moving = {joint.name for joint in moving_joints(parts)}
+    for joint in parts.joints.values():
+        kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
+        facts = {"joint": kind, "partners": partners(parts, held)}
+        words = {"where": place(joint.where), "kind": kind, "key": "kind", "names": named(held)}
+        if joint.record is None:
+            yield "joints", facts, words
+            continue
+        facts["enforced"] = CONSTRAINED if joint.name in moving else SHARED
+        driven = "driven " if joint.name in parts.driven_joints else ""
+        words["noun"] = f"a {driven}{kind} joint"
+        if joint.record.bushing is not None:
+            words |= {"key": "bushing", "noun": "one"}
+            turns = joint.record.bushing.turning_stiffness is not None
+            facts["bushing"] = "against turns" if turns else "given"
+        yield "joints", facts, words
+
+
+def partners(parts: Parts, held: list[Entry]) -> str:
+    """What a joint joins, as far as the table asks for it."""
+    kinds = {NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS}
+    if NOUNS["plane"] in kinds and len(kinds) == 2:
+        return MIXED
+    beside = NOUNS["plane"] in kinds and any(rigid_in_space(parts, link) for link in held)
+    return BESIDE if beside else ""
+
+
+def named(held: list[Entry]) -> str:
+    """Links with what they are."""
+    return " and ".join(f"{link.name!r}, a {NOUNS.get(fidelity(link), 'rigid link')}" for link in held)
+
+
+def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, str]]:
+    """What a drive, gear, motor or spring is on."""
+    joint = parts.joints.get(name or "")
+    if joint is None:
+        return {}, {}
+    kind, between = str(joint.word("kind")), GROUND not in link_names(joint)
+    facts = {"joint": kind, "slide": "between links" if between else "on the ground"}
+    return facts, {"name": joint.name, "kind": kind}
+
+
+def drives(parts: Parts) -> Iterator[Told]:
+    """Drives and their shafts."""
+    for drive in parts.all_drives:
+        facts, words = on_joint(parts, drive.word("joint"))
+        shaft = "given" if drive.has("shaft_stiffness") else "none"
+        yield "drives", {**facts, "shaft": shaft}, {**words, "where": place(drive.where)}
+
+
+def gears(parts: Parts) -> Iterator[Told]:
+    """Gears as a whole, and their joints."""
+    for gear in parts.gears.values():
+        yield "gears", {}, {"where": place(gear.where)}
+        names = gear.raw.get("joints")
+        if not isinstance(names, (list, tuple)) or len(names) != 2:
+            continue
+        for i, name in enumerate(names):
+            facts, words = on_joint(parts, name if isinstance(name, str) else None)
+            element = "rack" if gear.has("radius") and i == 1 else "gear"
+            where = place((*gear.where, "joints", i))
+            yield "gears", {**facts, "element": element, "stiffening": ""}, {**words, "where": where}
+
+
+def elements(parts: Parts) -> Iterator[Told]:
+    """Motors, and springs on joints."""
+    for motor in parts.motors.values():
+        facts, words = on_joint(parts, motor.word("joint"))
+        element = next((key for key in ("torque", "force") if motor.has(key)), "")
+        yield "motors", {**facts, "element": element}, {**words, "where": place(motor.where)}
+    for spring in parts.springs.values():
+        facts, words = on_joint(parts, spring.word("joint"))
+        element = "torsion" if spring.word("kind") == "torsion" else "along"
+        yield "springs", {**facts, "element": element}, {**words, "where": place(spring.where)}
+
+
+def analysis(parts: Parts) -> Iterator[Told]:
+    """The analysis with its start and times, and damping."""
+    entry, damping = parts.analysis, parts.damping
+    words = {"where": place(entry.where)}
+    if given := [*parts.motors, *parts.springs]:
+        yield "analysis", {"element": "motor or spring", "frames": ""}, {**words, "elements": shown(given)}
+    yield "analysis", {"drive": ""}, words
+    if entry.word("frames"):
+        yield "analysis", only(frames=str(entry.word("frames"))), words
+    if entry.word("initial"):
+        yield "analysis", only(start=str(entry.word("initial"))), words
+    for key in ("turns", "steps_per_turn"):
+        if entry.has(key):
+            yield "analysis", only(time=key), words
+    for key in ("initial_speeds", "initial_motions"):
+        speeds = entry.raw.get(key)
+        if isinstance(speeds, Mapping) and speeds and parts.links:
+            facts = {"start": key, "stiffening": "", "solver": "", "drive": ""}
+            yield "analysis", facts, {**words, "given": shown(list(speeds))}
+    alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
+    if alpha:
+        words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
+        words["key"] = "ratio" if damping.has("ratio") else "alpha"
+        yield "damping", {"damping": "in proportion to mass"}, words
+
+
+def only(**facts: str) -> dict[str, str]:
+    """Factors of one key of the analysis, beside which those of others were told already."""
+    return {"frames": "", "stiffening": "", "solver": "", **facts}
+
+
+def links(parts: Parts) -> Iterator[Told]:
+    """Links with frames of their own."""
+    for link in parts.links.values():
+        if link.word("frames") and not slider(link):
+            yield "links", {"frames": str(link.word("frames"))}, {"where": place(link.where)}
+
+
+def loads(parts: Parts) -> Iterator[Told]:
+    """Loads on kinds of links, and their factors."""
+    for load in parts.loads.values():
+        link = parts.links.get(load.word("link") or "")
+        if link is None:
+            continue
+        kind = "slider" if slider(link) else fidelity(link)
+        facts = {"element": str(load.word("kind")), "link": kind}
+        words = {"where": place(load.where), "name": link.name, "noun": fidelity(link)}
+        yield "loads", {**facts, "factor": load.word("factor", "over") or ""}, words
+
+
+def slider(link: Entry) -> bool:
+    """Whether a link is rigid and has no shape."""
+    return fidelity(link) == "rigid" and not link.has("shape")

@@ -1,0 +1,170 @@
+"""The table of capabilities: its page, a scene for each line, and each joint with all frames as its page says."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from kedfem.errors import SceneError
+from kedfem.scene import capabilities, scene_from
+from kedfem.scene.capabilities import KINDS, REFUSALS, Refusal, refusals
+from kedfem.scene.capability_page import COLUMNS, JOINTS, capabilities_page
+from tests.moving import bar, driven_slide, inverted, turning
+from tests.partners import chain
+from tests.rooms.test_bad_scenes import BASES, changed
+
+Raw = dict[str, Any]
+AT = {"at": [0.1, 0]}
+
+
+def test_the_page_is_the_table() -> None:
+    page = Path(__file__).parents[2] / "docs" / "capabilities.md"
+    said = "python -m kedfem.scene.capability_page > docs/capabilities.md"
+    assert page.read_text("utf-8") == capabilities_page(), said
+
+
+def faults(raw: Raw) -> list[str]:
+    try:
+        scene_from(raw)
+    except SceneError as error:
+        return error.faults
+    return []
+
+
+def as_said(refusal: Refusal, fault: str) -> bool:
+    """Whether a fault is in the words of a line, whatever scene it is about."""
+    text = refusal.said(_Any())
+    return re.fullmatch(".+".join(map(re.escape, text.split("\0"))), fault) is not None
+
+
+class _Any(dict[str, str]):
+    def __missing__(self, key: str) -> Any:
+        return _Word()
+
+
+class _Word(str):
+    def __new__(cls) -> "_Word":
+        return super().__new__(cls, "\0")
+
+    def __repr__(self) -> str:
+        return "\0"
+
+
+def slid(kind: str, **more: Any) -> Raw:
+    """A crank and an arm with a block or a pin that slides on it."""
+    return {**inverted(kind=kind), **more}
+
+
+def bare(**load: Any) -> Raw:
+    """A load on a slider without a shape."""
+    return changed(BASES["beam"], {"loads/l": {"link": "shoe", **load}})
+
+
+def planar(kind: str, other: str) -> Raw:
+    """A plane link joined to a solid or rigid one between hinges."""
+    links = {"a": bar("beam", (0, 0), (0.1, 0), 1), "b": bar("plane", (0.1, 0), (0.3, 0)),
+             "c": bar(other, (0.3, 0), (0.5, 0))}  # fmt: skip
+    joints = {
+        "A": {"kind": "revolute", "links": ["ground", "a"], "at": [0, 0]},
+        "B": {"kind": "revolute", "links": ["a", "b"], "at": [0.1, 0]},
+        "C": {
+            "kind": kind,
+            "links": ["b", "c"],
+            "at": [0.3, 0],
+            **({"axis": "x"} if kind == "prismatic" else {}),
+        },
+    }
+    return {"links": links, "joints": joints, "drive": turning(), "analysis": {"end_time": 0.1, "step": 1e-3}}
+
+
+def bushed() -> Raw:
+    raw = chain("spherical", ("beam", "beam"))
+    raw["joints"]["J"]["bushing"] = {"stiffness": 1e6, "turning_stiffness": 1e3}
+    return raw
+
+
+def shafted() -> Raw:
+    raw = driven_slide()
+    raw["drive"]["shaft_stiffness"] = 1.0
+    return raw
+
+
+def driven(kind: str) -> Raw:
+    raw = chain(kind, ("beam", "beam"))
+    raw["drive"] |= {"joint": "J"}
+    return raw
+
+
+BOTH = {
+    "a": {"kind": "torsion", "joint": "S", "stiffness": 1.0},
+    "b": {"kind": "spring", "joint": "A", "stiffness": 1.0},
+}
+SCENES: list[Raw] = [
+    slid("slot", analysis={**inverted()["analysis"], "frames": "following"}),
+    slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "rho_inf": 1.0}),
+    slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "frames": "following"}),
+    slid("prismatic", analysis={**inverted()["analysis"], "solver": "literal", "frames": "following"}),
+    slid("prismatic", springs=BOTH, motors={"m": {"joint": "S", "torque": 1.0}, "n": {"joint": "A", "force": 1.0}}),
+    slid("prismatic", motors={"n": {"joint": "S", "force": 1.0}},
+         springs={"s": {"kind": "spring", "joint": "S", "stiffness": 1.0}},
+         gears={"g": {"joints": ["A", "S"], "ratio": 2}, "r": {"joints": ["A", "B"], "radius": 0.1}},
+         analysis={**inverted()["analysis"], "stiffening": True,
+                   "initial_speeds": {"B": 1.0}, "initial_motions": {"arm": {**AT, "velocity": [0, 1]}}}),
+    bushed(), shafted(), driven("spherical"), planar("weld", "solid"), planar("prismatic", "solid"),
+    planar("weld", "rigid"),
+    bare(kind="torque", at=[1, 0], vector=[0, 0, 1]), bare(kind="body", force_density=[0, 1]),
+    bare(kind="surface", at=[1, 0], axis="x", force=[0, 1]), bare(kind="pressure", at=[1, 0], axis="x", pressure=5),
+    changed(BASES["free"], {
+        "analysis/frames": "nominal", "links/arm/frames": "nominal", "analysis/initial": "quasi-static",
+        "analysis/turns": 1, "analysis/steps_per_turn": 10, "damping": {"alpha": 1.0, "beta": 1e-5},
+        "loads/p": {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 1],
+                    "factor": {"over": "angle", "at": [0], "value": [1]}},
+    }),
+]  # fmt: skip
+
+
+def test_every_line_of_the_table_refuses_a_scene_in_its_own_words() -> None:
+    """But those of models, which their parts tell when they are meshed."""
+    said = [fault for raw in SCENES for fault in faults(raw)]
+    silent = [each for each in REFUSALS if each.of != "model" and not any(as_said(each, x) for x in said)]
+    assert not silent, [each.must for each in silent]
+
+
+@pytest.mark.parametrize("column", COLUMNS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_joint_stands_with_frames_as_its_page_says(kind: str, column: str) -> None:
+    """Between two beams that move: refused in the words of each line that it meets, and for nothing else."""
+    facts, raw = COLUMNS[column], chain(kind, ("beam", "beam"))
+    raw["analysis"] |= {
+        "initial": "rest",
+        "frames": facts["frames"],
+        "stiffening": facts["stiffening"] == "on",
+    }
+    if facts["drive"] == "none":
+        del raw["drive"]
+    met = list(refusals("joints", {**JOINTS[kind], **facts}))
+    found = [x for x in faults(raw) if x.startswith("joints.J.")]
+    assert all(any(as_said(each, x) for x in found) for each in met)
+    assert all(any(as_said(each, x) for each in met) for x in found), found
+
+
+def test_a_line_that_is_taken_out_refuses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To lift a refusal is to change one line: of slots with frames that follow."""
+    raw = slid("slot", analysis={**inverted()["analysis"], "frames": "following"})
+    assert any("must be another than slot" in fault for fault in faults(raw))
+    monkeypatch.setattr(capabilities, "REFUSALS", tuple(x for x in REFUSALS if x is not capabilities.SLOTS))
+    assert not faults(raw)
+
+
+def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> None:
+    (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "following"}))
+    assert said == (
+        'joints.S.kind: must be another than slot with frames = "following" (the pin of a slot slides as the nominal '
+        'motion tells), got a slot: take frames = "nominal", or a slide with a hinge'
+    )
+
+
+def test_bases_are_good() -> None:
+    assert not faults(tomllib.loads(BASES["beam"]))
