@@ -306,6 +306,16 @@ def _count(entries: int) -> str:
     return f"{entries} entr{'y' if entries == 1 else 'ies'}"
 
 
+@app.command(name="compile")
+def compile_() -> None:
+    """Compile what scenes need, once for this version; otherwise the first runs do."""
+    from kedfem.precompile import precompile
+
+    with _progress() as watch:
+        precompile(watch)
+    out.print("compiled")
+
+
 @app.command()
 def bench(
     what: Annotated[
@@ -348,16 +358,27 @@ class _progress:  # noqa: N801
             TimeRemainingColumn,
         )
 
+        from kedfem.compiled import compiling
+
         columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
         self._bars = Progress(
             *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True
         )
+        self._compiling = compiling(self._compiles)
+        self._compiling.__enter__()
         self._bars.start()
         self._stage, self._task = "", None
         return self._watch
 
     def __exit__(self, *_: object) -> None:
         self._bars.stop()
+        self._compiling.__exit__(None, None, None)
+
+    def _compiles(self, begins: bool) -> None:
+        if begins:
+            self._once = self._bars.add_task("compiling, once for this version of kedfem", total=None)
+        else:
+            self._bars.remove_task(self._once)
 
     def _watch(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
@@ -369,6 +390,7 @@ class _progress:  # noqa: N801
 
     _stage: str
     _task: Any
+    _once: Any
 
 
 def _version(file: Path) -> tuple[int, int] | None:

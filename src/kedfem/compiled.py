@@ -2,16 +2,23 @@
 
 numba compiles a function again when its own file has changed, but not when one that it calls in another file has, nor a
 constant there. So what it compiled is kept in a folder named after all `*kernel.py` files together, what they import of
-kedfem, and this file with its options. Imported by these files only: numba takes a while to load.
+kedfem, and this file with its options: in the user's cache folder, so that a read-only installation compiles once too, or
+beside the package where that cannot be used. Numba takes a while to load: imported by kernels, and where users are told
+that it compiles.
 """
 
 import os
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
+
+from kedfem.folders import KERNELS, compiled_folder
 
 ROOT = Path(__file__).parent
 
@@ -22,7 +29,7 @@ def kernel_folder(root: Path) -> Path:
     kernels = set(root.rglob("*kernel.py"))
     for file in sorted(kernels | {each for kernel in kernels for each in _imported(kernel, root)}):
         digest.update(file.read_bytes())
-    return root / "__pycache__" / f"kernels-{digest.hexdigest()[:16]}"
+    return (compiled_folder() or root / "__pycache__" / KERNELS) / digest.hexdigest()[:16]
 
 
 def _imported(kernel: Path, root: Path) -> set[Path]:
@@ -31,6 +38,30 @@ def _imported(kernel: Path, root: Path) -> set[Path]:
     files = (root / Path(*name.split(".")) for name in names)
     found = (file for path in files for file in (path.with_suffix(".py"), path / "__init__.py"))
     return {file for file in found if file.is_file()}
+
+
+@contextmanager
+def compiling(told: Callable[[bool], None]) -> Iterator[None]:
+    """Tell when numba begins to compile, by True, and when it ends, by False; loading compiled code is not told."""
+    with event.install_listener("numba:compile", _Compiling(told)):
+        yield
+
+
+class _Compiling(event.Listener):
+    """Told of each function; those that a function calls are compiled within it."""
+
+    def __init__(self, told: Callable[[bool], None]) -> None:
+        self.told, self.depth = told, 0
+
+    def on_start(self, _: object) -> None:
+        self.depth += 1
+        if self.depth == 1:
+            self.told(True)
+
+    def on_end(self, _: object) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            self.told(False)
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):

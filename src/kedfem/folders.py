@@ -3,12 +3,22 @@
 import os
 from pathlib import Path
 
+KERNELS = "kernels"
+"""Compiled code, in the cache folder."""
+
 
 def cache_folder() -> Path | None:
     """Where entries are kept; None if nowhere, if the folder cannot be made, or if others could put entries there."""
     folder = named_cache()
-    if folder is None:
-        return None
+    return None if folder is None else _usable(folder)
+
+
+def compiled_folder() -> Path | None:
+    """Where compiled code is kept, also while KEDFEM_CACHE is off; None if it cannot be there, see `cache_folder`."""
+    return _usable((named_cache() or _users()) / KERNELS)
+
+
+def _usable(folder: Path) -> Path | None:
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return folder if private(folder) else None
@@ -21,9 +31,13 @@ def named_cache() -> Path | None:
     given = os.environ.get("KEDFEM_CACHE")
     if given in {"", "off"}:
         return None
+    return Path(given) if given else _users()
+
+
+def _users() -> Path:
     from platformdirs import user_cache_path
 
-    return Path(given) if given else user_cache_path("kedfem")
+    return user_cache_path("kedfem")
 
 
 def private(path: Path) -> bool:

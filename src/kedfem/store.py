@@ -18,7 +18,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any, TypeVar
 
-from kedfem.folders import cache_folder, private
+from kedfem.folders import KERNELS, cache_folder, private
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")
 MOST = 1_000_000_000  # bytes that the cache may take
@@ -60,8 +60,9 @@ def itself(x: T) -> T:
 
 
 def entries(folder: Path) -> Iterator[Path]:
-    """All entries of a cache folder, also what killed runs left of unfinished ones."""
-    return (path for path in folder.glob("*/*") if path.suffix in {SUFFIX, ".part"} and path.is_file())
+    """All entries of a cache folder, compiled code, and what killed runs left of unfinished ones."""
+    found = (*folder.glob("*/*"), *folder.glob(f"{KERNELS}/*/*/*"))
+    return (path for path in found if path.suffix in {SUFFIX, ".part", ".nbi", ".nbc"} and path.is_file())
 
 
 def clear(folder: Path) -> int:

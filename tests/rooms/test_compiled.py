@@ -1,6 +1,9 @@
 """Compiled loops are kept for one state of all kernels together."""
 
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,26 @@ import pytest
 pytest.importorskip("numba")
 
 from kedfem import compiled
+from kedfem.store import entries
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = "rssr", "four_bar_following", "motor_four_bar", "spinning_bar"
+BEFOREHAND = """
+import sys
+from kedfem.analysis import analyse
+from kedfem.compiled import compiling
+from kedfem.dynamics.system.step_kernel import marched
+from kedfem.precompile import precompile
+from kedfem.scene import read_scene
+precompile(lambda *_: None)
+assert len(marched.signatures) == 1, marched.signatures
+told = []
+with compiling(told.append):
+    for scene in sys.argv[1:]:
+        read = read_scene(scene)
+        analyse(read.model_copy(update={"analysis": read.analysis.model_copy(update={"accuracy": "quick"})}))
+assert not told
+"""
 
 
 def test_a_change_in_any_kernel_begins_a_new_folder(tmp_path: Path) -> None:
@@ -50,3 +73,41 @@ def test_what_is_compiled_goes_there() -> None:
     from kedfem.dynamics.kernel import times
 
     assert Path(times.stats.cache_path).is_relative_to(compiled.kernel_folder(compiled.ROOT))
+
+
+def test_it_is_kept_for_the_user_even_where_the_cache_is_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+    assert compiled.kernel_folder(compiled.ROOT).is_relative_to(tmp_path)
+    monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "named"))
+    assert compiled.kernel_folder(compiled.ROOT).is_relative_to(tmp_path / "named" / "kernels")
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "file"))
+    assert compiled.kernel_folder(compiled.ROOT).is_relative_to(compiled.ROOT / "__pycache__")
+
+
+def test_it_counts_among_what_the_cache_holds(tmp_path: Path) -> None:
+    code = tmp_path / "kernels" / "0123" / "room_4567" / "loop_kernel.nbi"
+    code.parent.mkdir(parents=True)
+    code.touch()
+    assert list(entries(tmp_path)) == [code]
+
+
+def test_the_user_is_told_while_it_compiles() -> None:
+    import numba
+
+    inner = numba.njit(lambda x: x + 1)
+    told: list[bool] = []
+    with compiled.compiling(told.append):
+        outer = numba.njit(lambda x: inner(x) + inner(2.0))
+        assert outer(1.0) == 5.0
+        assert outer(3.0) == 7.0
+    assert told == [True, False]
+
+
+@pytest.mark.long
+def test_after_compiling_beforehand_no_scene_compiles_anything(tmp_path: Path) -> None:
+    scenes = [shutil.copytree(ROOT / "examples" / each, tmp_path / each) / "scene.toml" for each in EXAMPLES]
+    subprocess.run([sys.executable, "-c", BEFOREHAND, *scenes], check=True, timeout=600)

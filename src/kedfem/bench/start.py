@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from kedfem.bench.machine import Watch, markdown, seconds, write_page
+from kedfem.compiled import ROOT, kernel_folder
 
 COMMANDS = {"kedfem --help": ["--help"], "kedfem --version": ["--version"]}
 TURNS = """
@@ -42,7 +43,8 @@ def bench_start(folder: Path, quick: bool, watch: Watch) -> str:
 def _ten_turns(repeats: int) -> list[tuple[str, str]]:
     """The whole run, first with an empty cache, then with what that left."""
     with TemporaryDirectory() as folder:
-        environment = os.environ | {"KEDFEM_CACHE": f"{folder}/cache"}
+        kept = {"KEDFEM_CACHE": f"{folder}/cache", "NUMBA_CACHE_DIR": str(kernel_folder(ROOT))}
+        environment = os.environ | kept
         command = [sys.executable, "-c", TURNS, f"{folder}/results"]
         run = partial(subprocess.run, command, capture_output=True, check=True, env=environment)
         cold, warm = seconds(run, 1), seconds(run, repeats)

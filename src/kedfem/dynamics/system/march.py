@@ -96,12 +96,10 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         loads = [applied(link, each, motion, body) for link, each, body in every]
     F = [work_over_time(part, x).reshape(len(motion.t), -1) for part, x in zip(of.parts, loads, strict=True)]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
-    drives = np.ascontiguousarray(drives)
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
-    return Driving(
-        motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), weights
-    )
+    rows = motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), weights
+    return Driving(*(np.ascontiguousarray(x) for x in rows))  # other strides would be compiled for anew
 
 
 def march(
