@@ -119,7 +119,7 @@ def test_parts_of_the_catalogue_are_meshed(name: str, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_hexahedra_at_any_price_are_gmshs_subdivision(tmp_path: Path) -> None:
     with empty_model() as occ:
-        occ.addSphere(0, 0, 0, 10)
+        occ.intersect([(3, occ.addSphere(0, 0, 0, 10))], [(3, occ.addBox(0, 0, 0, 20, 20, 20))])
         occ.synchronize()
         write_step(tmp_path / "ball.step", ["ball"])
     shape = {"kind": "cad", "file": "ball.step"}

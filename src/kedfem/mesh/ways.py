@@ -21,6 +21,7 @@ from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedro
 from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.revolved import revolved_mesh
 from kedfem.mesh.tetrahedra import FORMS
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
@@ -37,7 +38,7 @@ Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
 NOTHING: KeptWhole = ((), ())
 
-SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh)
+SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh, revolved_mesh)
 #: What is tried in turn, by `mesh.kind` and element.
 WAYS: dict[str | None, tuple[Way, ...]] = {
     None: (*SWEEPS, swept_without_blends, filled_mesh),
@@ -187,7 +188,7 @@ def best_mesh(
             continue
         least = mesh_quality(form(mesh)).least
         many = sizing.size is None and sizing.across <= 2 and 3 * len(form(mesh).points) > MOST
-        told = [mesh.way, *reasons[:1]]  # the first says what is in the way, of layers
+        told = [mesh.way, *reasons[: way not in SWEEPS]]  # the first says what is in the way, of layers
         if mesh.tetrahedra or (least >= ENOUGH and not many):
             return replace(mesh, way="; ".join(told))
         found.append((least - many, replace(mesh, way="; ".join(told))))  # many: behind all others

@@ -51,6 +51,11 @@ class Solid:
         return float(np.linalg.norm(self.high - self.low))
 
     @property
+    def middle(self) -> Float[np.ndarray, "3"]:
+        """Middle of the box [m]."""
+        return np.asarray((self.low + self.high) / 2)
+
+    @property
     def area(self) -> float:
         """Area of all faces [m²]."""
         return sum(face.area for face in self.faces)

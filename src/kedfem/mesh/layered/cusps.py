@@ -74,10 +74,10 @@ def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
         if done is None:
             break
         plan, lost = done[0], lost + done[1]
-    return _without_spare_curves(plan), lost
+    return without_spare_curves(plan), lost
 
 
-def _without_spare_curves(plan: Plan) -> Plan:
+def without_spare_curves(plan: Plan) -> Plan:
     """The plan with curves left out that no region has."""
     used = sorted({i for region in plan.regions for loop in region.loops for i, _ in loop})
     regions = tuple(

@@ -84,7 +84,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
             break
     if best is None:
         raise OtherWayError(refusals[0])
-    return _not_too_bad(solid, best[1])
+    return not_too_bad(solid, best[1])
 
 
 def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "3"], ...]:
@@ -200,12 +200,12 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
     return f"{kind}{comma} swept along {direction_in_words(direction)} through {through}{by}"
 
 
-def _not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
+def not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
     """The mesh itself, unless another way may do better."""
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:
         raise OtherWayError(
-            f"{solid.name}: layers must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
+            f"{solid.name}: a sweep must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
             f"at {in_mm(quality.centre)}"
         )
     return mesh

@@ -1,7 +1,7 @@
 """The plan of a solid made of layers: a partition of the plane, each region with the slabs that it has material in."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -85,6 +85,8 @@ class Plan:
         Where the slabs begin and end along the direction.
     curves : tuple of Curve
     regions : tuple of Region
+    origin : (3,) [m]
+        Where the plan's lengths begin, in the solid's components.
     """
 
     axes: Float[np.ndarray, "3 3"]
@@ -92,6 +94,7 @@ class Plan:
     heights: Float[np.ndarray, " h"]
     curves: tuple[Curve, ...]
     regions: tuple[Region, ...]
+    origin: Float[np.ndarray, "3"] = field(default_factory=lambda: np.zeros(3))
 
     @property
     def volume(self) -> float:
@@ -111,7 +114,7 @@ class Plan:
 
     def in_space(self, point: Float[np.ndarray, "2"], height: float) -> Float[np.ndarray, "3"]:
         """A point of the plan at a height, where it is in the solid [m]."""
-        return np.asarray(self.extent * (np.array([*point, height]) @ self.axes))
+        return np.asarray(self.origin + self.extent * (np.array([*point, height]) @ self.axes))
 
 
 def loop_samples(curves: tuple[Curve, ...], loop: Loop) -> Float[np.ndarray, "_ 2"]:

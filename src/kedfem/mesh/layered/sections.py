@@ -63,7 +63,7 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
                 f"{solid.name}: its layers must have sections across {axes[2].round(6).tolist()}, "
                 f"got none from OpenCASCADE: {error}"
             ) from error
-        _check_volume(solid, plan)
+        check_volume(solid, plan)
         yield plan
 
 
@@ -73,8 +73,8 @@ def _cut_plan(
     """The plan of the only solid in gmsh's model, which is of unit extent."""
     [(_, solid)] = gmsh.model.getEntities(3)
     middles = (heights[1:] + heights[:-1]) / 2
-    faces = [_section(gmsh, int(solid), axes, height) for height in middles]
-    return _laid_over(gmsh, faces, axes, extent, heights)
+    faces = [_slab_section(gmsh, int(solid), axes, height) for height in middles]
+    return laid_over(gmsh, faces, axes, extent, heights)
 
 
 def plan_axes(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -102,7 +102,7 @@ def _slab_heights(
     return np.asarray(ordered[np.append(True, np.diff(ordered) > _SAME)])
 
 
-def _section(
+def _slab_section(
     gmsh: ModuleType, solid: int, axes: Float[np.ndarray, "3 3"], height: float
 ) -> list[tuple[int, int]]:
     """The faces in which a plane cuts the solid, moved along its normal to height 0."""
@@ -110,15 +110,22 @@ def _section(
     low, high = np.reshape(occ.getBoundingBox(3, solid), (2, 3))
     centre = (low + high) / 2 @ axes[:2].T
     corners = [np.array([*(centre + sign), height]) @ axes for sign in ([-1, -1], [1, -1], [1, 1], [-1, 1])]
+    cut = section(gmsh, solid, np.array(corners))
+    occ.translate(cut, *(-height * axes[2]))
+    return cut
+
+
+def section(gmsh: ModuleType, solid: int, corners: Float[np.ndarray, "4 3"]) -> list[tuple[int, int]]:
+    """The faces in which a plane rectangle cuts the solid."""
+    occ = gmsh.model.occ
     points = [occ.addPoint(*corner) for corner in corners]
     lines = [occ.addLine(points[i - 1], points[i]) for i in range(4)]
     sheet = occ.addPlaneSurface([occ.addCurveLoop(lines)])
     cut, _ = occ.intersect([(3, solid)], [(2, sheet)], removeObject=False)
-    occ.translate(cut, *(-height * axes[2]))
     return [(dim, tag) for dim, tag in cut if dim == 2]
 
 
-def _laid_over(
+def laid_over(
     gmsh: ModuleType,
     sections: list[list[tuple[int, int]]],
     axes: Float[np.ndarray, "3 3"],
@@ -273,10 +280,8 @@ def _oriented(curves: tuple[Curve, ...], loops: list[Loop]) -> tuple[Loop, ...]:
     )
 
 
-def _check_volume(solid: Solid, plan: Plan) -> None:
+def check_volume(solid: Solid, plan: Plan) -> None:
     """Refuses sections that do not make up the solid."""
     share = plan.volume * plan.extent**3 / solid.volume
     if abs(share - 1) > _LOST:
-        raise OtherWayError(
-            f"{solid.name}: sections of its layers must fill its volume, got {share:.6g} of it"
-        )
+        raise OtherWayError(f"{solid.name}: its sections, swept, must fill its volume, got {share:.6g} of it")

@@ -1,0 +1,123 @@
+"""The core of a solid of revolution about its own axis: a disc of quadrilaterals, carried along; no wedges."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.mesh.choice import best_quads
+from kedfem.mesh.hexahedra import SolidMesh, stacked
+from kedfem.mesh.layered.fills import Rim, mapped
+from kedfem.mesh.layered.mapping import Mapping
+from kedfem.mesh.layered.partition import Curve, Plan, Region
+from kedfem.mesh.plane import quadratic_quads
+
+NEAR = 1e-7  # of the solid's size: that near to the axis is on it, that near to each other is one
+_SHARE = 0.6  # of the least radius of anything off the axis: the core's own
+_HALVINGS = 50
+
+Curves = dict[int, Curve]
+Ending = Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, " n"]]
+
+
+def core_radius(plan: Plan) -> float:
+    """Radius of a core in which each end is one smooth face across the axis; 0 where nothing touches the axis.
+
+    Parameters
+    ----------
+    plan : Plan
+        The meridian section: x along the axis, y from it.
+    """
+    least, touches = np.inf, False
+    for radii in (curve.samples[:, 1] for curve in plan.curves):
+        if radii.max() < NEAR:
+            touches = True
+            continue
+        from_axis = [way for way in (radii, radii[::-1]) if way[0] < NEAR]
+        rising = [np.append(np.diff(way) > 0, False) for way in from_axis]
+        least = min([least, *(float(way[np.argmin(up)]) for way, up in zip(from_axis, rising, strict=True))])
+        if not from_axis:
+            least = min(least, float(radii.min()))
+    return _SHARE * least if touches else 0.0
+
+
+def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]:
+    """quad9 cells of the unit disc, so many sides around it, the first corner at angle 0.
+
+    Parameters
+    ----------
+    around : int
+        A multiple of 4: a square of cells inside rings of them.
+    """
+    angles = np.arange(2 * around) * np.pi / around
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    rim = Rim(circle[::2], ((np.append(np.arange(around), 0),),), circle[1::2])
+    best = best_quads([mapped(rim, Mapping("disc"))], first_good=True)
+    if best is None:
+        raise ValueError("a disc must have a mesh")
+    full = quadratic_quads(best.corners)
+    return full.points, full.cells
+
+
+def core_mesh(
+    plan: Plan, region: Region, radius: float, stations: Float[np.ndarray, " s"], around: int
+) -> SolidMesh:
+    """hex27 mesh of what a region about the axis becomes when it turns: x along the axis, y and z across it.
+
+    Parameters
+    ----------
+    plan : Plan
+        The meridian section, within its context.
+    region : Region
+        The part between the axis and the core's radius, from one end to the other.
+    radius : float [-]
+        The core's, by the solid's extent.
+    stations : (s,) [-]
+        Places along x of the nodes on the core's surface, two to an element and one more, rising.
+    around : int
+        Elements around it.
+
+    Returns
+    -------
+    SolidMesh
+        By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
+    """
+    points, quads = disc(around)
+    low, high = _ends(plan, region)
+    layers = len(stations) // 2
+    shares = (stations - stations[0]) / (stations[-1] - stations[0])
+    mesh = stacked(points, shares, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))
+    radii, back = np.unique(np.round(np.linalg.norm(points, axis=1), 12), return_inverse=True)
+    first, last = (np.tile(end(radius * radii)[back], len(shares)) for end in (low, high))
+    share = mesh.points[:, 2]
+    along = (1 - share) * first + share * last
+    return SolidMesh(np.column_stack([along, radius * mesh.points[:, :2]]), mesh.cells)
+
+
+def _ends(plan: Plan, region: Region) -> list[Ending]:
+    """Where along x both ends of a core are, over the radius, that with the least x first."""
+    (loop,) = region.loops
+    ends = []
+    for i, _ in loop:
+        radii = plan.curves[i].samples[[0, -1], 1]
+        if radii.min() < NEAR < radii.max():
+            ends.append(plan.curves[i])
+    if len(ends) != 2:
+        raise ValueError("a core must have two ends")
+    ends.sort(key=lambda curve: float(curve.samples[:, 0].mean()))
+    return [_along(curve) for curve in ends]
+
+
+def _along(curve: Curve) -> Ending:
+    """x of a curve that rises from the axis, at radii: halved between its two ends."""
+    rises = curve.samples[0, 1] < curve.samples[-1, 1]
+
+    def at(radii: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        low, high = np.zeros(len(radii)), np.full(len(radii), curve.length)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            beyond = (curve.places(middle)[:, 1] > radii) == rises
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return np.asarray(curve.places((low + high) / 2)[:, 0])
+
+    return at

@@ -1,0 +1,249 @@
+"""Solids of revolution, whole or in part: the meridian section meshed with quadrilaterals and swept about the axis."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import KDTree
+
+from kedfem.errors import KedfemError
+from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.words import direction_in_words
+from kedfem.mesh.core import NEAR, core_mesh, core_radius
+from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.layered.cusps import without_spare_curves
+from kedfem.mesh.layered.division import plan_size
+from kedfem.mesh.layered.layers import not_too_bad
+from kedfem.mesh.layered.partition import Plan, Region
+from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
+from kedfem.mesh.layered.sections import check_volume, laid_over, section
+from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.revolution import Revolution, revolution
+from kedfem.mesh.session import gmsh_copy
+
+_ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
+_FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for
+_RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
+_GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
+_SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
+_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser, as with tetrahedra
+_COARSER = (1.4, 2.0)  # times the size
+
+
+@dataclass(frozen=True, slots=True)
+class _Meridian:
+    """The plan of a meridian section: what is outside of the core, the parts inside, and the core's radius."""
+
+    outside: Plan
+    whole: Plan
+    inside: tuple[Region, ...]
+    radius: float
+    size: float
+
+
+def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+    """Hexahedra of a solid of revolution: pulleys, bushings, shafts, balls; and of a part of a turn, as an elbow.
+
+    Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles. What is
+    next to the axis is a core of its own, discs of quadrilaterals carried along it, as sections swept about a line in
+    them would have no angle there.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid in its current model, which is left as it is.
+    solid : Solid
+        The only solid in that model.
+    sizing : Sizing
+        How fine: the rule of layers, for the section; around the axis the same size at the mean radius, or 12 to 24
+        elements to a turn where none is asked for.
+
+    Returns
+    -------
+    SolidMesh
+        27-node elements, the nodes of the surface on the solid's own faces.
+
+    Raises
+    ------
+    OtherWayError
+        The solid is not of revolution, with the face that is in the way, or gives elements of poor quality.
+    """
+    turn = revolution(gmsh, solid)
+    found: list[tuple[float, SolidMesh]] = []
+    refusals: list[str] = []
+    for share in _SHARES:
+        try:
+            mesh = _mesh_about(gmsh, solid, turn, sizing, share)
+        except KedfemError as error:
+            refusals.append(str(error))
+            continue
+        found.append((mesh_quality(mesh).least, mesh))
+        if found[-1][0] >= _GOOD:
+            return _cheaper(gmsh, solid, turn, sizing, mesh)
+    if not found:
+        raise OtherWayError(refusals[0])
+    return not_too_bad(solid, max(found, key=lambda each: each[0])[1])
+
+
+def _cheaper(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, mesh: SolidMesh) -> SolidMesh:
+    """The mesh, or a good one of larger elements where nobody asked for so many."""
+    for share in _COARSER if sizing.size is None and sizing.across <= 2 else ():
+        if 3 * len(mesh.points) <= _PLENTY:
+            break
+        try:
+            other = _mesh_about(gmsh, solid, turn, sizing, share)
+        except KedfemError:
+            continue
+        if len(other.points) < len(mesh.points) and mesh_quality(other).least >= _GOOD:
+            mesh = other
+    return mesh
+
+
+def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float) -> SolidMesh:
+    """The mesh swept about the axis, in the solid's place."""
+    with _meridian(gmsh, solid, turn, sizing, share) as meridian:
+        flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing.turn)
+        around = _elements_around(meridian, turn, sizing)
+        mesh = _turned(flat, turn, around)
+        for region in meridian.inside:
+            mesh = _with_core(mesh, flat, meridian, region, around)
+    words = "mapped blocks," if not flat.settings else "quadrilaterals"
+    degrees = f"{np.degrees(turn.angle):.4g}° in {around} elements"
+    by = f"; gmsh algorithm {', '.join(str(one) for one in flat.settings)}" if flat.settings else ""
+    return SolidMesh(
+        turn.origin + solid.extent * mesh.points @ turn.axes,
+        mesh.cells,
+        way=f"{words} swept about {direction_in_words(turn.axes[0])} through {degrees}{by}",
+    )
+
+
+@contextmanager
+def _meridian(
+    gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float
+) -> Iterator[_Meridian]:
+    """The meridian section in a copy of the model: x along the axis, y from it, in sizes of the solid."""
+    angle = _ASIDE if turn.full else turn.angle / 2
+    radial = np.array([0, np.cos(angle), np.sin(angle)]) @ turn.axes
+    axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
+    with gmsh_copy(gmsh, 1 / solid.extent) as copy:
+        try:
+            faces = _section(copy, solid, turn, axes)
+            whole = _plan(copy, solid, turn, axes, faces)
+            check_volume(solid, whole)
+            size = share * plan_size(whole, sizing)
+            radius = core_radius(whole)
+            if radius > 0 and not turn.full:
+                raise OtherWayError(f"{solid.name}: a part of a turn must keep off its axis")
+            if radius > 0:
+                whole = _plan(copy, solid, turn, axes, _cut(copy, faces, axes, radius))
+        except KedfemError:
+            raise
+        except Exception as error:  # gmsh raises nothing more special
+            raise OtherWayError(
+                f"{solid.name}: it must have a section through its axis, got none from OpenCASCADE: {error}"
+            ) from error
+        inside = tuple(region for region in whole.regions if _reach(whole, region) <= radius + NEAR)
+        outside = tuple(region for region in whole.regions if _reach(whole, region) > radius + NEAR)
+        yield _Meridian(without_spare_curves(replace(whole, regions=outside)), whole, inside, radius, size)
+
+
+def _section(
+    gmsh: ModuleType, solid: Solid, turn: Revolution, axes: Float[np.ndarray, "3 3"]
+) -> list[tuple[int, int]]:
+    """The faces in which half a plane through the axis cuts the solid, moved with the axis' point to the origin."""
+    [(_, tag)] = gmsh.model.getEntities(3)
+    middle = (solid.middle - turn.origin) @ turn.axes[0] / solid.extent
+    corners = np.array([[middle + x, y, 0] for x, y in ((-1, 0), (1, 0), (1, 1.5), (-1, 1.5))])
+    faces = section(gmsh, int(tag), turn.origin / solid.extent + corners @ axes)
+    gmsh.model.occ.translate(faces, *(-turn.origin / solid.extent))
+    return faces
+
+
+def _cut(
+    gmsh: ModuleType, faces: list[tuple[int, int]], axes: Float[np.ndarray, "3 3"], radius: float
+) -> list[tuple[int, int]]:
+    """The faces of a section divided along a line at a radius."""
+    occ = gmsh.model.occ
+    low, high = (
+        np.array([np.reshape(occ.getBoundingBox(*face), (2, 3)) @ axes[0] for face in faces]).reshape(-1, 2).T
+    )
+    ends = [min(low.min(), high.min()) - 1, max(low.max(), high.max()) + 1]
+    line = occ.addLine(*(occ.addPoint(*(np.array([x, radius, 0]) @ axes)) for x in ends))
+    pieces = occ.fragment(faces, [(1, line)])[1][: len(faces)]
+    return [piece for group in pieces for piece in group if piece[0] == 2]
+
+
+def _plan(
+    gmsh: ModuleType,
+    solid: Solid,
+    turn: Revolution,
+    axes: Float[np.ndarray, "3 3"],
+    faces: list[tuple[int, int]],
+) -> Plan:
+    """The plan of half a section; it is as thick as its mean point goes (Pappus)."""
+    occ = gmsh.model.occ
+    masses = np.array([occ.getMass(2, face) for _, face in faces])
+    radii = np.array([occ.getCenterOfMass(2, face) for _, face in faces]) @ axes[1]
+    path = turn.angle * float(masses @ radii / masses.sum())
+    plan = laid_over(gmsh, [faces], axes, solid.extent, np.array([0.0, path]))
+    return replace(plan, origin=turn.origin)
+
+
+def _reach(plan: Plan, region: Region) -> float:
+    """The largest radius of a region."""
+    return max(float(plan.curves[i].samples[:, 1].max()) for loop in region.loops for i, _ in loop)
+
+
+def _elements_around(meridian: _Meridian, turn: Revolution, sizing: Sizing) -> int:
+    """Elements around the axis, of a full turn four by four; where no size is asked for as many as bending needs."""
+    share = turn.angle / (2 * np.pi)
+    wanted = meridian.whole.heights[-1] / meridian.size
+    if sizing.size is None:
+        least = _FEWEST if meridian.inside else _RING
+        wanted = float(np.clip(wanted, share * least, share * _MOST) * sizing.across / 2)
+    wanted = max(wanted, turn.angle / sizing.turn, sizing.layers)
+    return 4 * max(2, round(wanted / 4)) if turn.full else max(2, int(np.ceil(wanted)))
+
+
+def _turned(flat: PlanMesh, turn: Revolution, around: int) -> SolidMesh:
+    """The section's cells swept through the angle: x along the axis, y and z across it, by the solid's extent."""
+    count = len(flat.points)
+    levels = np.arange(2 * around + 1.0)
+    quads = np.tile(flat.cells, (around, 1))
+    mesh = stacked(flat.points, levels, quads, np.repeat(np.arange(around), len(flat.cells)))
+    cells = mesh.cells % (2 * around * count) if turn.full else mesh.cells
+    x, r, level = mesh.points.T
+    angle = level * turn.angle / (2 * around)
+    turned = SolidMesh(np.stack([x, r * np.cos(angle), r * np.sin(angle)], axis=1), cells)
+    return without_spare_nodes(turned)
+
+
+def _with_core(
+    mesh: SolidMesh, flat: PlanMesh, meridian: _Meridian, region: Region, around: int
+) -> SolidMesh:
+    """The mesh with a core put in, the nodes between them taken once."""
+    loop = region.loops[0]
+    samples = np.concatenate([meridian.whole.curves[i].samples for i, _ in loop])
+    on = samples[samples[:, 1] > meridian.radius - NEAR, 0]
+    x, r = flat.points.T
+    nodes = (abs(r - meridian.radius) < NEAR) & (x > on.min() - NEAR) & (x < on.max() + NEAR)
+    core = core_mesh(meridian.whole, region, meridian.radius, np.sort(x[nodes]), around)
+    distance, nearest = KDTree(mesh.points).query(core.points)
+    shared = distance < NEAR
+    number = np.empty(len(core.points), dtype=np.int64)
+    number[shared] = nearest[shared]
+    number[~shared] = len(mesh.points) + np.arange((~shared).sum())
+    _check_shared(shared, core, meridian, int(nodes.sum()) * 2 * around)
+    return SolidMesh(
+        np.concatenate([mesh.points, core.points[~shared]]), np.concatenate([mesh.cells, number[core.cells]])
+    )
+
+
+def _check_shared(shared: Bool[np.ndarray, " n"], core: SolidMesh, meridian: _Meridian, wanted: int) -> None:
+    """Refuse a core that does not fit what is around it."""
+    outer = np.linalg.norm(core.points[:, 1:], axis=1) > meridian.radius - NEAR
+    if shared.sum() != wanted or not np.array_equal(shared, outer):
+        raise OtherWayError(f"the core must share {wanted} nodes, got {shared.sum()}")

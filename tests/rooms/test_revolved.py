@@ -1,0 +1,193 @@
+"""Solids of revolution swept about their axis: each against OpenCASCADE's volume, in any place, seats and frequencies."""
+
+from collections.abc import Callable
+from math import atan2, cos, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.bench.parts import frequencies
+from kedfem.links.offers import face_kind
+from kedfem.links.solid import solid_basis, solid_link
+from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
+from kedfem.mesh.bounds import valid_everywhere
+from kedfem.mesh.cad.faces import with_faces
+from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.cad.solids import OtherWayError, Sizing
+from kedfem.mesh.core import disc
+from kedfem.mesh.filling import filled_mesh
+from kedfem.mesh.quality import scaled_jacobian
+from kedfem.mesh.revolved import revolved_mesh
+from kedfem.mesh.session import gmsh_model
+from kedfem.scene import Material, link_from
+from kedfem.scene.shapes import Cad
+
+STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
+Outline = list[tuple[float, float]]
+
+
+def turned(occ: Any, outline: Outline, angle: float = 2 * pi) -> None:
+    """An outline (x, r) [mm] turned about x."""
+    points = [occ.addPoint(x, r, 0) for x, r in outline]
+    lines = [occ.addLine(points[k - 1], points[k]) for k in range(len(points))]
+    face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+    occ.revolve([(2, face)], 0, 0, 0, 1, 0, 0, angle)
+    occ.remove([(2, face)], recursive=True)
+
+
+PULLEY = [(-8, 8), (8, 8), (8, 14), (4, 14), (4, 24), (9, 24), (9, 32)]
+PULLEY += [(0, 25), (-9, 32), (-9, 24), (-4, 24), (-4, 14), (-8, 14)]
+SHAFT = [(0, 0), (60, 0), (60, 6), (58, 8), (40, 8), (36, 12), (20, 12), (20, 10), (1, 10), (0, 9)]
+POINTED = [(0, 0), (30, 0), (20, 8), (0, 8)]
+CAVITY = [(0, 0), (10, 0), (12, 4), (18, 5), (20, 0), (40, 0), (40, 9), (0, 9)]
+
+
+def elbow(occ: Any) -> None:
+    ring = occ.addDisk(30, 0, 0, 8, 8, zAxis=[0, 1, 0])
+    hole = occ.addDisk(30, 0, 0, 5, 5, zAxis=[0, 1, 0])
+    cut, _ = occ.cut([(2, ring)], [(2, hole)])
+    occ.revolve(cut, 0, 0, 0, 0, 0, 1, 1.9)
+    occ.remove(cut, recursive=True)
+
+
+def capped_ball(occ: Any) -> None:
+    ball, tool = occ.addSphere(0, 0, 0, 10), occ.addBox(-20, -20, 7, 40, 40, 40)
+    occ.cut([(3, ball)], [(3, tool)])
+
+
+#: What is drawn, and the radii [mm] of the bores, journals and balls on it.
+PARTS: dict[str, tuple[Callable[[Any], None], list[float]]] = {
+    "pulley": (lambda occ: turned(occ, PULLEY), [8, 14, 14, 24, 24]),
+    "shaft": (lambda occ: turned(occ, SHAFT), [8, 10, 12]),
+    "pointed": (lambda occ: turned(occ, POINTED), [8]),
+    "cavity": (lambda occ: turned(occ, CAVITY), [9]),
+    "half a pulley": (lambda occ: turned(occ, PULLEY, pi), []),
+    "elbow": (elbow, []),
+    "ball": (lambda occ: occ.addSphere(0, 0, 0, 10), [10]),
+    "capped ball": (capped_ball, [10]),
+}
+
+
+def drawn(folder: Path, draw: Callable[[Any], None], oblique: bool = False) -> tuple[Path, float]:
+    """The file of a part and its volume [m³]."""
+    with gmsh_model() as gmsh:
+        occ = gmsh.model.occ
+        draw(occ)
+        if oblique:
+            occ.rotate(occ.getEntities(3), 3, -5, 2, 0.3, -0.5, 0.8, 1.1)
+            occ.translate(occ.getEntities(3), 70, 20, -40)
+        occ.synchronize()
+        gmsh.write(str(folder / "part.brep"))
+        return folder / "part.brep", 1e-9 * sum(occ.getMass(3, tag) for _, tag in occ.getEntities(3))
+
+
+def swept(file: Path, sizing: Sizing = Sizing()) -> SolidMesh:  # noqa: B008
+    """The mesh of a part's file, its faces known."""
+    with solid_model(CadKeys("part", "solid"), file, "part", Cad(file=file.name)) as (gmsh, solid):
+        return with_faces(gmsh, solid, revolved_mesh(gmsh, solid, sizing))
+
+
+def volume(mesh: SolidMesh) -> float:
+    return float(solid_basis(mesh).dx.sum())
+
+
+CHEAP = ("shaft", "elbow")
+
+
+@pytest.mark.parametrize(
+    "name", [*CHEAP, *(pytest.param(name, marks=pytest.mark.long) for name in PARTS if name not in CHEAP)]
+)
+def test_parts_are_swept_in_any_place(name: str, tmp_path: Path) -> None:
+    """det J > 0 all over, no wedges, volume within 5e-4 of CAD, each face found; turned by any angle the same mesh."""
+    draw, radii = PARTS[name]
+    meshes = []
+    for oblique in (False, True):
+        file, exact = drawn(tmp_path, draw, oblique)
+        mesh = swept(file)
+        assert valid_everywhere(mesh.points, mesh.cells).all()
+        assert mesh_quality(mesh).least > 0.3
+        assert volume(mesh) == pytest.approx(exact, rel=5e-4)  # parabolas at 30° lose 1.5e-4 of a circle
+        seats = [f for f in mesh.faces if face_kind(mesh, f) in {"bore", "journal", "ball", "ball seat"}]
+        assert_allclose(sorted(1e3 * face.radius for face in seats), radii, rtol=1e-6)
+        meshes.append(mesh)
+    assert len(meshes[0].points) == pytest.approx(len(meshes[1].points), rel=0.1)  # gmsh rounds otherwise
+    assert volume(meshes[0]) == pytest.approx(volume(meshes[1]), rel=1e-4)
+
+
+def test_the_surface_is_the_parts_own(tmp_path: Path) -> None:
+    """Nodes on a bore and a journal have its radius to rounding, at corners, sides and middles."""
+    mesh = swept(drawn(tmp_path, PARTS["pulley"][0])[0])
+    radii = np.linalg.norm(mesh.points[:, 1:], axis=1)
+    for face in mesh.faces:
+        if face.kind == "cylinder":
+            assert_allclose(radii[face.sides], face.radius, rtol=1e-9)
+    assert radii.min() == pytest.approx(8e-3, rel=1e-9)
+    assert radii.max() == pytest.approx(32e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("around", [8, 12, 16, 20, 32])
+def test_a_core_has_a_disc_without_sharp_angles(around: int) -> None:
+    points, cells = disc(around)
+    assert scaled_jacobian(points, cells).min() > 0.75
+    on = np.linalg.norm(points, axis=1) > 1 - 1e-9
+    assert_allclose(
+        np.sort([atan2(y, x) % (2 * pi) for x, y in points[on]]), np.arange(2 * around) * pi / around
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["elbow", "shaft", "half a pulley", "pulley"])
+def test_frequencies_are_those_of_fine_tetrahedra(name: str, tmp_path: Path) -> None:
+    """First six of the free part, at default sizes, within 0.5 %."""
+    file, _ = drawn(tmp_path, PARTS[name][0])
+    with solid_model(CadKeys("part", "solid"), file, "part", Cad(file=file.name)) as (gmsh, solid):
+        meshes = revolved_mesh(gmsh, solid, Sizing()), filled_mesh(gmsh, solid, Sizing(size=2.2e-3))
+    found, fine = (frequencies(solid_link("part", mesh, STEEL, np.eye(3)), 5e3)[:6] for mesh in meshes)
+    assert_allclose(found, fine, rtol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("outline", "wanted"),
+    [
+        (PULLEY, 15_000),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in ((PULLEY, 60_000), (SHAFT, 30_000))),
+    ],
+)
+def test_about_as_many_unknowns_as_asked_for(outline: Outline, wanted: int, tmp_path: Path) -> None:
+    drawn(tmp_path, lambda occ: turned(occ, outline))
+    given = {"shape": {"kind": "cad", "file": "part.brep"}, "material": "steel", "mesh": {"unknowns": wanted}}
+    mesh = part_mesh(link_from(given), tmp_path)
+    assert "swept about" in mesh.way
+    assert 1 / 1.3 < 3 * len(mesh.points) / wanted < 1.3
+
+
+def test_what_is_no_solid_of_revolution_is_refused_with_the_face(tmp_path: Path) -> None:
+    def keyed(occ: Any) -> None:
+        shaft, key = occ.addCylinder(0, 0, 0, 40, 0, 0, 10), occ.addBox(5, -2, 7, 20, 4, 9)
+        occ.cut([(3, shaft)], [(3, key)])
+
+    message = r"no solid of revolution, as the plane face .* near .* does not turn about x"
+    with pytest.raises(OtherWayError, match=message):
+        swept(drawn(tmp_path, keyed)[0])
+    with pytest.raises(OtherWayError, match="no solid of revolution, as no face turns about an axis"):
+        swept(drawn(tmp_path, lambda occ: occ.addBox(0, 0, 0, 1, 2, 3))[0])
+
+
+def test_a_part_of_a_turn_that_touches_its_axis_goes_another_way(tmp_path: Path) -> None:
+    with pytest.raises(OtherWayError, match="axis"):
+        swept(drawn(tmp_path, lambda occ: turned(occ, SHAFT, 2.0))[0])
+
+
+def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> None:
+    """The centre of volume of a ring of angle α: at sin(α/2) / (α/2) of its radius's mean, half way round."""
+    outline = [(0.0, 20.0), (4.0, 20.0), (4.0, 21.0), (0.0, 21.0)]
+    for angle in (0.8, 5.5):
+        mesh = swept(drawn(tmp_path, lambda occ, a=angle: turned(occ, outline, a))[0], Sizing(size=2e-3))
+        basis = solid_basis(mesh)
+        x = np.asarray(basis.default_parameters()["x"])
+        centre = 1e3 * (x * basis.dx).sum(axis=(1, 2)) / basis.dx.sum()
+        radius = 2 / 3 * (21**3 - 20**3) / (21**2 - 20**2) * sin(angle / 2) / (angle / 2)
+        assert_allclose(centre, [2, radius * cos(angle / 2), radius * sin(angle / 2)], atol=2e-3)
