@@ -2,12 +2,14 @@
 
 import sys
 
-from geometry import PARTS, engine
+from geometry import PARTS, crank_train, engine
 from geometry.make import HERE, write_part
 
-for name in sys.argv[1:] or (*PARTS, engine.NAME):
-    if name == engine.NAME:
-        engine.write(HERE)
+ASSEMBLIES = {whole.NAME: whole.write for whole in (engine, crank_train)}
+
+for name in sys.argv[1:] or (*PARTS, *ASSEMBLIES):
+    if name in ASSEMBLIES:
+        ASSEMBLIES[name](HERE)
     else:
         write_part(name, HERE)
     sys.stdout.write(f"geometry/{name}.step\n")

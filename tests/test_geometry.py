@@ -7,7 +7,7 @@ from types import ModuleType
 import gmsh
 import numpy as np
 import pytest
-from geometry import PARTS, engine
+from geometry import PARTS, crank_train, engine
 from geometry.make import HERE, drawn, empty_model, write_part
 from numpy.testing import assert_allclose
 
@@ -59,27 +59,33 @@ def test_a_step_file_comes_out_the_same_every_time(tmp_path: Path) -> None:
     for name in ("crank", "clevis"):  # twice in one process: OpenCASCADE counts what it has written
         write_part(name, tmp_path)
         assert (tmp_path / f"{name}.step").read_text("utf-8") == (HERE / f"{name}.step").read_text("utf-8")
-    engine.write(tmp_path)
-    assert (tmp_path / "engine.step").read_text("utf-8") == (HERE / "engine.step").read_text("utf-8")
+    for whole in (engine, crank_train):
+        whole.write(tmp_path)
+        name = f"{whole.NAME}.step"
+        assert (tmp_path / name).read_text("utf-8") == (HERE / name).read_text("utf-8")
 
 
 def test_headers_name_the_part_and_nobody() -> None:
-    for name in (*PARTS, engine.NAME):
+    for name in (*PARTS, engine.NAME, crank_train.NAME):
         text = (HERE / f"{name}.step").read_text("utf-8")
         assert f"FILE_NAME('{name}.step','2026-01-01T00:00:00',('kedfem')" in text
         assert "Open CASCADE" not in text
 
 
-def test_the_engine_has_three_named_solids_that_touch_but_do_not_overlap() -> None:
+@pytest.mark.parametrize(
+    ("name", "parts"), [(engine.NAME, list(engine.SOLIDS)), (crank_train.NAME, list(crank_train.SOLIDS))]
+)
+def test_an_assembly_has_named_solids_that_touch_but_do_not_overlap(name: str, parts: list[str]) -> None:
     with empty_model() as occ:
-        occ.importShapes(str(HERE / "engine.step"))
+        occ.importShapes(str(HERE / f"{name}.step"))
         tags = dict(zip(names(), solids(occ), strict=True)) if solids(occ) else {}
-        assert list(tags) == ["crank", "rod", "slider"]
+        assert sorted(tags) == sorted(parts)
         whole = sum(occ.getMass(3, tag) for tag in tags.values())
-        pieces, _ = occ.fragment([(3, tags["crank"])], [(3, tags["rod"]), (3, tags["slider"])])
-        parts = [occ.getMass(*piece) for piece in pieces if piece[0] == 3]
-        assert len(parts) == 3
-        assert_allclose(sum(parts), whole, rtol=1e-9)
+        first, *others = [(3, tag) for tag in tags.values()]
+        pieces, _ = occ.fragment([first], others)
+        volumes = [occ.getMass(*piece) for piece in pieces if piece[0] == 3]
+        assert len(volumes) == len(parts)
+        assert_allclose(sum(volumes), whole, rtol=1e-9)
 
 
 def test_the_engine_is_a_slider_crank() -> None:
