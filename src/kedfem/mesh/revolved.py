@@ -1,4 +1,4 @@
-"""Solids of revolution, whole or in part: the meridian section meshed with quadrilaterals and swept about the axis."""
+"""Solids of revolution: the meridian section meshed with quadrilaterals and swept about the axis."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,21 +16,16 @@ from kedfem.mesh.core import NEAR, core_mesh, core_radius
 from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
-from kedfem.mesh.layered.layers import not_too_bad
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, section
-from kedfem.mesh.quality import mesh_quality
 from kedfem.mesh.revolution import Revolution, revolution
 from kedfem.mesh.session import gmsh_copy
+from kedfem.mesh.shares import sized
 
 _ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
 _FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for
 _RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
-_GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
-_SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
-_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser, as with tetrahedra
-_COARSER = (1.4, 2.0)  # times the size
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +40,7 @@ class _Meridian:
 
 
 def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """Hexahedra of a solid of revolution: pulleys, bushings, shafts, balls; and of a part of a turn, as an elbow.
+    """Hexahedra of a solid of revolution: pulleys, bushings, shafts, balls.
 
     Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles. What is
     next to the axis is a core of its own, discs of quadrilaterals carried along it, as sections swept about a line in
@@ -72,51 +67,23 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         The solid is not of revolution, with the face that is in the way, or gives elements of poor quality.
     """
     turn = revolution(gmsh, solid)
-    found: list[tuple[float, SolidMesh]] = []
-    refusals: list[str] = []
-    for share in _SHARES:
-        try:
-            mesh = _mesh_about(gmsh, solid, turn, sizing, share)
-        except KedfemError as error:
-            refusals.append(str(error))
-            continue
-        found.append((mesh_quality(mesh).least, mesh))
-        if found[-1][0] >= _GOOD:
-            return _cheaper(gmsh, solid, turn, sizing, mesh)
-    if not found:
-        raise OtherWayError(refusals[0])
-    return not_too_bad(solid, max(found, key=lambda each: each[0])[1])
-
-
-def _cheaper(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, mesh: SolidMesh) -> SolidMesh:
-    """The mesh, or a good one of larger elements where nobody asked for so many."""
-    for share in _COARSER if sizing.size is None and sizing.across <= 2 else ():
-        if 3 * len(mesh.points) <= _PLENTY:
-            break
-        try:
-            other = _mesh_about(gmsh, solid, turn, sizing, share)
-        except KedfemError:
-            continue
-        if len(other.points) < len(mesh.points) and mesh_quality(other).least >= _GOOD:
-            mesh = other
-    return mesh
+    return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))
 
 
 def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float) -> SolidMesh:
     """The mesh swept about the axis, in the solid's place."""
     with _meridian(gmsh, solid, turn, sizing, share) as meridian:
         flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing.turn)
-        around = _elements_around(meridian, turn, sizing)
-        mesh = _turned(flat, turn, around)
+        around = _elements_around(meridian, sizing)
+        mesh = _turned(flat, around)
         for region in meridian.inside:
             mesh = _with_core(mesh, flat, meridian, region, around)
     words = "mapped blocks," if not flat.settings else "quadrilaterals"
-    degrees = f"{np.degrees(turn.angle):.4g}° in {around} elements"
     by = f"; gmsh algorithm {', '.join(str(one) for one in flat.settings)}" if flat.settings else ""
     return SolidMesh(
         turn.origin + solid.extent * mesh.points @ turn.axes,
         mesh.cells,
-        way=f"{words} swept about {direction_in_words(turn.axes[0])} through {degrees}{by}",
+        way=f"{words} swept about {direction_in_words(turn.axes[0])} in {around} elements{by}",
     )
 
 
@@ -125,8 +92,7 @@ def _meridian(
     gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float
 ) -> Iterator[_Meridian]:
     """The meridian section in a copy of the model: x along the axis, y from it, in sizes of the solid."""
-    angle = _ASIDE if turn.full else turn.angle / 2
-    radial = np.array([0, np.cos(angle), np.sin(angle)]) @ turn.axes
+    radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
     axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
         try:
@@ -135,8 +101,6 @@ def _meridian(
             check_volume(solid, whole)
             size = share * plan_size(whole, sizing)
             radius = core_radius(whole)
-            if radius > 0 and not turn.full:
-                raise OtherWayError(f"{solid.name}: a part of a turn must keep off its axis")
             if radius > 0:
                 whole = _plan(copy, solid, turn, axes, _cut(copy, faces, axes, radius))
         except KedfemError:
@@ -187,7 +151,7 @@ def _plan(
     occ = gmsh.model.occ
     masses = np.array([occ.getMass(2, face) for _, face in faces])
     radii = np.array([occ.getCenterOfMass(2, face) for _, face in faces]) @ axes[1]
-    path = turn.angle * float(masses @ radii / masses.sum())
+    path = 2 * np.pi * float(masses @ radii / masses.sum())
     plan = laid_over(gmsh, [faces], axes, solid.extent, np.array([0.0, path]))
     return replace(plan, origin=turn.origin)
 
@@ -197,26 +161,25 @@ def _reach(plan: Plan, region: Region) -> float:
     return max(float(plan.curves[i].samples[:, 1].max()) for loop in region.loops for i, _ in loop)
 
 
-def _elements_around(meridian: _Meridian, turn: Revolution, sizing: Sizing) -> int:
-    """Elements around the axis, of a full turn four by four; where no size is asked for as many as bending needs."""
-    share = turn.angle / (2 * np.pi)
+def _elements_around(meridian: _Meridian, sizing: Sizing) -> int:
+    """Elements around the axis, four by four; where no size is asked for as many as bending needs."""
     wanted = meridian.whole.heights[-1] / meridian.size
     if sizing.size is None:
         least = _FEWEST if meridian.inside else _RING
-        wanted = float(np.clip(wanted, share * least, share * _MOST) * sizing.across / 2)
-    wanted = max(wanted, turn.angle / sizing.turn, sizing.layers)
-    return 4 * max(2, round(wanted / 4)) if turn.full else max(2, int(np.ceil(wanted)))
+        wanted = float(np.clip(wanted, least, _MOST) * sizing.across / 2)
+    wanted = max(wanted, 2 * np.pi / sizing.turn, sizing.layers)
+    return 4 * max(2, round(float(wanted) / 4))
 
 
-def _turned(flat: PlanMesh, turn: Revolution, around: int) -> SolidMesh:
-    """The section's cells swept through the angle: x along the axis, y and z across it, by the solid's extent."""
+def _turned(flat: PlanMesh, around: int) -> SolidMesh:
+    """The section's cells swept through a turn: x along the axis, y and z across it, by the solid's extent."""
     count = len(flat.points)
     levels = np.arange(2 * around + 1.0)
     quads = np.tile(flat.cells, (around, 1))
     mesh = stacked(flat.points, levels, quads, np.repeat(np.arange(around), len(flat.cells)))
-    cells = mesh.cells % (2 * around * count) if turn.full else mesh.cells
+    cells = mesh.cells % (2 * around * count)
     x, r, level = mesh.points.T
-    angle = level * turn.angle / (2 * around)
+    angle = level * np.pi / around
     turned = SolidMesh(np.stack([x, r * np.cos(angle), r * np.sin(angle)], axis=1), cells)
     return without_spare_nodes(turned)
 

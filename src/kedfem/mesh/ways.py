@@ -17,6 +17,7 @@ from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.carried import carried_mesh
 from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
 from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.layered.layers import layered_mesh
@@ -38,7 +39,7 @@ Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
 NOTHING: KeptWhole = ((), ())
 
-SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh, revolved_mesh)
+SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh, revolved_mesh, carried_mesh)
 #: What is tried in turn, by `mesh.kind` and element.
 WAYS: dict[str | None, tuple[Way, ...]] = {
     None: (*SWEEPS, swept_without_blends, filled_mesh),

@@ -1,0 +1,159 @@
+"""The path of a bent bar, pipe or ring segment: lines and arcs from one plane end to the other, section carried."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.mesh.cad.solids import CadFace, OtherWayError, Solid
+from kedfem.mesh.layered.sections import plan_axes
+from kedfem.mesh.looks import OFF, Looks, common_axes, looks
+
+_SAMPLES = np.linspace(0, 1, 9)  # along each edge
+_ENDS = 12  # plane faces that are tried as the first end
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Where the section is: its centre [m], and rows: two directions in it, and that along the path."""
+
+    origin: Float[np.ndarray, "3"]
+    axes: Float[np.ndarray, "3 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A line, or an arc about an axis, of a path.
+
+    Attributes
+    ----------
+    start : Frame
+    arm : (3,) [m]
+        Of an arc from its axis to where it starts; of a line 0.
+    travel : float
+        Length of a line [m], angle of an arc [rad].
+    """
+
+    start: Frame
+    arm: Float[np.ndarray, "3"]
+    travel: float = 0.0
+
+    @property
+    def radius(self) -> float:
+        """Of an arc; 0 of a line [m]."""
+        return float(np.linalg.norm(self.arm))
+
+    @property
+    def length(self) -> float:
+        """Of the path of the section's centre [m]."""
+        return self.travel * (self.radius or 1.0)
+
+    def at(self, share: float) -> Frame:
+        """The frame where a share of the leg is done."""
+        done, (x, y, ahead) = share * self.travel, self.start.axes
+        if self.radius == 0:
+            return Frame(self.start.origin + done * ahead, self.start.axes)
+        out = self.arm / self.radius
+        plane = np.stack([out, ahead])
+        turned = np.array([[np.cos(done), np.sin(done)], [-np.sin(done), np.cos(done)]]) @ plane
+        R = np.eye(3) + (turned - plane).T @ plane  # takes out and ahead to where they are then
+        return Frame(self.start.origin - self.arm + R @ self.arm, np.stack([R @ x, R @ y, R @ ahead]))
+
+    def passed(self, x: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+        """At what travel places are passed."""
+        off, ahead = x - self.start.origin, self.start.axes[2]
+        if self.radius == 0:
+            return np.asarray(off @ ahead)
+        angle = np.arctan2((off + self.arm) @ ahead, (off + self.arm) @ self.arm / self.radius) % (2 * np.pi)
+        return np.asarray(np.where(angle > 2 * np.pi - 10 * OFF, 0.0, angle))
+
+
+def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
+    """The path along which a plane end, moved rigidly, sweeps the whole solid.
+
+    From the end on, the faces that meet it must all run along a line square to it, or turn about an axis in its plane, up
+    to one more such plane; from there the faces behind go on, to the other end.
+
+    Raises
+    ------
+    OtherWayError
+        No plane face is an end of that kind.
+    """
+    every = looks(gmsh, solid)
+    planes = sorted((face for face in solid.faces if face.kind == "plane"), key=lambda face: face.area)
+    for end in planes[:_ENDS]:
+        if legs := _walked(gmsh, solid, every, end):
+            return legs
+    raise OtherWayError(f"{solid.name}: no plane end sweeps it along lines and arcs to another end")
+
+
+def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFace) -> tuple[Leg, ...]:
+    """The legs from one end on, if they lead past all faces to another end; else none."""
+    legs: tuple[Leg, ...] = ()
+    frame, seen = Frame(end.centre, plan_axes(-end.direction)), {end.tag}
+    walls = _behind(gmsh, _edges(gmsh, end.tag), seen)
+    while walls:
+        leg, far = _leg(gmsh, solid, [every[tag] for tag in sorted(walls)], frame)
+        if leg is None:
+            return ()
+        legs, seen, frame = (*legs, leg), seen | walls, leg.at(1.0)
+        walls = _behind(gmsh, far, seen)
+        if len(walls) == 1 and _is_across(solid, every[min(walls)], frame):
+            return legs if len(seen) + 1 == len(every) else ()
+    return ()
+
+
+def _edges(gmsh: ModuleType, face: int) -> set[int]:
+    """Tags of a face's edges."""
+    return {int(tag) for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, oriented=False)}
+
+
+def _behind(gmsh: ModuleType, edges: set[int], seen: set[int]) -> set[int]:
+    """The faces at edges that have not been passed."""
+    return {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]} - seen
+
+
+def _is_across(solid: Solid, look: Looks, frame: Frame) -> bool:
+    """Whether a face is plane, and square to the path at a frame."""
+    off = abs((look.places - (frame.origin - solid.middle) / solid.extent) @ frame.axes[2]).max()
+    return look.face.kind == "plane" and bool(max(off, abs(look.normals @ frame.axes[:2].T).max()) < OFF)
+
+
+def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tuple[Leg | None, set[int]]:
+    """The leg that walls make from a frame on, and the edges where it ends; None if they make none."""
+    for leg in _motions(solid, walls, frame):
+        slack = OFF * solid.extent / (leg.radius or 1.0)
+        passed = {
+            edge: leg.passed(_places(gmsh, edge)) for wall in walls for edge in _edges(gmsh, wall.face.tag)
+        }
+        travel = float(max(each.max() for each in passed.values()))
+        ends = {edge for edge, each in passed.items() if each.min() > travel - slack}
+        through = {
+            edge for edge, each in passed.items() if each.min() < slack and each.max() > travel - slack
+        }
+        first = {edge for edge, each in passed.items() if each.max() < slack}
+        if ends and len(ends | through | first) == len(passed):
+            return replace(leg, travel=travel), ends
+    return None, set()
+
+
+def _motions(solid: Solid, walls: list[Looks], frame: Frame) -> Iterator[Leg]:
+    """The line, or the arcs, on which all walls are swept by what they have in a frame's plane."""
+    ahead, own = frame.axes[2], (frame.origin - solid.middle) / solid.extent
+    if all(wall.runs_along(ahead) for wall in walls):
+        yield Leg(frame, np.zeros(3))
+        return
+    for point, axis in common_axes(solid, walls):
+        arm = own - point - ((own - point) @ axis) * axis
+        if max(abs(axis @ ahead), abs(arm @ ahead)) < OFF and all(
+            wall.turns_about((point, axis)) for wall in walls
+        ):
+            yield Leg(frame, solid.extent * arm)
+
+
+def _places(gmsh: ModuleType, edge: int) -> Float[np.ndarray, "n 3"]:
+    """Places along an edge."""
+    low, high = (bound[0] for bound in gmsh.model.getParametrizationBounds(1, edge))
+    return np.reshape(gmsh.model.getValue(1, edge, low + _SAMPLES * (high - low)), (-1, 3))
