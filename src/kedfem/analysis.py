@@ -6,56 +6,45 @@ from pathlib import Path as FilePath
 from time import perf_counter
 from typing import TypeVar
 
-import numpy as np
-from jaxtyping import Float, Int
-
 from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of, meaningless
-from kedfem.accuracy.estimates import Seen, Strained, budget, watcher
+from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories
 from kedfem.accuracy.plan import Plan, plan_for
-from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
-from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.cost import factor_words
-from kedfem.dynamics.history import Block
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.levels import level_steps
 from kedfem.dynamics.loads import coarse_steps
-from kedfem.dynamics.model import segments, ways
-from kedfem.dynamics.transient import Steps, eased_warning
-from kedfem.links.recovery import StressRecovery, stress_recovery
+from kedfem.dynamics.transient import eased_warning
+from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.derived import (
     MESH,
-    STEM,
     WORST,
     fields,
     peak_warning,
-    remove_derived,
     write_derived,
     write_envelope,
 )
-from kedfem.output.vtu import AnimationWriter, write_cells, write_frame
-from kedfem.results import Channel, Peak, Results, ResultsWriter, add_notes, claimed, read_results
+from kedfem.output.vtu import write_cells, write_frame
+from kedfem.results import Peak, Results, add_notes, claimed, read_results
 from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.doubtful import doubtful
-from kedfem.results.envelope import Envelope, highest, peaks
-from kedfem.results.recorded import Recorded
-from kedfem.results.recording import recording, rows
+from kedfem.results.envelope import highest, peaks
+from kedfem.results.recording import recording
 from kedfem.results.undetermined import undetermined, undetermined_warning
-from kedfem.results.writer import add_peaks, drive_channel, mark_doubtful
-from kedfem.scene import Scene, time_grid, turn_steps
-
-ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
+from kedfem.results.writer import add_peaks, mark_doubtful
+from kedfem.resume import EVERY, Keeper, remove_state
+from kedfem.scene import Scene
+from kedfem.stepping import Watch, Watched, stepped
 
 T = TypeVar("T")
-Watch = Callable[[str, int, int], None]
-"""Told of progress: (stage, done, total)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,13 +78,20 @@ class Run:
         return self.results.peaks
 
 
-def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run:
+def analyse(
+    scene: Scene,
+    watch: Watch = lambda stage, done, total: None,
+    resumes: bool = False,
+    every: float = EVERY,
+) -> Run:
     """Run a scene and write its results.
 
     Parameters
     ----------
     scene : validated scene
     watch : told of progress
+    resumes : whether to go on from the last state that an earlier run of the same scene stored
+    every : seconds between stored states
 
     Raises
     ------
@@ -103,10 +99,13 @@ def analyse(scene: Scene, watch: Watch = lambda stage, done, total: None) -> Run
         With a message for the user; rows and frames up to there are kept and marked as interrupted.
     """
     with claimed(scene.results_folder) as folder:
-        return _analysed(scene, folder, watch)
+        keeper = Keeper.of(scene, folder, resumes, every)
+        run = _analysed(scene, folder, watch, keeper)
+        remove_state(folder)
+        return run
 
 
-def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
+def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper) -> Run:
     """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
@@ -128,10 +127,12 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch) -> Run:
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
     watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
-    envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch))
+    envelope, seen, step = clock.timed(
+        "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
+    )
     notices += [*balance_warning(account.balance, scene.analysis.stiffening), *efforts.warnings()]
     notices += [*undetermined_warning(untold), *watched.passes.warnings(), *eased_warning(solvers)]
-    notices += coarse_steps(scene)
+    notices += [*coarse_steps(scene), *keeper.warnings()]
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
@@ -197,101 +198,3 @@ class Clock:
         out = work()
         self.stage("")
         return out
-
-
-def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
-    """Numbers of the time steps that become animation frames."""
-    animation, grid = scene.output.animation, time_grid(scene)
-    if animation is None:
-        return np.zeros(0, int)
-    turn = turn_steps(scene) or float(grid.steps)
-    first = 0.0 if animation.last_turns is None else max(0.0, grid.steps - animation.last_turns * turn)
-    count = int((grid.steps - first) * animation.frames_per_turn / turn + 1e-9)
-    steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_turn
-    return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
-
-    recorded: list[Recorded]
-    untold: dict[str, str]
-    efforts: CrossChecks
-    recoveries: list[StressRecovery]
-    passes: SingularPasses
-
-
-def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
-             folder: FilePath, watch: Watch) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
-    """All time steps: rows to the results file, frames to the animation; also what the steps show of errors."""
-    scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
-    wanted = set(frame_steps(scene).tolist())
-    frames = AnimationWriter(folder, STEM)
-    envelope = Envelope(model, watched.recoveries)
-    seen = watcher(ready)
-    errors = StepWatch(ready, watched.recorded, seen.running)
-    channels = [each.channel for each in watched.recorded]
-    notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
-    following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
-    notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
-    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
-    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
-    with ResultsWriter(
-        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
-    ) as writer:
-        table = _Table(writer, channels, folder)
-        try:
-            for block in leveled(scene, ready.linkage, ready.path, model, solvers, fine=True):
-                if block.fine or not block.levels:
-                    envelope.add(block)
-                if block.fine:
-                    continue
-                values = rows(watched.recorded, block)
-                table.add(block, values)
-                watched.efforts.add(block, values)
-                watched.passes.add(block)
-                seen.add(block)
-                errors.add(block, values)
-                for k in range(len(block)):
-                    if block.step + k in wanted:
-                        now = block.at(k)
-                        frames.add(now.t, fields(scene, model, watched.recoveries, now))
-                watch("steps", block.step + len(block) - 1, steps)
-        finally:
-            table.flush()
-            writer.note(errors.estimate.notes)
-    envelope.flush()
-    return envelope, seen, errors.estimate
-
-
-@dataclass
-class _Table:
-    """Rows that wait for the results file, but the first: with those an earlier run's frames, pictures and table go."""
-
-    writer: ResultsWriter
-    channels: list[Channel]
-    folder: FilePath
-    waiting: int = 0
-    since: float = 0.0
-    when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list)
-    values: list[dict[str, Float[np.ndarray, "T c"]]] = field(default_factory=list)
-
-    def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
-        """More rows."""
-        self.when.append(np.stack([block.motion.t, block.motion.phi]))
-        self.values.append(values)
-        self.waiting += len(block)
-        if self.waiting >= ROWS or perf_counter() - self.since >= SECONDS:
-            self.flush()
-
-    def flush(self) -> None:
-        """Bring the rows to the disk."""
-        if self.when:
-            time, angle = np.concatenate(self.when, axis=1)
-            block = {c.name: np.concatenate([each[c.name] for each in self.values]) for c in self.channels}
-            self.when, self.values, self.waiting, self.since = [], [], 0, perf_counter()
-            first = self.writer.rows == 0
-            self.writer.append(time, angle, block)
-            if first:
-                remove_derived(self.folder)

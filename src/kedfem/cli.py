@@ -48,22 +48,29 @@ def _root(
 def run(
     scene: ScenePath,
     quick: Quick = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on from the last state that an interrupted or killed run stored."),
+    ] = False,
+    states: Annotated[float, typer.Option(metavar="SECONDS", help="Time between stored states.")] = 10.0,
 ) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
     from kedfem.report import run_tables, size_line
     from kedfem.results import abandoned_rows
+    from kedfem.resume import has_state
     from kedfem.scene import read_scene
 
     loaded = _quick(read_scene(scene)) if quick else read_scene(scene)
     file = loaded.results_folder / "results.h5"
     before = _version(file)
-    if (rows := abandoned_rows(file)) is not None:
+    if not resume and (rows := abandoned_rows(file)) is not None:
         said = f"{file}: an earlier run was killed after {rows} rows; they stay until this run's first rows replace them"
+        said += "; --resume would go on with it" * has_state(file.parent)
         err.print(f"warning: {said}", style="yellow", markup=False, soft_wrap=True)
     try:
         with _progress() as watch:
-            done = analyse(loaded, watch)
+            done = analyse(loaded, watch, resume, states)
     except KeyboardInterrupt:
         _interrupted(file, _version(file) != before)
     if done.sizes:
@@ -399,10 +406,15 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 
 def _interrupted(file: Path, begun: bool) -> NoReturn:
-    from kedfem.results import read_results
+    from kedfem.results import run_status
+    from kedfem.resume import has_state
 
-    status = read_results(file).status if begun else ""
-    kept = f"what was computed is readable in {file} (status: {status})" if begun else "nothing was written"
+    kept = (
+        f"what was computed is readable in {file} (status: {run_status(file)})"
+        if begun
+        else "nothing was written"
+    )
+    kept += "; kedfem run --resume goes on with it" * has_state(file.parent)
     err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
     raise typer.Exit(INTERRUPTED)
 

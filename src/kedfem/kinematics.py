@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
-from kedfem.analysis import Clock, Watch, frame_steps
+from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.places import slider_axis
 from kedfem.dynamics.transient import motions
@@ -29,6 +29,7 @@ from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.rigid import RigidForces, rigid_forces
 from kedfem.results.writer import drive_channel
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
+from kedfem.stepping import Watch, frame_steps
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,6 @@ from rich.console import Console
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import resolution
 from kedfem.accuracy.stability import stability_warning
-from kedfem.analysis import frame_steps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.start import initial_rates
 from kedfem.dynamics.transient import drive_range, forcings, motions
@@ -30,6 +29,7 @@ from kedfem.scene import (
     time_grid,
     turn_steps,
 )
+from kedfem.stepping import frame_steps
 from tests.scenes import arm, bar
 
 ARM = """

@@ -12,6 +12,7 @@ takes a fraction. Their channels are compared as `histories` does: what two step
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,6 +50,7 @@ class Strained:
     model: Model
     energy: dict[int, float]
     states: dict[int, np.ndarray]
+    REMEMBERED: ClassVar = ("energy", "states")
 
     def __init__(self, model: Model) -> None:
         self.model, self.energy, self.states = model, {}, {}
@@ -74,6 +76,7 @@ class Seen:
     strained: Strained
     geometric: GeometricError
     running: StepError
+    REMEMBERED: ClassVar = ("strained", "geometric", "running")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""

@@ -23,6 +23,7 @@ displacements of slices across the link's axis; so both take scalar weights only
 """
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -121,6 +122,7 @@ class GeometricError:
     strain: float = 0.0
     turn: float = 0.0
     _of: list[Slices | None] = field(default_factory=list, repr=False)
+    REMEMBERED: ClassVar = ("axial", "strain", "turn")
 
     def __post_init__(self) -> None:
         self._of = [

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -115,6 +116,7 @@ class StepError:
     _swing: float = field(default=0.0, repr=False)
     _left: float = field(default=0.0, repr=False)
     _last: Float[np.ndarray, " k"] | None = field(default=None, repr=False)
+    REMEMBERED: ClassVar = ("change", "peak", "grown", "_swing", "_left", "_last")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""

@@ -8,6 +8,7 @@ of steel beams, 0.3 and 0.2 m, change by 120 % of their peak between 400 and 800
 """
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -37,6 +38,7 @@ class SingularPasses:
     largest: float = 0.0
     _rank: int = field(default=0, repr=False)
     _of: dict[int, int] = field(default_factory=dict, repr=False)
+    REMEMBERED: ClassVar = ("least", "when", "largest")
 
     def __post_init__(self) -> None:
         linkage, model = self.ready.linkage, self.ready.model

@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -183,6 +184,7 @@ class StepWatch:
     recorded: Sequence[Recorded]
     running: StepError
     sizes: dict[str, _Sizes] = field(default_factory=dict)
+    REMEMBERED: ClassVar = ("sizes",)
 
     def __post_init__(self) -> None:
         self.recorded = [each for each in self.recorded if watched(each.channel.name)]

@@ -24,10 +24,12 @@ from jaxtyping import Float
 
 from kedfem.dynamics.frames import mean_rotations
 from kedfem.dynamics.history import Block, LinkHistory, exerted_together, joined
+from kedfem.dynamics.marks import Mark, Marks
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import turned_vectors
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.segment import position
+from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.transient import Steps, block_length, started, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.mesh.room import memory
@@ -102,8 +104,9 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
 
 
 def leveled(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solvers: Sequence[Steps], fine: bool = False
-) -> Iterator[Block]:
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solvers: Sequence[Steps],
+    fine: bool | Marks = False,
+) -> Iterator[Block]:  # fmt: skip
     """All time points of the analysis, combined of all levels, block after block; see `transient`.
 
     Parameters
@@ -111,27 +114,37 @@ def leveled(
     solvers : of `level_steps`; with one of them this is `transient`
     fine : whether to hand on too, before each block, all time points of the finest level since the block before,
         numbered in its steps and flagged as `fine`: combined states at common times, and between them its own, corrected
-        by the interpolated corrections there. For what follows peaks; rows belong to the analysis's own time points
+        by the interpolated corrections there. For what follows peaks; rows belong to the analysis's own time points.
+        Or marks of a march that hands them on: it goes on after what it has handed on, and sets them before each block
 
     Raises
     ------
     SolveError
         As `transient`, by the first level that fails; what all of them have is handed on before.
     """
+    marks = fine if isinstance(fine, Marks) else Marks.of(len(solvers), storable=False)
+    for each, mark in zip(solvers, marks.levels, strict=True):
+        if isinstance(each, CorotationalSteps):
+            each.eased = mark.eased
     if len(solvers) == 1:
-        yield from transient(scene, linkage, along, model, solvers[0])
+        yield from _single(scene, linkage, along, model, solvers[0], marks)
         return
-    scenes = level_scenes(scene)
-    start = started(scenes[-1], linkage, along, model, solvers[-1])
+    scenes, done = level_scenes(scene), marks.done
+    begins = any(mark.state is None for mark in marks.levels)
+    start = started(scenes[-1], linkage, along, model, solvers[-1]) if begins else None
+    for mark in marks.levels:
+        mark.start = start
     schemes = [generalised_alpha(time_grid(each).step, each.analysis.rho_inf) for each in scenes]
     streams = [
-        _Stream(transient(each, linkage, along, model, solver, start), scheme)
-        for each, solver, scheme in zip(scenes, solvers, schemes, strict=True)
+        _Stream(transient(each, linkage, along, model, solver, mark), scheme, mark)
+        for each, solver, scheme, mark in zip(scenes, solvers, schemes, marks.levels, strict=True)
     ]
-    combination = _Combination(model, level_weights(len(solvers), scene.analysis.rho_inf))
+    for k, stream in enumerate(streams):
+        stream.skip((done - 1) * 2**k + 1 if done else 0)
+    weights = level_weights(len(solvers), scene.analysis.rho_inf)
+    combination = _Combination(model, weights, marks.corrections)
     length = max(1, block_length(model) // 2 ** (len(solvers) - 1))
     steps = time_grid(scene).steps
-    done = 0
     while done <= steps:
         count = 1 if done == 0 else min(length, steps + 1 - done)
         strides = [2**k if done else 1 for k in range(len(streams))]
@@ -139,11 +152,25 @@ def leveled(
         here = min(0 if x is None else len(x) // stride for x, stride in zip(taken, strides, strict=True))
         if here:
             blocks = [x.part(0, here * s) for x, s in zip(taken, strides, strict=True) if x is not None]
-            yield from combination.blocks(done, blocks, strides, fine)
+            marks.done = done + here
+            for block in combination.blocks(done, blocks, strides, bool(fine)):
+                marks.corrections = combination.corrections
+                yield block
         for stream in streams:
             if stream.failed is not None and here < count:
                 raise stream.failed
         done += count
+
+
+def _single(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, marks: Marks
+) -> Iterator[Block]:
+    """All time points of a march by itself, from those on that were handed on before."""
+    since = marks.done
+    for block in transient(scene, linkage, along, model, solver, marks.levels[0]):
+        marks.done = block.step + len(block)
+        if marks.done > since:
+            yield block.part(max(0, since - block.step), len(block))
 
 
 @dataclass
@@ -152,9 +179,20 @@ class _Stream:
 
     blocks: Iterator[Block]
     scheme: Scheme
+    mark: Mark
     failed: SolveError | None = None
     _rest: Block | None = None
     _last: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._last = list(self.mark.last)
+
+    def skip(self, to: int) -> None:
+        """Leave out the time points before one."""
+        block = self._next() if to else None
+        while block is not None and block.step + len(block) <= to:
+            block = self._next()
+        self._rest = block and block.part(max(0, to - block.step), len(block))
 
     def taken(self, count: int) -> Block | None:
         """The next time points; fewer where the level has failed, None without any."""
@@ -178,6 +216,7 @@ class _Stream:
     def _next(self) -> Block | None:
         if self.failed is not None:
             return None
+        self.mark.last = list(self._last)
         try:
             block = next(self.blocks)
         except SolveError as error:
@@ -231,7 +270,7 @@ class _Combination:
 
     model: Model
     weights: Float[np.ndarray, " l"]
-    _corrections: list[Fields] = field(default_factory=list)
+    corrections: list[Fields] = field(default_factory=list)
 
     def blocks(
         self, first: int, taken: Sequence[Block], strides: Sequence[int], fine: bool
@@ -253,7 +292,7 @@ class _Combination:
         if fine:
             now = [{n: x[n] - y[n] for n in LINEAR} for x, y in zip(combined, seen[-1], strict=True)]
             yield self._fine(taken[-1], strides[-1], now)
-            self._corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
+            self.corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
         exerted = exerted_together([x.exerted for x in levels], self._weighted)
         links = [self._history(k, x, motion) for k, x in enumerate(combined)]
         yield Block(first, motion, links, levels, exerted=exerted)
@@ -264,7 +303,7 @@ class _Combination:
 
     def _fine(self, finest: Block, stride: int, now: Sequence[Fields]) -> Block:
         """The finest level's time points; corrections are linear in time between common ones."""
-        before = self._corrections or [{name: x[:1] for name, x in each.items()} for each in now]
+        before = self.corrections or [{name: x[:1] for name, x in each.items()} for each in now]
         point, share = np.divmod(1 + np.arange(len(finest)), stride)
         after, links = np.minimum(point + 1, len(finest) // stride), []
         for k, (then, later) in enumerate(zip(before, now, strict=True)):

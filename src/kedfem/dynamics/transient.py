@@ -22,6 +22,7 @@ from kedfem.dynamics.interface import static_tie
 from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
+from kedfem.dynamics.marks import Mark
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_start import rigid_start
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
@@ -133,31 +134,39 @@ def _is_small(link: Link) -> bool:
 
 def transient(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps,
-    start: Start | None = None,
+    start: Start | Mark | None = None,
 ) -> Iterator[Block]:  # fmt: skip
     """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
 
     Parameters
     ----------
-    start : the state at t = 0, that of `started` if not given
+    start : the state at t = 0, that of `started` if not given; or the mark of a march, which goes on from the beginning
+        of its block; it is set anew at every block
 
     Raises
     ------
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
+    mark = start if isinstance(start, Mark) else Mark(start=start)
+    since = mark.step
     if isinstance(solver, CorotationalSteps):
-        yield from _corotational(scene, linkage, along, model, solver, start)
+        yield from _corotational(scene, linkage, along, model, solver, mark)
         return
     stresses = stresses_of(solver)
-    states = started(scene, linkage, along, model, solver) if start is None else start
-    drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
-    yield Block(0, drawn, _first(model, solver, states, drawn))
-    state: Any = begun(scene, linkage, along, model, solver, states)
+    state: Any = mark.state
+    if state is None:
+        states = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
+        drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
+        yield Block(0, drawn, _first(model, solver, states, drawn))
+        state = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
     bridge = bridged(scene, linkage, along, model)
-    for first, motion in motions(scene, linkage, along):
+    for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
+            if first + k < since:
+                continue
+            mark.set(first + k, state, solver)
             part = motion.part(k, k + length)
             if isinstance(solver, FollowingSteps | FollowingDense):
                 try:
@@ -176,19 +185,24 @@ def transient(
 
 
 def _corotational(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: CorotationalSteps, start: Start | None
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: CorotationalSteps, mark: Mark
 ) -> Iterator[Block]:
     """All time points of a system with co-rotational frames; see `transient`."""
 
     def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
         return rigid_motion(linkage, along, t, path_parameter(scene, t))
 
-    state = start if isinstance(start, State) else solver.begin(motion_at)
-    drawn, length = motion_at(np.zeros(1)), block_length(model)
-    links, exerted = solver.first(state, forcings(model, drawn), motion_at)
-    yield Block(0, drawn, links, exerted=exerted)
-    for first, motion in motions(scene, linkage, along):
+    state, since, length = mark.state, mark.step, block_length(model)
+    if state is None:
+        state = mark.start if isinstance(mark.start, State) else solver.begin(motion_at)
+        drawn = motion_at(np.zeros(1))
+        links, exerted = solver.first(state, forcings(model, drawn), motion_at)
+        yield Block(0, drawn, links, exerted=exerted)
+    for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
+            if first + k < since:
+                continue
+            mark.set(first + k, state, solver)
             part = motion.part(k, k + length)
             forcing = forcings(model, part)
             try:
@@ -200,6 +214,11 @@ def _corotational(
                 stuck = Stuck(failed.taken, [], failed.moves)
                 raise SolveError(_stuck(model, first + k + failed.taken, part, stuck)) from None
             yield from _finite(Block(first + k, part, links, exerted=exerted), "")
+
+
+def storable(solvers: Sequence[Steps]) -> bool:
+    """Whether what these solvers remember is all in their states; some have memories of their own."""
+    return not any(isinstance(each, FollowingSteps | FollowingDense) for each in solvers)
 
 
 def stresses_of(solver: Steps) -> Stiffening | None:
@@ -306,8 +325,10 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         yield from (block.at(k) for k in range(len(block)))
 
 
-def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
+def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iterator[tuple[int, RigidMotion]]:
     """Rigid motion at all time points after the first, block after block with the number of its first point.
+
+    Blocks that end before the time point `since` are left out.
 
     A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved.
     """
@@ -317,6 +338,8 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
     kept: list[RigidMotion] = []
     for first in range(1, grid.steps + 1, POINTS):
         steps = np.arange(first, min(first + POINTS, grid.steps + 1))
+        if steps[-1] < since and not (returns and first <= turn <= KEPT):
+            continue
         t = grid.step * steps
         drive = path_parameter(scene, t)
         if kept and first > round(turn):
@@ -330,7 +353,8 @@ def motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, 
         motion = rigid_motion(linkage, along, t, drive)
         if returns and first <= turn <= KEPT and grid.steps > turn:
             kept.append(motion)
-        yield first, motion
+        if steps[-1] >= since:
+            yield first, motion
 
 
 def block_length(model: Model) -> int:

@@ -91,10 +91,18 @@ class AnimationWriter:
         From :meth:`add`: the folder or a file cannot be written.
     """
 
+    REMEMBERED = ("times",)
+
     def __init__(self, folder: Path, stem: str) -> None:
         self.folder = Path(folder)
         self.stem = stem
         self.times: list[float] = []
+
+    @property
+    def missing(self) -> Path | None:
+        """A frame that was written and is there no more."""
+        every = (self.folder / _frame_name(self.stem, k) for k in range(len(self.times)))
+        return next((path for path in every if not path.is_file()), None)
 
     def add(self, time: float, fields: Fields) -> Path:
         """Write the next frame.

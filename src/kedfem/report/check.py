@@ -13,7 +13,6 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.singular import SingularPasses
-from kedfem.analysis import Watched, frame_steps, stepped
 from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost, tried_cost
 from kedfem.dynamics.history import Snapshot
@@ -37,6 +36,7 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.recording import recording
 from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
+from kedfem.stepping import Watched, frame_steps, stepped
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:

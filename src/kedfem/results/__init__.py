@@ -14,7 +14,7 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
 """
 
 from kedfem.results.files import claimed, ready_folder, replacing
-from kedfem.results.reader import abandoned_rows, read_results
+from kedfem.results.reader import abandoned_rows, read_results, run_status
 from kedfem.results.records import Channel, Peak, Results
 from kedfem.results.table import write_csv
 from kedfem.results.writer import ResultsWriter, add_notes
@@ -30,5 +30,6 @@ __all__ = [
     "read_results",
     "ready_folder",
     "replacing",
+    "run_status",
     "write_csv",
 ]

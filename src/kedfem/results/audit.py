@@ -103,6 +103,8 @@ class _Sums:
 class Account:
     """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
 
+    REMEMBERED = ("_next", "_sums", "_start", "_last", "_springs", "_largest", "_impulse")
+
     def __init__(self, model: Model, actions: Measured | None = None) -> None:
         self.model, self.actions = model, actions
         joined = zip(model.links, model.joints, model.bodies, strict=True)

@@ -106,6 +106,8 @@ class CrossChecks:
         On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in joints do
     """
 
+    REMEMBERED = ("pairs", "_last", "_work", "_left", "exchanged")
+
     def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
         self.size = linkage.size

@@ -6,6 +6,7 @@ coordinates, of a few columns; and `envelope_kernel` leaves out most of the time
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -48,6 +49,8 @@ class Modes:
     basis : (r, dn) orthonormal, without rigid motion
     parts : (p, 6, r) as the kernel wants them
     """
+
+    REMEMBERED = ("basis", "parts", "gain")
 
     def __init__(self, link: Link, recovery: StressRecovery) -> None:
         self.link, self.recovery = link, recovery
@@ -124,6 +127,7 @@ class Envelope:
     _step: list[Int[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
     _waiting: list[Block] = field(default_factory=list, repr=False)
     _when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list, repr=False)
+    REMEMBERED: ClassVar = ("worst", "looked", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when")
 
     def __post_init__(self) -> None:
         for link, recovery in zip(self.model.links, self.recoveries, strict=False):
@@ -138,6 +142,11 @@ class Envelope:
         steps = sum(map(len, self._waiting))
         if steps >= STEPS or 9 * 8 * steps * self.model.unknowns >= WAITING:
             self.flush()
+
+    @property
+    def waits(self) -> bool:
+        """Whether there are blocks that were not looked at."""
+        return bool(self._waiting)
 
     def flush(self) -> None:
         """Look at all that waits."""

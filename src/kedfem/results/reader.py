@@ -61,6 +61,15 @@ def abandoned_rows(path: Path) -> int | None:
         return None
 
 
+def run_status(path: Path) -> str:
+    """What a results file says of its run, without its rows; "" of a file that cannot be read."""
+    try:
+        with _opened(path) as file:
+            return str(file.attrs["status"])
+    except (OSError, RuntimeError, KeyError):
+        return ""
+
+
 def _opened(path: Path) -> Any:
     """The file, whether or not a run is writing it."""
     try:

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
+from shutil import copyfile
 from types import TracebackType
 from typing import Any, Self
 
@@ -13,7 +14,8 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError, SolveError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
-from kedfem.results.layout import CHUNK_ROWS, FORMAT, PEAKS, new_rows, opened, seal
+from kedfem.results.layout import CHUNK_ROWS, FORMAT, PEAKS, new_rows, opened, seal, series
+from kedfem.results.reader import read_results
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
 from kedfem.scene import Scene
 
@@ -90,6 +92,7 @@ class ResultsWriter:
         drive: Channel = ANGLE,
     ) -> None:
         self.drive = drive
+        self.run, self._before = "", 0
         self.path = Path(path)
         self.channels = tuple(channels)
         self.rows = 0
@@ -99,16 +102,33 @@ class ResultsWriter:
         self._published = False
         self._file: Any = None
 
+    def of_run(self, run: str, rows: int) -> Self:
+        """The same writer, of a run with a name that no other one has.
+
+        Parameters
+        ----------
+        rows
+            How many rows of a file of that run to keep, and to go on after; 0 begins a new file.
+        """
+        self.run, self._before = run, rows
+        return self
+
     def __enter__(self) -> Self:
         ready_folder(self.path.parent)
         self._refuse_another_run()
         try:
             require_space(self.path.parent, SPARE_SPACE)
+            if self._before:
+                self._go_on()
+                return self
             self._file = opened(self._part, "x")
             self._lay_out()
         except OSError as error:
             self._discard()
             raise self._fault(error) from error
+        except OutputError:
+            self._discard()
+            raise
         return self
 
     def append(
@@ -193,6 +213,7 @@ class ResultsWriter:
         self._file.attrs.update(
             {"format": FORMAT, "kedfem_version": installed_version(), "status": "running", "reason": ""}
         )
+        self._file.attrs["run"] = self.run
         scene = self._file.create_group("scene")  # datasets: an attribute holds no more than 64 kB
         for key, text in self._scene.items():
             scene[key] = text
@@ -203,6 +224,26 @@ class ResultsWriter:
             rows.attrs.update(unit=channel.unit, frame=channel.frame, description=channel.description)
             rows.attrs.update(columns=list(channel.columns) or [channel.name], index=index)
         seal(self._file)
+
+    def _go_on(self) -> None:
+        """Take the first rows of this run's own file; it stays as it is until its shortened copy takes its place."""
+        before = read_results(self.path)
+        require_space(self.path.parent, self.path.stat().st_size + SPARE_SPACE)
+        copyfile(self.path, self._part)
+        self._file = opened(self._part, "r+")
+        found = {each.name: each for each in series(self._file)}
+        names = {f"/{each.name}" for each in (TIME, self.drive, *self.channels)}
+        if self._file.attrs.get("run") != self.run or set(found) != names or len(before.time) < self._before:
+            wanted = f"{self.path}: must hold the {self._before} rows of the run to be resumed"
+            raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
+        self._file.pop(PEAKS, None)
+        for rows in found.values():
+            rows.resize(self._before, axis=0)
+        self._file["notes"].attrs.update(self._notes)
+        self._file.attrs.update(status="running", reason="")
+        seal(self._file)
+        self.rows = self._before
+        self._publish()
 
     def _check(self, length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
         """Names and shapes of a block."""

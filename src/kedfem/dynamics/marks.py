@@ -1,0 +1,76 @@
+"""Where a march stands, so that it can be stored and gone on with: the last blocks of its levels and what was before."""
+
+from copy import deepcopy
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from kedfem.dynamics.system.arrays import State
+from kedfem.errors import SolveError
+
+
+@dataclass
+class Mark:
+    """A march at the beginning of the block that it is in.
+
+    step : number of the block's first time point
+    state : of the solver before it; None before the first time point
+    eased : steps of the solver so far whose tolerance was eased
+    kept : whether anybody stores it
+    start : the state at t = 0, where the march begins there, if it is known
+    last : δ'' and the balance's acceleration before it of each link, where levels are combined
+    """
+
+    step: int = 0
+    state: Any = None
+    eased: int = 0
+    last: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    kept: bool = False
+    start: Any = None
+    REMEMBERED: ClassVar = ("step", "state", "eased", "last")
+
+    def set(self, step: int, state: Any, solver: Any) -> None:
+        """The march begins a block; a state that its solver uses up is copied, if anybody stores it.
+
+        The system's states are never used up.
+        """
+        if self.kept:
+            self.step, self.eased = step, int(getattr(solver, "eased", 0))
+            self.state = state if isinstance(state, State) else deepcopy(state)
+
+
+@dataclass
+class Marks:
+    """All levels of a march, and how far what they make together has come.
+
+    done : number of the next time point of the analysis
+    levels : coarsest first
+    corrections : of the finest level's states at the last common time, link by link
+    """
+
+    done: int = 0
+    levels: list[Mark] = field(default_factory=list)
+    corrections: list[dict[str, np.ndarray]] = field(default_factory=list)
+    storable: bool = True
+    REMEMBERED: ClassVar = ("done", "levels", "corrections")
+
+    @classmethod
+    def of(cls, solvers: int, storable: bool = True) -> "Marks":
+        """Before the first time point, of so many levels whose states are kept."""
+        return cls(levels=[Mark(kept=storable) for _ in range(solvers)], storable=storable)
+
+
+def refuse_unstorable(marks: Marks) -> None:
+    """Only loops whose whole state is known can be gone on with.
+
+    Raises
+    ------
+    SolveError
+        This one's is not.
+    """
+    if not marks.storable:
+        raise SolveError(
+            "--resume: must be of a run whose states can be stored, got co-rotational frames with segments or loads that "
+            "only the loop with memory of its own takes; run without --resume"
+        )

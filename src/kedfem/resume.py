@@ -1,0 +1,216 @@
+"""States of a run on the disk, from which it can go on to the same rows after it was ended from outside.
+
+A state belongs to rows that are in the results file, to a scene, to the contents of its files and to this version of
+kedfem. It is put in place whole, after its rows; it goes when the run is complete, or when another one's first rows
+take the place of its rows.
+"""
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from secrets import token_hex
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.marks import Marks, refuse_unstorable
+from kedfem.errors import OutputError, SceneError
+from kedfem.memory import Packed, packed
+from kedfem.results import replacing
+from kedfem.results.writer import installed_version
+from kedfem.scene import Cad, MeshFile, Part, Scene
+from kedfem.store import contents, software
+
+STATE = "state.kept"
+EVERY = 10.0  # seconds between two states: what a kill may cost
+SHARE = 20.0  # times what storing takes: a twentieth of a run's time at most
+OVERDUE = (
+    4.0  # times `every`, after which a state is stored though it is large: steps wait for their stresses
+)
+FORMAT = 1
+
+
+@dataclass
+class Keeper:
+    """Stores the states of one run, and puts one back.
+
+    folder : of the results
+    origin : what the run depends on, key → value
+    every : seconds between two states
+    run : a name that no other run has
+    stored : the state to go on from, if there is one
+    failed : why the last state could not be stored
+    """
+
+    folder: Path
+    origin: dict[str, Any]
+    every: float = EVERY
+    run: str = ""
+    stored: Packed | None = None
+    failed: str = ""
+    _since: float = 0.0
+    _takes: float = 0.0
+
+    @classmethod
+    def of(cls, scene: Scene, folder: Path, resumes: bool, every: float = EVERY) -> "Keeper":
+        """Of a run that begins, or goes on with the one whose state is in its folder.
+
+        Raises
+        ------
+        OutputError
+            There is no state to go on from, or it is damaged.
+        SceneError
+            It belongs to another scene, to other files, or to another version.
+        """
+        keeper = cls(folder, origin(scene), every, token_hex(8), _since=perf_counter())
+        if resumes:
+            keeper.stored = _read(folder / STATE)
+            keeper.run = str(keeper.stored.said["run"])
+            _refuse_other(keeper.stored.put_back("origin"), keeper.origin, "changed back")
+        return keeper
+
+    @property
+    def rows(self) -> int:
+        """Rows that belong to the state to go on from."""
+        return int(self.stored.said["rows"]) if self.stored else 0
+
+    def prepared(self, ready: Prepared, marks: Marks) -> None:
+        """What was planned and meshed belongs to the state to go on from.
+
+        Raises
+        ------
+        SceneError
+            It does not.
+        SolveError
+            The run's states cannot be stored.
+        """
+        self.origin |= {f"planned {key}": value for key, value in flat(ready.scene).items()}
+        self.origin["model"] = _digest(ready)
+        if self.stored:
+            refuse_unstorable(marks)
+            remedy = "planned and meshed again as before (it is, where KEDFEM_CACHE still has both)"
+            _refuse_other(self.stored.put_back("all"), self.origin, remedy)
+
+    def put_back(self, memories: Mapping[str, Any]) -> None:
+        """Everything that the run remembers, as it was.
+
+        Raises
+        ------
+        OutputError
+            The state is damaged.
+        """
+        if self.stored:
+            try:
+                for name, each in memories.items():
+                    self.stored.put_back(name, each)
+            except ValueError as error:
+                raise OutputError(f"{self.folder / STATE}: must be a stored state, got {error}") from error
+
+    def due(self, waits: bool) -> bool:
+        """Whether it is time to store a state; later, while steps wait whose stresses were not looked at."""
+        since = perf_counter() - self._since
+        return since >= max(self.every, SHARE * self._takes) * (OVERDUE if waits else 1.0)
+
+    def keep(self, rows: int, memories: Mapping[str, Any]) -> None:
+        """Store a state that belongs to so many rows; where it cannot be, the run goes on without."""
+        began = perf_counter()
+        said = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin}
+        said |= {
+            "origin": {k: v for k, v in self.origin.items() if k != "model" and not k.startswith("planned ")}
+        }
+        content = packed(said | dict(memories))
+        try:
+            with replacing(self.folder / STATE) as part, part.open("wb") as file:
+                file.write(sha256(content).digest())
+                file.write(content)
+            self.failed = ""
+        except OutputError as error:
+            self.failed = str(error)
+        self._since = perf_counter()
+        self._takes = self._since - began
+
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know of states that could not be stored."""
+        return (f"{self.failed}; had this run been killed, it could not have gone on",) if self.failed else ()
+
+
+def remove_state(folder: Path) -> None:
+    """A state that belongs to no rows any more goes."""
+    with suppress(OSError):
+        (folder / STATE).unlink(missing_ok=True)
+
+
+def has_state(folder: Path) -> bool:
+    """Whether there is a state to go on from."""
+    return (folder / STATE).is_file()
+
+
+def origin(scene: Scene) -> dict[str, Any]:
+    """What a run depends on: kedfem and its libraries, the scene key by key, the contents of its files."""
+    shapes = (link.shape for link in scene.links.values())
+    files = {x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)}
+    named = {f"contents of {name}": contents([scene.folder / name]).hex() for name in sorted(map(str, files))}
+    return {"kedfem": installed_version(), "software": software(), **flat(scene), **named}
+
+
+def flat(scene: Scene) -> dict[str, Any]:
+    """A scene as its keys, dotted, with their values."""
+    out: dict[str, Any] = {}
+
+    def add(name: str, x: Any) -> None:
+        if isinstance(x, dict) and x:
+            for key, value in x.items():
+                add(f"{name}.{key}" if name else key, value)
+        else:
+            out[name] = x
+
+    add("", scene.model_dump(mode="json"))
+    return out
+
+
+def _refuse_other(before: Mapping[str, Any], now: Mapping[str, Any], remedy: str) -> None:
+    """Only what has not changed can be gone on with; the first key that differs is named."""
+    for key in before:
+        then, here = before.get(key, "nothing"), now.get(key, "nothing")
+        if then != here:
+            what = f"{key}: must be {_short(then)}, as in the run to be resumed, got {_short(here)}"
+            raise SceneError(f"{what}; it has to be {remedy}, or run without --resume")
+
+
+def _short(x: Any) -> str:
+    said = str(x)
+    return said if len(said) <= 60 else f"{said[:57]}..."
+
+
+def _read(path: Path) -> Packed:
+    try:
+        whole = path.read_bytes()
+    except FileNotFoundError:
+        said = f"{path}: must be the stored state of a run, got nothing there: the run before is complete, ended before"
+        raise OutputError(f"{said} it stored any, or cannot store them; run without --resume") from None
+    except OSError as error:
+        raise OutputError(f"{path}: must be a readable file, got {error.strerror}") from error
+    try:
+        if sha256(whole[32:]).digest() != whole[:32]:
+            raise ValueError("other bytes than were written")
+        found = Packed(whole[32:])
+        if found.said.get("format") != FORMAT:
+            raise ValueError("another layout")
+        return found
+    except ValueError as error:
+        raise OutputError(f"{path}: must be a stored state, got {error}; run without --resume") from error
+
+
+def _digest(ready: Prepared) -> str:
+    """Of the model's numbers: two runs with the same one do the same."""
+    digest = sha256()
+    for link, joint in zip(ready.model.links, ready.model.joints, strict=True):
+        K0 = link.K0.data if sp.issparse(link.K0) else link.K0
+        for x in (link.X, link.m1, K0, joint.weights, joint.B):
+            digest.update(np.ascontiguousarray(x).tobytes())
+    return digest.hexdigest()

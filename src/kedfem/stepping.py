@@ -1,0 +1,167 @@
+"""All time steps of a run: rows to the results file, frames to the animation, states to go on from."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from time import perf_counter
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.accuracy.estimates import Seen, watcher
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.singular import SingularPasses
+from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.levels import leveled
+from kedfem.dynamics.marks import Marks
+from kedfem.dynamics.model import segments, ways
+from kedfem.dynamics.transient import Steps, storable
+from kedfem.errors import OutputError
+from kedfem.links.recovery import StressRecovery
+from kedfem.output.derived import STEM, fields, remove_derived
+from kedfem.output.vtu import AnimationWriter
+from kedfem.results import Channel, ResultsWriter
+from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.envelope import Envelope
+from kedfem.results.recorded import Recorded
+from kedfem.results.recording import rows
+from kedfem.results.writer import drive_channel
+from kedfem.resume import Keeper, remove_state
+from kedfem.scene import Scene, time_grid, turn_steps
+
+ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
+
+Watch = Callable[[str, int, int], None]
+"""Told of progress: (stage, done, total)."""
+
+
+def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
+    """Numbers of the time steps that become animation frames."""
+    animation, grid = scene.output.animation, time_grid(scene)
+    if animation is None:
+        return np.zeros(0, int)
+    turn = turn_steps(scene) or float(grid.steps)
+    first = 0.0 if animation.last_turns is None else max(0.0, grid.steps - animation.last_turns * turn)
+    count = int((grid.steps - first) * animation.frames_per_turn / turn + 1e-9)
+    steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_turn
+    return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
+
+    recorded: list[Recorded]
+    untold: dict[str, str]
+    efforts: CrossChecks
+    recoveries: list[StressRecovery]
+    passes: SingularPasses
+
+
+def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
+             folder: FilePath, watch: Watch, keeper: Keeper | None = None,
+             ) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
+    """All time steps: rows to the results file, frames to the animation; also what the steps show of errors.
+
+    Parameters
+    ----------
+    keeper : of states on the disk, if the run can be resumed; it may have one to go on from
+    """
+    scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
+    wanted = set(frame_steps(scene).tolist())
+    frames = AnimationWriter(folder, STEM)
+    envelope = Envelope(model, watched.recoveries)
+    seen = watcher(ready)
+    errors = StepWatch(ready, watched.recorded, seen.running)
+    channels = [each.channel for each in watched.recorded]
+    notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
+    following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
+    notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
+    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
+    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
+    marks = Marks.of(len(solvers), keeper is not None and storable(solvers))
+    memories = {
+        "marks": marks, "frames": frames, "envelope": envelope, "seen": seen, "errors": errors,
+        "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
+    }  # fmt: skip
+    if keeper is not None:
+        keeper.prepared(ready, marks)
+        keeper.put_back(memories)
+        refuse_without(frames)
+    written = ResultsWriter(
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
+    )
+    with written.of_run(keeper.run, keeper.rows) if keeper else written as writer:
+        table = _Table(writer, channels, folder)
+        try:
+            for block in leveled(scene, ready.linkage, ready.path, model, solvers, marks):
+                if block.fine or not block.levels:
+                    envelope.add(block)
+                if block.fine:
+                    continue
+                values = rows(watched.recorded, block)
+                table.add(block, values)
+                watched.efforts.add(block, values)
+                watched.passes.add(block)
+                seen.add(block)
+                errors.add(block, values)
+                for k in range(len(block)):
+                    if block.step + k in wanted:
+                        now = block.at(k)
+                        frames.add(now.t, fields(scene, model, watched.recoveries, now))
+                watch("steps", block.step + len(block) - 1, steps)
+                if keeper is not None and marks.storable and keeper.due(envelope.waits):
+                    table.flush()
+                    keeper.keep(writer.rows, memories)
+        finally:
+            table.flush()
+            writer.note(errors.estimate.notes)
+    envelope.flush()
+    return envelope, seen, errors.estimate
+
+
+def refuse_without(frames: AnimationWriter) -> None:
+    """A run goes on only where the frames that it wrote are still there.
+
+    Raises
+    ------
+    OutputError
+    """
+    if (missing := frames.missing) is not None:
+        raise OutputError(
+            f"{missing}: must be there to resume the run that wrote it, got nothing; run without --resume"
+        )
+
+
+@dataclass
+class _Table:
+    """Rows that wait for the results file, but the first: with those an earlier run's frames, pictures and table go."""
+
+    writer: ResultsWriter
+    channels: list[Channel]
+    folder: FilePath
+    waiting: int = 0
+    since: float = 0.0
+    when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list)
+    values: list[dict[str, Float[np.ndarray, "T c"]]] = field(default_factory=list)
+
+    def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
+        """More rows."""
+        self.when.append(np.stack([block.motion.t, block.motion.phi]))
+        self.values.append(values)
+        self.waiting += len(block)
+        if self.waiting >= ROWS or perf_counter() - self.since >= SECONDS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Bring the rows to the disk."""
+        if self.when:
+            time, angle = np.concatenate(self.when, axis=1)
+            block = {c.name: np.concatenate([each[c.name] for each in self.values]) for c in self.channels}
+            self.when, self.values, self.waiting, self.since = [], [], 0, perf_counter()
+            first = self.writer.rows == 0
+            self.writer.append(time, angle, block)
+            if first:
+                remove_derived(self.folder)
+                remove_state(self.folder)

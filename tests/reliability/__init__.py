@@ -1,0 +1,1 @@
+"""What kedfem promises of damaged input, kills and full disks, tried at random; see docs/reliability.md."""

@@ -1,0 +1,278 @@
+"""Kills, shared folders and full disks: `python -m tests.reliability.kills --moments 100 --seed 1`.
+
+A run of `kedfem run` in a process of its own is ended at a random moment, by SIGKILL or SIGTERM; then it goes on, and its
+rows must be those of a run that nobody disturbed, bit by bit. Needs a system with these signals.
+"""
+
+import argparse
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from shutil import copytree, rmtree
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from kedfem.errors import OutputError
+from kedfem.results import Results, read_results
+
+SCENE = """
+[links.crank]
+material = "steel"
+fidelity = "solid"
+shape = { kind = "bar", between = [[0, 0], [0.1, 0]], width = 0.012, thickness = 0.01 }
+mesh = { size = 0.006 }
+[joints.A]
+kind = "revolute"
+links = ["ground", "crank"]
+at = [0, 0]
+[drive]
+joint = "A"
+motion = { kind = "constant_speed", speed = "60 rpm" }
+[analysis]
+turns = 1
+steps_per_turn = STEPS
+accuracy = "quick"
+levels = LEVELS
+[output]
+plots = false
+picture = false
+animation = { frames_per_turn = 60 }
+"""
+LONGEST = 300.0  # seconds that one run may take
+ORPHANS = 5.0  # seconds after which nothing of a killed run may be there
+FOUND, REFUSED, DOUBTFUL, ENDED = 0, 2, 4, 130
+
+
+@dataclass
+class Ground:
+    """Where runs are tried: a scene, the rows that it has, and what its whole run takes [s]."""
+
+    folder: Path
+    rows: Results
+    takes: float
+    counts: Counter[str] = field(default_factory=Counter)
+    findings: list[str] = field(default_factory=list)
+
+    def count(self, what: str, wrong: str = "") -> None:
+        """One more that went as it must, or did not."""
+        self.counts[what] += 1
+        if wrong:
+            self.findings.append(f"{what}: {wrong}")
+
+
+def started(folder: Path, *more: str, cache: Path | None = None, **how: Any) -> "subprocess.Popen[str]":
+    """`kedfem run` in a process of its own."""
+    environment = os.environ | {
+        "KEDFEM_CACHE": str(cache) if cache else "off", "OMP_NUM_THREADS": "1", "COLUMNS": "200",
+        "KEDFEM_TRIED": str(folder),
+    }  # fmt: skip
+    command = [sys.executable, "-m", "kedfem", "run", "scene.toml", *more]
+    return subprocess.Popen(
+        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
+    )
+
+
+def finished(running: "subprocess.Popen[str]") -> tuple[int, str]:
+    """Exit code and all that was said."""
+    out, err = running.communicate(timeout=LONGEST)
+    return running.returncode, out + err
+
+
+def ready(folder: Path, steps: int = 6000, levels: int = 1) -> Ground:
+    """The scene, and its undisturbed run, twice: the first one compiles."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = SCENE.replace("STEPS", str(steps)).replace("LEVELS", str(levels))
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
+    for _ in range(2):
+        began = time.monotonic()
+        code, said = finished(started(folder))
+        if code not in {FOUND, DOUBTFUL}:
+            raise RuntimeError(said)
+    return Ground(folder, read_results(folder / "scene-results" / "results.h5"), time.monotonic() - began)
+
+
+def new_place(ground: Ground, name: str) -> Path:
+    """A folder with the scene alone."""
+    folder = ground.folder.parent / name
+    rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    (folder / "scene.toml").write_bytes((ground.folder / "scene.toml").read_bytes())
+    return folder
+
+
+def others(folder: Path) -> list[int]:
+    """Processes that a run in a folder has left, its workers too."""
+    mark, found = f"KEDFEM_TRIED={folder}".encode(), []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            if (
+                mark in (path / "environ").read_bytes().split(b"\0")
+                and "Z" not in (path / "stat").read_text().rsplit(")", 1)[1].split()[0]
+            ):
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found
+
+
+def unequal(ground: Ground, folder: Path, whole: bool = True) -> str:
+    """What is wrong with the rows that a run left; "" where they are those of the undisturbed one, from the first on."""
+    file = folder / "scene-results" / "results.h5"
+    if not file.exists():
+        return "no results" if whole else ""
+    try:
+        found = read_results(file)
+    except OutputError as error:
+        return str(error)
+    n = len(found.time)
+    if found.status == "running":
+        return "a run is said to be under way"
+    if whole and (found.status != ground.rows.status or n != len(ground.rows.time)):
+        return f"{found.status}, {n} rows"
+    same = np.array_equal(found.time, ground.rows.time[:n]) and all(
+        np.array_equal(found.channels[name][1], values[:n])
+        for name, (_, values) in ground.rows.channels.items()
+    )
+    return "" if same else "other rows"
+
+
+def torn(folder: Path) -> str:
+    """A frame that is listed and not whole."""
+    for path in (folder / "scene-results").glob("*.vtu"):
+        if not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
+            return f"{path.name} is not whole"
+    return ""
+
+
+def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> None:
+    """One run, ended at a part of its time, and gone on with."""
+    folder = new_place(ground, name)
+    cache = folder / "cache"
+    running = started(folder, "--states", "0.05", cache=cache, start_new_session=True)
+    try:
+        time.sleep(moment * ground.takes)
+        ended = running.poll() is None
+        if ended:
+            running.send_signal(number)
+        code, said = finished(running)
+    finally:
+        if running.poll() is None:
+            running.kill()
+    stage = _stage(folder) if ended else "after the end"
+    what = f"{number.name} {stage}"
+    wrong = "a traceback" if "Traceback" in said else ""
+    if ended and number == signal.SIGTERM and code not in {ENDED, FOUND, DOUBTFUL, -number}:
+        wrong = f"exit code {code}: {said[-300:]}"
+    end = time.monotonic() + ORPHANS
+    while others(folder) and time.monotonic() < end:
+        time.sleep(0.1)
+    if left := others(folder):
+        wrong = f"{len(left)} processes are left"
+    ground.count(what, wrong or unequal(ground, folder, whole=False) or torn(folder))
+    state = (folder / "scene-results" / "state.kept").exists()
+    resumes = ("--resume",) * state
+    code, said = finished(started(folder, *resumes, cache=cache))
+    after = "gone on with" if state else "run again"
+    wrong = "" if code in {FOUND, DOUBTFUL} else f"exit code {code}: {said[-400:]}"
+    ground.count(after, wrong or unequal(ground, folder) or torn(folder))
+    rmtree(folder, ignore_errors=True)
+
+
+def _stage(folder: Path) -> str:
+    """How far a run had come."""
+    results = folder / "scene-results"
+    if (results / "state.kept").exists():
+        return "while stepping, with a state"
+    if (results / "results.h5").exists():
+        return "while stepping, before a state"
+    return "before the first rows"
+
+
+def together(ground: Ground, count: int, shared: str) -> None:
+    """Several runs at once in one folder, or each in its own on one cold cache."""
+    cache = ground.folder.parent / "shared-cache"
+    rmtree(cache, ignore_errors=True)
+    if shared == "folder":
+        folders = [new_place(ground, "together")] * count
+    else:
+        folders = [new_place(ground, f"together{k}") for k in range(count)]
+    running = [started(folder, cache=cache) for folder in folders]
+    ends = [finished(each) for each in running]
+    good = [code in {FOUND, DOUBTFUL} for code, _ in ends]
+    refused = [code == REFUSED and "another run" in said for code, said in ends]
+    every = all(a or b for a, b in zip(good, refused, strict=True)) if shared == "folder" else all(good)
+    wrong = "" if every and any(good) else " | ".join(f"{code}: {said[-200:]}" for code, said in ends)
+    for folder in set(folders):
+        wrong = wrong or unequal(ground, folder) or torn(folder)
+        rmtree(folder, ignore_errors=True)
+    ground.count(f"{count} at once on one {shared}", wrong)
+
+
+def short_of(ground: Ground, what: str, limit: int = 0) -> None:
+    """A run without the room, the right, or the folder that it needs: a sentence; what was there is kept."""
+    folder = new_place(ground, "short")
+    copytree(ground.folder / "scene-results", folder / "scene-results")
+    results, how = folder / "scene-results", {}
+    if what == "quota":
+        how = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))}
+    running = started(folder, **how)
+    if what == "folder removed":
+        _wait(
+            lambda: time.monotonic() - began > 0.7 * ground.takes or running.poll() is not None,
+            began := time.monotonic(),
+        )
+        rmtree(results, ignore_errors=True)
+    code, said = finished(running)
+    wrong = ""
+    if "Traceback" in said or "internal error" in said or code not in {FOUND, REFUSED, DOUBTFUL}:
+        wrong = f"exit code {code}: {said[-400:]}"
+    if what != "folder removed":
+        wrong = wrong or unequal(ground, folder, whole=False)
+    elif code == REFUSED and "must be" not in said:
+        wrong = f"no sentence: {said[-300:]}"
+    ground.count(what, wrong)
+    rmtree(folder, ignore_errors=True)
+
+
+def _wait(condition: Callable[[], bool], since: float) -> None:
+    while not condition() and time.monotonic() - since < LONGEST:
+        time.sleep(0.05)
+
+
+def main() -> None:
+    """Try so many moments, and the rest once."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--moments", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--levels", type=int, default=1)
+    given = parser.parse_args()
+    rng = random.Random(f"kills {given.seed}")
+    with TemporaryDirectory() as folder:
+        ground = ready(Path(folder) / "whole", levels=given.levels)
+        for k in range(given.moments):
+            killed(ground, signal.SIGKILL if k % 2 else signal.SIGTERM, rng.uniform(0.1, 1.0), f"k{k}")
+        for count in (2, 5):
+            for shared in ("folder", "cache"):
+                together(ground, count, shared)
+        for limit in (10_000, 100_000, 1_000_000, 2_000_000, 4_000_000):
+            short_of(ground, "quota", limit)
+        short_of(ground, "folder removed")
+        print(f"a whole run takes {ground.takes:.2f} s, {len(ground.rows.time)} rows")  # noqa: T201 - a command
+    for what, count in sorted(ground.counts.items()):
+        print(f"{what:40} {count:5d}")  # noqa: T201
+    for finding in ground.findings:
+        print(f"FINDING {finding}")  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

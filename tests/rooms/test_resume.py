@@ -1,0 +1,248 @@
+"""Runs that were ended from outside go on from their stored state to the same rows, peaks, frames and estimates."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kedfem.analysis import Run, analyse
+from kedfem.dynamics import transient
+from kedfem.errors import KedfemError, OutputError, SceneError
+from kedfem.memory import Packed, packed
+from kedfem.results import read_results
+from kedfem.resume import STATE
+from kedfem.scene import Scene, scene_from
+from tests.laws.test_levels import linkage
+from tests.scenes import constant_speed, four_bar, material
+
+STEPS = 96  # of an analysis
+LOOPS = {  # kinds of loops, as `dynamics.transient` chooses them, each in one of the ways to begin and to combine levels
+    "dense": ("nominal", {"levels": 1}),
+    "dense, two levels": ("nominal", {"levels": 2}),
+    "system": ("springs", {"levels": 1}),
+    "system, three levels": ("springs", {"levels": 3}),
+    "co-rotational": ("following", {"levels": 1}),
+    "co-rotational, two levels": ("following", {"levels": 2}),
+    "literal": ("nominal", {"levels": 1, "solver": "literal"}),
+    "rows": ("rows", {"levels": 1}),
+    "stiffened": ("stiffened", {"levels": 1}),
+}
+CHEAP = {"dense, two levels", "co-rotational"}
+
+
+def scene_of(kind: str, folder: Path, analysis: dict[str, Any]) -> Scene:
+    raw = linkage(kind)
+    raw["analysis"] |= {"step": raw["analysis"]["end_time"] / STEPS, **analysis}
+    raw["output"] = raw["output"] | {"animation": {"frames_per_turn": 20}, "plots": False, "picture": False}
+    return scene_from(raw, folder)
+
+
+def turning(folder: Path, **analysis: Any) -> Scene:
+    """A crank at constant speed for two turns: the second turn takes its motion from the first."""
+    beam = {
+        "material": "soft",
+        "fidelity": "beam",
+        "element": "beam3",
+        "mesh": {"elements": 1},
+        "shape": {"kind": "bar", "width": 0.02, "thickness": 0.01},
+    }
+    raw = four_bar((0.1, 0.3, 0.25, 0.3), beam, constant_speed("60 rpm"))
+    raw |= {"materials": {"soft": material(2700, 7e10)}, "output": {"plots": False, "picture": False}}
+    raw["analysis"] = {"turns": 2, "steps_per_turn": 48, "levels": 1, "frames": "nominal", **analysis}
+    return scene_from(raw, folder)
+
+
+@pytest.fixture(autouse=True)
+def _states_at_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of few steps, and a state after each, however long that takes."""
+    monkeypatch.setattr(transient, "POINTS", 16)
+    monkeypatch.setattr("kedfem.resume.SHARE", 0.0)
+
+
+def ended_early(scene: Scene, at: float, every: float = 0.0) -> None:
+    """A run that is interrupted after a part of its steps."""
+
+    def watch(stage: str, done: int, total: int) -> None:
+        if stage == "steps" and total and done >= at * total:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        analyse(scene, watch, every=every)
+
+
+def content(run: Run) -> dict[str, Any]:
+    """All that a run leaves, but what is drawn."""
+    results = run.results
+    rows = {name: values for name, (_, values) in results.channels.items()}
+    files = {path.name: path.read_bytes() for path in run.folder.iterdir() if path.suffix in {".vtu", ".pvd"}}
+    return {
+        "rows": rows | {"t": results.time, "angle": results.angle}, "status": (results.status, results.reason),
+        "notes": dict(results.notes), "peaks": dict(results.peaks), "files": files, "warnings": run.warnings,
+    }  # fmt: skip
+
+
+def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
+    for name, values in one["rows"].items():
+        np.testing.assert_array_equal(other["rows"][name], values, err_msg=name)
+    for key in ("status", "notes", "peaks", "files", "warnings"):
+        assert one[key] == other[key], key
+
+
+@pytest.mark.parametrize(
+    "loop", [pytest.param(loop, marks=() if loop in CHEAP else pytest.mark.long) for loop in LOOPS]
+)
+def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: Path, loop: str) -> None:
+    kind, analysis = LOOPS[loop]
+    whole = content(analyse(scene_of(kind, tmp_path / "whole", analysis)))
+    ended = scene_of(kind, tmp_path / "ended", analysis)
+    ended_early(ended, 0.4)
+    state = (ended.results_folder / STATE).read_bytes()
+    rows = Packed(state[32:]).said["rows"]
+    assert STEPS / 4 < rows <= len(read_results(ended.results_folder / "results.h5").time) < STEPS
+    resumed = analyse(ended, resumes=True)
+    assert_same(whole, content(resumed))
+    assert not (ended.results_folder / STATE).exists()
+
+
+@pytest.mark.parametrize("at", [pytest.param(0.1, marks=pytest.mark.long), 0.7])
+def test_poses_that_return_are_found_again(tmp_path: Path, at: float) -> None:
+    whole = content(analyse(turning(tmp_path / "whole")))
+    ended_early(turning(tmp_path / "ended"), at)
+    assert_same(whole, content(analyse(turning(tmp_path / "ended"), resumes=True)))
+
+
+@pytest.mark.long
+def test_a_run_that_is_ended_twice_goes_on_twice(tmp_path: Path) -> None:
+    whole = content(analyse(turning(tmp_path / "whole")))
+    scene = turning(tmp_path / "ended")
+    ended_early(scene, 0.2)
+
+    def watch(stage: str, done: int, total: int) -> None:
+        if stage == "steps" and done >= 0.7 * total > 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        analyse(scene, watch, resumes=True, every=0.0)
+    assert_same(whole, content(analyse(scene, resumes=True)))
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [({"turns": 3}, "analysis.turns"), ({"rho_inf": 0.5}, "analysis.rho_inf")],
+)
+def test_another_scene_is_refused_with_the_key_that_differs(
+    tmp_path: Path, changed: dict[str, Any], key: str
+) -> None:
+    ended_early(turning(tmp_path), 0.5)
+    before = read_results(turning(tmp_path).results_folder / "results.h5")
+    with pytest.raises(SceneError, match=rf"^{key}: must be .*, got "):
+        analyse(turning(tmp_path, **changed), resumes=True)
+    after = read_results(turning(tmp_path).results_folder / "results.h5")
+    np.testing.assert_array_equal(after.time, before.time)
+
+
+def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended_early(turning(tmp_path), 0.5)
+    monkeypatch.setattr("kedfem.resume.software", lambda: "another")
+    with pytest.raises(SceneError, match=r"^software: must be .*, got another"):
+        analyse(turning(tmp_path), resumes=True)
+
+
+def test_without_a_state_nothing_is_resumed(tmp_path: Path) -> None:
+    with pytest.raises(
+        OutputError, match=r"state\.kept: must be the stored state of a run, got nothing there"
+    ):
+        analyse(turning(tmp_path), resumes=True)
+    run = analyse(turning(tmp_path))
+    with pytest.raises(OutputError, match="the run before is complete"):
+        analyse(turning(tmp_path), resumes=True)
+    assert read_results(run.folder / "results.h5").status == "complete"
+
+
+def test_the_state_of_one_run_never_meets_the_rows_of_another(tmp_path: Path) -> None:
+    scene = turning(tmp_path)
+    ended_early(scene, 0.5)
+    old = (scene.results_folder / STATE).read_bytes()
+    analyse(scene)
+    (scene.results_folder / STATE).write_bytes(old)
+    with pytest.raises(OutputError, match="got another run's or fewer"):
+        analyse(scene, resumes=True)
+    assert read_results(scene.results_folder / "results.h5").status == "complete"
+
+
+def test_missing_frames_are_noticed(tmp_path: Path) -> None:
+    analysis = LOOPS["system"][1]
+    ended_early(scene_of("springs", tmp_path, analysis), 0.5)
+    folder = scene_of("springs", tmp_path, analysis).results_folder
+    (folder / "animation_0001.vtu").unlink()
+    with pytest.raises(OutputError, match=r"animation_0001\.vtu: must be there to resume"):
+        analyse(scene_of("springs", tmp_path, analysis), resumes=True)
+
+
+def test_a_damaged_state_is_refused(tmp_path: Path) -> None:
+    """A digest stands before all; behind it, what makes a file one of arrays must not be trusted either."""
+    ended_early(turning(tmp_path), 0.5)
+    path = turning(tmp_path).results_folder / STATE
+    good = path.read_bytes()
+    random = np.random.default_rng(17)
+    for k in range(40):
+        changed = bytearray(good)
+        if k % 2:
+            changed[random.integers(len(changed))] ^= 1 << int(random.integers(8))
+        else:
+            changed = changed[: random.integers(len(changed))]
+        path.write_bytes(changed)
+        with pytest.raises(OutputError, match="must be a stored state"):
+            analyse(turning(tmp_path), resumes=True)
+
+
+def test_a_state_makes_records_and_nothing_else() -> None:
+    """No code of whoever wrote it: names of classes that are not kedfem's own records are refused."""
+    for name in (
+        "os:system",
+        "kedfem.store:clear",
+        "subprocess:Popen",
+        "kedfem.cli:typer",
+        "kedfem.resume:Keeper",
+    ):
+        made = Packed(packed({"x": 1}))
+        made.said["x"] = {"record": [name, {"folder": "."}]}
+        if name == "kedfem.resume:Keeper":
+            continue
+        with pytest.raises(ValueError, match="not what was written"):
+            made.put_back("x")
+
+
+def test_what_was_packed_comes_back() -> None:
+    said = {
+        "a": [1, 2.5, None, float("inf")],
+        "b": (np.arange(3.0), {"k": np.float64(0.1), 3: "x"}),
+        "c": True,
+    }
+    back = {name: Packed(packed(said)).put_back(name) for name in said}
+    assert back["a"] == said["a"]
+    assert back["c"] is True
+    np.testing.assert_array_equal(back["b"][0], np.arange(3.0))
+    assert back["b"][1] == {"k": 0.1, 3: "x"}
+
+
+def test_what_cannot_be_stored_is_no_fault_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path) -> Any:
+        raise OutputError(f"{path}: must be a file that can be written, got No space left on device")
+
+    monkeypatch.setattr("kedfem.resume.replacing", full)
+    run = analyse(turning(tmp_path), every=0.0)
+    assert run.results.status == "complete"
+    assert any("it could not have gone on" in each for each in run.warnings)
+
+
+def test_a_loop_with_memories_of_its_own_is_refused_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended_early(turning(tmp_path), 0.5)
+    monkeypatch.setattr("kedfem.stepping.storable", lambda solvers: False)
+    with pytest.raises(KedfemError, match="--resume: must be of a run whose states can be stored"):
+        analyse(turning(tmp_path), resumes=True)
