@@ -82,6 +82,28 @@ def open_shell(folder: Path) -> Path:
     return _written(folder / "open_shell.step", faces)
 
 
+def gap(folder: Path, width: float) -> Path:
+    """The faces of a block of 60 x 20 x 10 mm without a solid, the top one so many mm above the others."""
+
+    def faces(occ: ModuleType) -> None:
+        occ.remove([(3, box(occ, (0, 60), (0, 20), (0, 10)))])
+        occ.synchronize()
+        (top,) = [face for face in occ.getEntities(2) if occ.getCenterOfMass(*face)[2] > 9]
+        occ.translate(occ.copy([top]), 0, 0, width)
+        occ.remove([top])
+
+    return _written(folder / "gap.step", faces)
+
+
+def sliver(folder: Path) -> Path:
+    """A block with a step of half a micrometre along one side."""
+
+    def stepped(occ: ModuleType) -> None:
+        joined(occ, [box(occ, (0, 60), (0, 20), (0, 10)), box(occ, (0, 60), (20, 20.0005), (0, 9.9))])
+
+    return _written(folder / "sliver.step", stepped)
+
+
 def wires(folder: Path) -> Path:
     """A sketch: edges only."""
     return _written(folder / "wires.step", lambda occ: occ.addCircle(0, 0, 0, 10))

@@ -6,7 +6,11 @@ from typing import Any
 
 import pytest
 
-from tests.rooms.cad_files import FORMATS, parts_in, refused, written
+from kedfem.mesh import mesh_quality
+from kedfem.mesh.ways import made_mesh
+from kedfem.scene import Cad, link_from
+from tests import bad_cad
+from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, read, refused, written
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +113,33 @@ class TestBadSolid:
         message = refused(tmp_path / "bow.step")
         assert "must hold a solid of positive volume [m³], got " in message
         assert message.endswith("its faces may be turned inwards or lie on each other: mend the part in CAD")
+
+
+class TestMended:
+    """What OpenCASCADE's mending closes is taken, and told; what it does not is refused as before."""
+
+    @pytest.mark.parametrize(("width", "said"), [(0.005, ""), (0.02, "0.064"), (0.05, "0.064")])
+    def test_faces_with_a_gap_are_sewn(self, tmp_path, width, said):
+        solid = read(bad_cad.gap(tmp_path, width))
+        # sewing may leave the top or take the sides to it
+        assert (
+            60 * 20 * 10 * MM**3 * (1 - 1e-9) <= solid.volume <= 60 * 20 * (10 + width) * MM**3 * (1 + 1e-9)
+        )
+        assert solid.mended == (said and f"faces up to {said} mm apart sewn")
+        assert len(solid.faces) == 6
+
+    def test_a_gap_above_a_thousandth_of_the_size_is_refused(self, tmp_path):
+        assert "faces that do not close (6 of them, 8 free edges" in refused(bad_cad.gap(tmp_path, 0.2))
+
+    def test_the_meshs_line_tells_the_mending(self, tmp_path):
+        path = bad_cad.gap(tmp_path, 0.02)
+        link = link_from({"shape": {"kind": "cad", "file": path.name}, "material": "steel"})
+        mesh = made_mesh(KEYS, "rod", link, Cad(file=path.name), path)
+        assert mesh.way.endswith("; faces up to 0.064 mm apart sewn")
+
+    def test_a_step_of_half_a_micrometre_does_not_stop_a_part(self, tmp_path):
+        path = bad_cad.sliver(tmp_path)
+        link = link_from({"shape": {"kind": "cad", "file": path.name}, "material": "steel"})
+        mesh = made_mesh(KEYS, "rod", link, Cad(file=path.name), path)
+        assert 3 * len(mesh.points) < 45_000
+        assert mesh_quality(mesh).least > 0  # flat beside the step, not folded

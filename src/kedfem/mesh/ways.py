@@ -90,6 +90,8 @@ def made_mesh(
         mesh = with_faces(
             gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, _wanted(link, shape, kept_whole))
         )
+        if solid.mended:
+            mesh = replace(mesh, way=f"{mesh.way}; {solid.mended}")
     return placed(mesh, np.array(shape.origin), file_axes(shape))
 
 

@@ -28,6 +28,7 @@ _MILLIMETRE = 1e-3
 _BREP_UNIT = 1e-3
 SMALLEST, LARGEST = 1e-5, 1e3  # [m], of a part's box: beyond them the unit must be wrong
 _ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
+_GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is told
 _SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
 
 
@@ -87,8 +88,8 @@ def _whole_brep(text: bytes) -> bool:
     return count is not None and int(count[1]) == len(shapes) and text.split()[-1] == b"0"
 
 
-def read_solids(gmsh: ModuleType, file: CadFile) -> list[int]:
-    """The tags of a file's solids, now in gmsh's model in metres; closed faces without a solid are made one.
+def read_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
+    """The tags of a file's solids, now in gmsh's model in metres, and what was mended; closed faces are made one.
 
     Raises
     ------
@@ -100,19 +101,39 @@ def read_solids(gmsh: ModuleType, file: CadFile) -> list[int]:
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
     if solids or not gmsh.model.getEntities(2):
         _check_any(gmsh, file, solids)
-        return solids
+        return solids, ""
     boxes = np.array([gmsh.model.getBoundingBox(2, tag) for tag in _faces(gmsh)])
+    extent = 0.0
     if np.abs(boxes).max() < _ENDLESS:
-        extent = np.linalg.norm(boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0))
-        check_size(file, "its faces", float(extent))
+        extent = float(np.linalg.norm(boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)))
+        check_size(file, "its faces", extent)
     for gap in _SEWING:
         _clear(gmsh)
         imported(gmsh, file, scaling, sewing=gap)
         if not _free_edges(gmsh, _faces(gmsh)):
             break
     solids = _closed_solids(gmsh)
+    for gap in () if solids else (share * extent for share in _GAPS):
+        _clear(gmsh)
+        imported(gmsh, file, scaling, sewing=None)
+        if _healed(gmsh, gap) and not _free_edges(gmsh, _faces(gmsh)):
+            return [tag for _, tag in gmsh.model.getEntities(3)], f"faces up to {1e3 * gap:.2g} mm apart sewn"
+    if not solids:
+        _clear(gmsh)
+        imported(gmsh, file, scaling, sewing=_SEWING[-1])
     _check_any(gmsh, file, solids)
-    return solids
+    return solids, ""
+
+
+def _healed(gmsh: ModuleType, tolerance: float) -> bool:
+    """Whether there are solids once OpenCASCADE has mended all shapes of the model: wires, tiny edges, gaps [m]."""
+    try:
+        with silent():
+            gmsh.model.occ.healShapes([], tolerance=tolerance)
+            gmsh.model.occ.synchronize()
+    except Exception:  # noqa: BLE001  (gmsh raises nothing more special)
+        return False
+    return bool(gmsh.model.getEntities(3))
 
 
 def check_size(file: CadFile, what: str, extent: float) -> None:

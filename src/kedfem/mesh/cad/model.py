@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -58,10 +58,11 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 
 def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: str | None) -> Solid:
     """One solid of a file, which is read into gmsh's empty model and left alone there."""
-    tags, names, bodies = _named_solids(gmsh, file)
+    tags, names, bodies, mended = _named_solids(gmsh, file)
     tag = tags[_choice(key, file, names, link, wanted)]
     leave_only(gmsh, tag)
-    return _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
+    solid = _solid(gmsh, file, tag, names[tags.index(tag)], bodies[tag])
+    return replace(solid, mended=mended) if mended else solid
 
 
 def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
@@ -72,13 +73,15 @@ def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
     MeshError
         As `solid_model`, for any of them.
     """
-    tags, names, bodies = _named_solids(gmsh, file)
+    tags, names, bodies, _ = _named_solids(gmsh, file)
     return [_solid(gmsh, file, tag, name, bodies[tag]) for tag, name in zip(tags, names, strict=True)]
 
 
-def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str], dict[int, Body | None]]:
-    """The tags of a file's solids, now in gmsh's model, their names, and their bodies in the file's text."""
-    tags = read_solids(gmsh, file)
+def _named_solids(
+    gmsh: ModuleType, file: CadFile
+) -> tuple[list[int], list[str], dict[int, Body | None], str]:
+    """The tags of a file's solids, now in gmsh's model, names, bodies in the file's text, and what was mended."""
+    tags, mended = read_solids(gmsh, file)
     most = max(len(_boundary(gmsh, tag)) for tag in tags)
     if most > MOST_FACES:
         raise MeshError(
@@ -87,7 +90,7 @@ def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str]
             "program (shape.kind = 'mesh')"
         )
     bodies = _bodies(gmsh, file, tags)
-    return tags, _solid_names(gmsh, file, tags, bodies), bodies
+    return tags, _solid_names(gmsh, file, tags, bodies), bodies, mended
 
 
 def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | None) -> Solid:

@@ -36,7 +36,7 @@ class CadFace:
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """The one solid in gmsh's model, in metres: its tag, name, volume [m³], box and faces."""
+    """The one solid in gmsh's model, in metres: its tag, name, volume [m³], box, faces; what was mended at import."""
 
     tag: int
     name: str
@@ -44,6 +44,7 @@ class Solid:
     low: Float[np.ndarray, "3"]
     high: Float[np.ndarray, "3"]
     faces: tuple[CadFace, ...]
+    mended: str = ""
 
     @property
     def extent(self) -> float:

@@ -13,12 +13,15 @@ from kedfem.mesh.plane import PlaneQuads, directed_sides
 from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
 _LINE, _POINT = 1, 15  # gmsh's numbers of elements
+_MOST_SIDES = (
+    4000  # of a region's rim: a sliver of micrometres asks for more; all are compared with each other
+)
 _ROUNDING = 1e-24  # square of the area between sides that are on one line
 
 
 def polygon_quads(rim: Rim) -> Iterator[PlaneQuads | None]:
     """What gmsh makes of a region under each setting, on the rim's own nodes; None if not quadrilaterals alone."""
-    if crosses_itself(rim.points, rim.sides):
+    if len(rim.sides) > _MOST_SIDES or crosses_itself(rim.points, rim.sides):
         return  # gmsh might never come back
     for setting in SETTINGS:
         with gmsh_model() as gmsh:
