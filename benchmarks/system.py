@@ -9,8 +9,6 @@ from tests.rooms.test_acted import four_bar as hinged
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.actions import actions
-from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED
 from kedfem.dynamics.substructure import factored
@@ -21,7 +19,7 @@ from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.dynamics.transient import forcings, motions, started, steps_of, transient
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import following, path_parameter, scene_from, time_grid
+from kedfem.scene import path_parameter, scene_from, time_grid
 
 STEPS, TURNS = 2000, 3
 
@@ -60,11 +58,7 @@ def speeds(raw: dict[str, Any], few: int) -> tuple[float, float, float]:
     short = scene_from({**raw, "analysis": {**raw["analysis"], "end_time": few * grid.step}})
     old = []
     for _ in range(TURNS):
-        solver: Any = steps_of(short, made.model)
-        if following(short):
-            scheme, model = generalised_alpha(grid.step, short.analysis.rho_inf), made.model
-            every = actions(short, model)
-            solver = FollowingDense(model.links, model.joints, scheme, model.damping, every, CONVERGED)
+        solver = steps_of(short, made.model)
         began = perf_counter()
         for _ in transient(short, made.linkage, made.path, made.model, solver):
             pass

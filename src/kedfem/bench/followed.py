@@ -12,7 +12,6 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.bench.scenes import four_bar_of
 from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
@@ -124,7 +123,7 @@ def advanced(
 ) -> Any:
     """A solver's state after some steps."""
     known: tuple[Any, ...] = (forcing,)
-    if isinstance(solver, FollowingDense | FollowingSteps | CorotationalSteps):
+    if isinstance(solver, FollowingSteps | CorotationalSteps):
         known = (forcing, motion)
     if isinstance(solver, CorotationalSteps):
         known = (forcing, motion, _motion_at(ready))

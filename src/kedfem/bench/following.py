@@ -10,7 +10,6 @@ import numpy as np
 from kedfem.bench.followed import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
 from kedfem.bench.machine import Watch, markdown, table, write_page
 from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.system.corotational import CorotationalSteps
 
 STEPS = 3000  # usual number
@@ -200,11 +199,11 @@ def _costs(watch: Watch) -> list[str]:
         linear, _ = cost(four_bar(link, STEPS))
         for count in segments:
             step, solver = cost(four_bar({**link, "segments": count}, STEPS, frames="following"))
-            kind = "compiled" if isinstance(solver, FollowingDense | CorotationalSteps) else "general"
+            kind = "compiled" if isinstance(solver, CorotationalSteps) else "general"
             unknowns = sum(each.unknowns for each in solver.links)
             sweeps = (
                 solver.sweeps / (BLOCKS * POINTS)
-                if isinstance(solver, FollowingDense | FollowingSteps | CorotationalSteps)
+                if isinstance(solver, FollowingSteps | CorotationalSteps)
                 else 0.0
             )
             rows.append((

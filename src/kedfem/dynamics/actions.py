@@ -22,15 +22,17 @@ from kedfem.dynamics.action import (
     End,
     Vector,
 )
+from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.model import Model, Slider, on_segment
 from kedfem.dynamics.places import seat_of, slider_axis
+from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import Seat, face_normal, holds, port_weights
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import perpendiculars
-from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
+from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring, path_parameter, time_grid
 
 
 def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
@@ -67,20 +69,36 @@ def hinges(scene: Scene, model: Model) -> tuple[Action, ...]:
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
 
 
-def followers(model: Model) -> tuple[Action, ...]:
-    """Loads that turn with links that no drive leads, one for each component in the link."""
+def followers(scene: Scene, model: Model) -> tuple[Action, ...]:
+    """Loads that turn with links as these themselves do, at the time steps, one for each component in the link.
+
+    Raises
+    ------
+    SceneError
+        If a torque is fixed in the world.
+    """
+    for k, load in turning(model.loads):
+        if load.share is not None:
+            raise SceneError(
+                f"loads: a torque in space that does not turn with link '{model.links[k].name}' in co-rotational "
+                f"frames must act on segments of at most {SMALL} unknowns, got {model.links[k].unknowns}: give it more "
+                "segments or larger elements"
+            )
+    grid = time_grid(scene)
+    t = grid.step * np.arange(grid.steps + 1)
+    phi = path_parameter(scene, t)[0]
     return tuple(
         Action(
             f"loads/{k}",
             FOLLOW,
             (_shown(model, k, w), _bearing(model, k, w)),
             axis=axis,
-            at=table[0],
-            value=table[1],
+            at=tuple(t.tolist()),
+            value=tuple(load.factor(t, phi).tolist()),
         )
         for k, (link, loads) in enumerate(zip(model.links, model.loads, strict=True))
         for load in loads
-        if (table := load.table) is not None
+        if load.own
         for axis, w in zip(np.eye(3), load.forces.T[: 2 if link.planar else 3], strict=False)
         if w.any()
     )

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.history import LinkHistory, joined
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import NotConverged
@@ -16,8 +15,7 @@ from kedfem.motion.rigid import RigidMotion
 
 HALVINGS = 6  # a step is taken in up to 2⁶ parts
 
-Followers = FollowingSteps | FollowingDense
-Advance = Callable[[Followers, Any, RigidMotion], tuple[list[LinkHistory], Any]]
+Advance = Callable[[FollowingSteps, Any, RigidMotion], tuple[list[LinkHistory], Any]]
 
 
 class Stuck(Exception):  # noqa: N818 - the driver of the steps says it as an error
@@ -45,10 +43,10 @@ class Bridge:
     rho_inf: float
     motion_at: Callable[[Float[np.ndarray, " T"]], RigidMotion]
     advance: Advance
-    finer: dict[int, Followers] = field(default_factory=dict)
+    finer: dict[int, FollowingSteps] = field(default_factory=dict)
     bridged: int = 0
 
-    def block(self, solver: Followers, state: Any, motion: RigidMotion) -> tuple[list[LinkHistory], Any]:
+    def block(self, solver: FollowingSteps, state: Any, motion: RigidMotion) -> tuple[list[LinkHistory], Any]:
         """All time points of a block, [KED, eq. (20)].
 
         Raises
@@ -74,7 +72,7 @@ class Bridge:
 
     def _in_parts(
         self,
-        solver: Followers,
+        solver: FollowingSteps,
         state: Any,
         end: RigidMotion,
         k: int,
@@ -95,7 +93,7 @@ class Bridge:
             return [each.part(parts - 1, parts) for each in histories], after
         raise Stuck(k, joined(done), link)
 
-    def _finer(self, solver: Followers, level: int) -> Followers:
+    def _finer(self, solver: FollowingSteps, level: int) -> FollowingSteps:
         if level not in self.finer:
             scheme = generalised_alpha(self.h / 2**level, self.rho_inf)
             self.finer[level] = type(solver)(

@@ -28,7 +28,6 @@ from kedfem.links.seats import (
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,
-    Factor,
     ForceLoad,
     Load,
     PressureLoad,
@@ -56,14 +55,14 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
-    table : times and factors, of a load that turns with a link whose frame does: an action (`actions.followers`)
+    own : turns as the link itself does, which no nominal orientation tells: `system.turning_loads`
     """
 
     forces: Float[np.ndarray, "n d"]
     follows: bool
     factor: Callable[[Times, Times], Times]
     share: tuple[Vector, Vector] | None = None
-    table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    own: bool = False
 
 
 def patterns(
@@ -87,31 +86,13 @@ def patterns(
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
             own = links[key].fit is not None and not prescribed
-            out[key] += [_led(scene, f"loads.{name}", load, x) for x in found] if own else found
+            out[key] += [replace(x, own=own and _turns(x)) for x in found]
     return {key: tuple(found) for key, found in out.items()}
 
 
-def _led(scene: Scene, where: str, load: Load, pattern: Pattern) -> Pattern:
-    """A load of a link whose frame is its own: no nominal orientation tells its direction."""
-    if pattern.share is not None:
-        frames = "with co-rotational frames" if scene.driven else "in a scene without a drive"
-        raise SceneError(
-            f"{where}.frame: must be 'link' for a torque in space {frames}, where no axis is fixed in a link that "
-            "bends, got 'world'"
-        )
-    turns = (
-        pattern.follows and pattern.forces[:, :2].any()
-    )  # ψ of a planar beam takes a torque however it has turned
-    return replace(pattern, table=_over_time(scene, load.factor)) if turns else pattern
-
-
-def _over_time(scene: Scene, factor: Factor) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Times and factors of a load, linear between; of one over the drive's angle at the time steps."""
-    grid = time_grid(scene)
-    if factor.over == "time":
-        return factor_table(factor, grid.end)
-    t = grid.step * np.arange(grid.steps + 1)
-    return tuple(t.tolist()), tuple(load_factor(factor, t, path_parameter(scene, t)[0]).tolist())
+def _turns(pattern: Pattern) -> bool:
+    """Whether a load depends on how its link has turned: ψ of a planar beam takes a torque however it has."""
+    return pattern.follows and bool(pattern.forces[:, :2].any())
 
 
 def coarse_steps(scene: Scene) -> tuple[str, ...]:
@@ -289,7 +270,7 @@ def applied(
     F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
     R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
     for load in loads:
-        if load.table is not None:
+        if load.own:
             continue
         factor = amounts(load, motion, body)
         if factor.any():

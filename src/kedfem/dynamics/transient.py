@@ -15,7 +15,6 @@ from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.first_rows import FIRST, INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.following_dense import FollowingDense
 from kedfem.dynamics.following_start import excess, far_deflected
 from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
 from kedfem.dynamics.interface import static_tie
@@ -42,7 +41,7 @@ from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
-from kedfem.scene.capabilities import LARGE_SEGMENTS, TURNING_LOADS
+from kedfem.scene.capabilities import LARGE_SEGMENTS
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
@@ -52,7 +51,7 @@ LARGE = (
 )
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps | FollowingSteps | FollowingDense
+ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps | FollowingSteps
 Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
 UNSETTLED = (
@@ -95,27 +94,24 @@ def _follower(scene: Scene, model: Model, scheme: Scheme) -> Steps:
         If joints by constraint equations stand beside what the system does not know yet.
     """
     tolerance = FREE if scene.driven is None else CONVERGED
-    turning, large = followers(model), [link for link in model.links if link.unknowns > SMALL]
+    large = [link for link in model.links if link.unknowns > SMALL]
     if model.rows:
-        _refuse_beside_rows(model, bool(turning))
+        _refuse_beside_rows(model)
         return CorotationalSteps(scene, model, scheme, tolerance)
-    if not large and not turning:
+    if not large:
         try:
             return CorotationalSteps(scene, model, scheme, tolerance)
         except (
             MeshError
         ):  # a seat that does not tell how it turns as a whole: actions know one direction of it
             pass
-    follower = FollowingSteps if large else FollowingDense
-    every = (*actions(scene, model), *turning)
-    return follower(model.links, model.joints, scheme, model.damping, every, tolerance)
+    every = (*actions(scene, model), *followers(scene, model))
+    return FollowingSteps(model.links, model.joints, scheme, model.damping, every, tolerance)
 
 
-def _refuse_beside_rows(model: Model, turning: bool) -> None:
-    """What co-rotational frames with joints by constraint equations do not know yet: loads that turn, large segments."""
+def _refuse_beside_rows(model: Model) -> None:
+    """What co-rotational frames with joints by constraint equations do not know yet: large segments."""
     names = ", ".join(x.name if x.name.startswith("gears.") else f"joints.{x.name}" for x in model.rows)
-    if turning:
-        raise SceneError(TURNING_LOADS.said({"names": names}))
     for link in model.links:
         if link.unknowns > LARGE:
             words = {
@@ -168,7 +164,7 @@ def transient(
                 continue
             mark.set(first + k, state, solver)
             part = motion.part(k, k + length)
-            if isinstance(solver, FollowingSteps | FollowingDense):
+            if isinstance(solver, FollowingSteps):
                 try:
                     links, state = bridge.block(solver, state, part)
                 except Stuck as stuck:
@@ -223,7 +219,7 @@ def storable(solvers: Sequence[Steps]) -> bool:
 
 def stresses_of(solver: Steps) -> Stiffening | None:
     """Geometric stiffening that a solver knows, if any."""
-    if isinstance(solver, FollowingSteps | FollowingDense | CorotationalSteps):
+    if isinstance(solver, FollowingSteps | CorotationalSteps):
         return None
     return solver.stiffening
 
@@ -249,7 +245,7 @@ def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByL
     """A solver's state at the first time point."""
     if isinstance(states, State) or isinstance(solver, SystemSteps):
         return states
-    if not model.rows or isinstance(solver, FollowingSteps | FollowingDense):
+    if not model.rows or isinstance(solver, FollowingSteps):
         return solver.begin(states)
     rows = rows_at_start(scene, linkage, along, model)
     return solver.begin(states, None if rows is None else rows.state(model.joints, states))
@@ -272,7 +268,7 @@ def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> l
         return solver.first(states, forcings(model, drawn), drawn)
     if isinstance(states, State):
         raise ValueError("the start of links must be their states, got a system's")
-    if not isinstance(solver, FollowingSteps | FollowingDense):
+    if not isinstance(solver, FollowingSteps):
         return [history([state]) for state in states]
     every = zip(model.links, model.joints, states, strict=True)
     return [first_history(link, joint, model.damping, state) for link, joint, state in every]
@@ -306,11 +302,7 @@ def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     """A warning where iterations of steps were taken as converged at an eased tolerance."""
-    eased = sum(
-        each.eased
-        for each in solvers
-        if isinstance(each, FollowingSteps | FollowingDense | CorotationalSteps)
-    )
+    eased = sum(each.eased for each in solvers if isinstance(each, FollowingSteps | CorotationalSteps))
     if not eased:
         return ()
     return (
@@ -387,7 +379,9 @@ def first_states(
     every = actions(scene, model)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        forces = first_forces((*every, *followers(model)), model.links, motion, [(x.u, x.v) for x in start])
+        forces = first_forces(
+            (*every, *followers(scene, model)), model.links, motion, [(x.u, x.v) for x in start]
+        )
         rows = rows_at_start(scene, linkage, along, model)
         states = initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
         # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
@@ -400,7 +394,7 @@ def first_states(
         )
         each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
         return rigid_start(model.links, model.joints, states, each)
-    every = (*every, *followers(model))
+    every = (*every, *followers(scene, model))
     if every:
         more = still_forces(
             Forces(every, model.links, h), motion,

@@ -61,10 +61,6 @@ class Refusal:
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("following",)}, "{where}.kind",
     'be another than slot with frames = "following"', "the pin of a slot slides as the nominal motion tells",
     "a slot", 'take frames = "nominal", or a slide with a hinge')  # fmt: skip
-TURNING_LOADS = Refusal("model", {"enforced": (CONSTRAINED,), "frames": ("following",), "load": ("turns with its link",)},
-    "loads", 'have frame = "world" and no pressure beside {names} with frames that follow',
-    "which are held by constraint equations", "ones that turn with their links",
-    "take nominal frames, or forces in the world")  # fmt: skip
 LARGE_SEGMENTS = Refusal("model", {"enforced": (CONSTRAINED,), "frames": ("following",),
     "unknowns": ("too many for dense matrices",)},
     "{where}", "have at most {most} unknowns in each segment beside {names} with frames that follow",
@@ -75,7 +71,6 @@ SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{
     "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
 REFUSALS = (
     SLOTS,
-    TURNING_LOADS,
     LARGE_SEGMENTS,
     SLIDERS,
     Refusal("joints", {"enforced": (CONSTRAINED,), "stiffening": ("on",)}, "{where}.{key}",

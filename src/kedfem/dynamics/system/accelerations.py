@@ -55,16 +55,16 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
 
 
 def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked) -> Solved:
-    """The same, but for what springs and motors do: A x = c_M Wᵀ λ with the matrix of a step.
+    """The same, but for what springs, motors and loads that turn with bodies do: A x = c_M Wᵀ λ with a step's matrix.
 
     Their whole force would at first accelerate next to no mass about their points: no step resolves that, and laws would
     see its rates. What stands against it in that matrix, c_K/c_M K x, is internal force at the start, so that all
     forces balance there. Large bodies, which are not stepped so, have their mass alone.
     """
-    of, K, none = now.of, now.always.still.K, np.zeros_like(r)
+    of, K, pushed = now.of, now.always.still.K, now.pushed(u)
     share = of.c.c_K / of.c.c_M
-    alone = accelerations(now, r, u, v, replace(asked, known=0 * asked.known))
-    if not asked.known.any():
+    alone = accelerations(now, r - pushed, u, v, replace(asked, known=0 * asked.known))
+    if not (asked.known.any() or pushed.any()):
         return alone
     small = [not isinstance(part, SparsePart) for part in of.parts]
     held = [
@@ -72,7 +72,7 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
         for k, part in enumerate(of.parts)
     ]
     balance = Balance(of, held, now.R, replace(asked, target=0 * asked.target))
-    more = balance.solved(none)
+    more = balance.solved(pushed)
     x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
     f = np.concatenate([balance.turned(k, small[k] * share * (K[k] @ x[k])) for k in range(len(K))])
     return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, f)

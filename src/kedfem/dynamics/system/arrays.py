@@ -50,6 +50,27 @@ class Beams(NamedTuple):
     rigidity: Any
 
 
+class TurningLoads(NamedTuple):
+    """Loads that turn with bodies, as directions shown by the body turn; see `turning_loads`.
+
+    body, at : (w,) number, and where its coordinates' share of `force` and twice its functions' of `shown` begin
+    planar_beam : (w,) whether an angle shows how it turns
+    drawn : (w, 2, 3) the directions as drawn; shown : weights of functions on what they move by
+    force : on the body's coordinates, components along the directions' frame
+    axis, fixed : (w, 3) in that frame and in the world, whose product a load's amount has for a factor; zero: none
+    """
+
+    body: Any
+    force_at: Any
+    shown_at: Any
+    planar_beam: Any
+    drawn: Any
+    shown: Any
+    force: Any
+    axis: Any
+    fixed: Any
+
+
 class Masses(NamedTuple):
     """Mass of sparse bodies, whose coordinates are nodal: matrices m of components, row by row, one after the other.
 
@@ -75,6 +96,7 @@ class Bodies(NamedTuple):
     column_at, columns : interface unknowns that each body knows; first : profile of their common matrix
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
     beams : those that know their strains at points; elements : of beams in space, whose strains need no frame
+    turning : loads that turn with bodies
     """
 
     at: Any
@@ -107,6 +129,7 @@ class Bodies(NamedTuple):
     beams: Beams
     elements: Elements
     mass: Masses
+    turning: TurningLoads
 
 
 class Ends(NamedTuple):
@@ -236,7 +259,7 @@ class Driving(NamedTuple):
 
     t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
     drives : (T, D)
-    F : (T, N) P − M R0'' on the coordinates, world components
+    F : (T, N) P − M R0'' on the coordinates, world components; amounts : (T, w) of loads that turn with bodies
     stations : (T, n) weights of the stations of all lines, where their pins are
     """
 
@@ -247,6 +270,7 @@ class Driving(NamedTuple):
     omega: Any
     drives: Any
     F: Any
+    amounts: Any
     stations: Any
 
 
@@ -318,3 +342,4 @@ class Work(NamedTuple):
     vectors: Any
     law: Any
     element: Any
+    frame: Any

@@ -52,7 +52,7 @@ def room(bodies: Bodies) -> Work:
     points = np.zeros((5, bodies.beams.tangent.shape[2]))
     return Work(
         y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
-        np.zeros((12, 3)), np.zeros(3), room_for(bodies.elements),
+        np.zeros((12, 3)), np.zeros(3), room_for(bodies.elements), np.zeros((3, 3)),
     )  # fmt: skip
 
 

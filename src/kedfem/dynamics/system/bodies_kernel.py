@@ -11,6 +11,7 @@ from kedfem.dynamics.frames_kernel import entry, held_together
 from kedfem.dynamics.metric_kernel import metric_force
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.record import COROTATIONAL, NOMINAL, TANGENTIAL
+from kedfem.dynamics.system.turning_kernel import turned_loads
 
 
 @inner
@@ -130,8 +131,11 @@ def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untype
 
 
 @inner
-def internal_forces(c, bodies, R, state, trial, work):  # type: ignore[no-untyped-def]
-    """trial.f becomes the internal force of all bodies with frames of their own at trial.u, world components."""
+def internal_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-untyped-def]
+    """trial.f becomes the internal force of all bodies with frames of their own at trial.u, world components.
+
+    Loads that turn with them are taken from it, their amounts being given.
+    """
     f, beams = trial.f, bodies.beams
     for i in range(len(bodies.motion)):
         if bodies.frame[i] != NOMINAL:
@@ -145,6 +149,7 @@ def internal_forces(c, bodies, R, state, trial, work):  # type: ignore[no-untype
             corotational_force(c, bodies, i, R, state, trial, work)
         if bodies.frame[i] != NOMINAL and c.alpha != 0.0:
             mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
+    turned_loads(bodies, R, amounts, trial.u, f, work.frame)
 
 
 @inner

@@ -30,6 +30,7 @@ from kedfem.dynamics.system.march import Motion, displacements, march, ready
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
+from kedfem.dynamics.system.turning_loads import turned, turning
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
@@ -138,7 +139,14 @@ class CorotationalSteps:
         forces = supports(self.ready, self.scene, found, motion)
         acting = on_links(forces, self.riders)
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
-        return every, exerted(forces, self.elements)
+        return self._with_turning_loads(every, motion), exerted(forces, self.elements)
+
+    def _with_turning_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
+        """Forces F with those of loads that turn with links."""
+        for k, load in turning(self.model.loads):
+            R, factor = motion.R[:, self.model.bodies[k]], load.factor(motion.t, motion.phi)
+            every[k] = replace(every[k], F=every[k].F + turned(self.links[k], load, R, every[k].u, factor))
+        return every
 
     def _link(self, k: int, found: History, forcing: Forcing, acting: Rows | None) -> LinkHistory:
         """How a link moves, in its frame as that is, and what acts on it."""

@@ -167,18 +167,18 @@ def _balanced(
     """
     of, mixing, bodies, settled = now.of, Mixing(), _Held(now, spins), False
     for _ in range(SWEEPS):
-        f, R = bodies.still.forces(now.motion.R[0], u)
+        f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
             change = bodies.change(Balance(of, bodies.held(R), R, _asked(now, u, z1)), r)
         except SolveError:
             break
+        if not np.isfinite(change).all():
+            break
         if settled:  # once more: what is left of stiff hubs would be large accelerations
             return np.asarray(u + change)
         u = u + mixing.step(change)
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        if not np.isfinite(size):
-            break
         settled = size <= CONVERGED * reached + of.c.floor
     raise SolveError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "

@@ -1,7 +1,7 @@
 """A system at one time of its nominal motion: all that starts ask of bodies, coordinates and laws there."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +9,8 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.linalg import splu
 
-from kedfem.dynamics.system.internal import Inside, Still, inside, own
+from kedfem.dynamics.dense import work_on
+from kedfem.dynamics.system.internal import Inside, Still, inside, own, rows
 from kedfem.dynamics.system.march import Ready, driving
 from kedfem.dynamics.system.rates import coordinates, gradients, places, term_values, travels
 from kedfem.dynamics.system.record import (
@@ -25,6 +26,8 @@ from kedfem.dynamics.system.record import (
     Stop,
 )
 from kedfem.dynamics.system.sparse import SparsePart, sparse_frequency
+from kedfem.dynamics.system.turning_loads import turned as turned_load
+from kedfem.dynamics.system.turning_loads import turning
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
@@ -62,16 +65,27 @@ class Instant:
     def __init__(self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None) -> None:
         motion = motion_at(np.array([time]))
         self.of, self.time, self.motion = of, time, motion
-        self.F, self.at = driving(of, motion).F[0], places(motion)
+        along = driving(of, motion)
+        self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
 
     def inside(self, u: Flat, v: Flat) -> list[Inside]:
-        """All bodies at a displacement and rate."""
-        spins = cross_matrix(self.omega)
-        return [inside(self.of, k, self.R[k], spins[k], u[own(self.of, k)], v[own(self.of, k)])
-                for k in range(len(self.R))]  # fmt: skip
+        """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
+        of, spins = self.of, cross_matrix(self.omega)
+        out = [inside(of, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
+        pushed = self.pushed(u)
+        return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
+
+    def pushed(self, u: Flat) -> Flat:
+        """Loads that turn with bodies (N,) on the coordinates at a displacement, world components."""
+        of, out = self.of, np.zeros_like(u)
+        for (k, load), amount in zip(turning(of.system.model.loads), self.amounts, strict=True):
+            link, here = of.system.model.links[k], own(of, k)
+            force = turned_load(link, load, self.R[k][None], rows(of, k, u[here])[None], amount[None])[0]
+            out[here] += work_on(of.parts[k], force).ravel()
+        return out
 
     def interface(self, x: Flat) -> Flat:
         """Interface unknowns from coordinates whose joints are closed: B z = W x."""

@@ -42,18 +42,21 @@ class Still:
         self._state, self._work = empty_state(of.bodies, of.constraints), room(of.bodies)
         self._trial = empty_trial(of.bodies, of.ends, of.constraints, self._state)
 
-    def forces(self, R: Float[np.ndarray, "M 3 3"], u: Flat) -> tuple[Flat, Float[np.ndarray, "L 3 3"]]:
+    def forces(
+        self, R: Float[np.ndarray, "M 3 3"], u: Flat, amounts: Float[np.ndarray, " w"]
+    ) -> tuple[Flat, Float[np.ndarray, "L 3 3"]]:
         """f (N,), world components, and the bodies' orientations, at a displacement u.
 
         Parameters
         ----------
         R : of all bodies of the linkage in the nominal motion
+        amounts : of loads that turn with bodies
         """
         from kedfem.dynamics.system.still_kernel import still_forces
 
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
-        still_forces(self._c, bodies, R, self._state, trial, self._work)
+        still_forces(self._c, bodies, R, amounts, self._state, trial, self._work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, (K, frame) in enumerate(zip(self.K, bodies.frame, strict=True)):
             if frame != NOMINAL:

@@ -38,6 +38,7 @@ from kedfem.dynamics.system.record import (
     Stop,
 )
 from kedfem.dynamics.system.sparse import Part, SparsePart, mass_tables, sparse_part
+from kedfem.dynamics.system.turning_loads import Loads, turning_loads
 from kedfem.links.record import BeamPoint, Link
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
@@ -96,15 +97,16 @@ def frame_of(link: Link) -> int:
 
 def body_arrays(
     links: Sequence[Link], joints: Sequence[Attachment], numbers: Sequence[int], parts: Sequence[Part],
-    number: Int[np.ndarray, " k"], first: Int[np.ndarray, " k"],
+    numbering: tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]], loads: Loads,
 ) -> Bodies:  # fmt: skip
     """All bodies as flat arrays, their parts factored.
 
     Parameters
     ----------
     numbers : of the bodies in the linkage
-    number, first : of `near_diagonal`
+    numbering : of `near_diagonal`
     """
+    number, first = numbering
     columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
     frames = [frame_of(link) for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
@@ -138,6 +140,7 @@ def body_arrays(
             *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
         ),
         elements=element_tables(links, parts), mass=mass_tables(links, parts),
+        turning=turning_loads(links, parts, loads),
     )  # fmt: skip
 
 
@@ -272,5 +275,5 @@ def as_arrays(system: Any, parts: Sequence[Part]) -> tuple[Bodies, Ends, Constra
     """A system's flat arrays, its bodies factored."""
     model = system.model
     number, first = near_diagonal(groups(system), system.unknowns)
-    bodies = body_arrays(model.links, model.joints, model.bodies, parts, number, first)
+    bodies = body_arrays(model.links, model.joints, model.bodies, parts, (number, first), model.loads)
     return bodies, end_arrays(system.ends, number), constraint_arrays(system.constraints)

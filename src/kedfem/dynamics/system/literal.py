@@ -23,7 +23,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.ports import port_columns
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.substructure import mass_matrix
-from kedfem.dynamics.system.literal_places import force, placed, valued
+from kedfem.dynamics.system.literal_places import force, placed, turned_load, valued
 from kedfem.dynamics.system.record import (
     Driven,
     Held,
@@ -171,7 +171,8 @@ class Literal:
     ) -> tuple[Column, list[Seen], np.ndarray]:
         """Internal force of body k, world components; deformations with their rates; damped quantities with theirs."""
         link, damping = self.system.model.links[k], self.system.model.damping
-        R = at.R[0, self.system.model.bodies[k], : link.d, : link.d]
+        whole = at.R[0, self.system.model.bodies[k]]
+        R = whole[: link.d, : link.d]
         x = u.reshape(link.n, link.d) @ R
         Mx = (mass_matrix(link) @ x.ravel()).reshape(x.shape)
         if link.fit is None:
@@ -190,7 +191,10 @@ class Literal:
             rates = self.rates(g, *g0)
             f += frame_force(link, frame, Followed(Q, turn, g, *rates), y, damping.beta)[0]
             seen.append((turn, np.stack([g, *rates])))
-        return (f @ R.T).ravel(), seen, C
+        own = [load for load in self.system.model.loads[k] if load.own]
+        x = u.reshape(link.n, link.d)
+        pushed = [load.factor(at.t, at.phi)[0] * turned_load(link, load, whole, x) for load in own]
+        return (f @ R.T - sum(pushed, np.zeros_like(f))).ravel(), seen, C
 
     def _unbalanced(self, now: Now, old: Now) -> Column:
         s = self.scheme

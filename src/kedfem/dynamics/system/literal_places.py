@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.system.record import (
     ANGLE,
     DISTANCE,
@@ -26,6 +28,8 @@ from kedfem.dynamics.system.record import (
     System,
     Term,
 )
+from kedfem.dynamics.system.turning_loads import shown_by
+from kedfem.links.record import Link
 from kedfem.motion.rows import Row, stacked
 from kedfem.motion.values import features, jacobian
 
@@ -48,6 +52,29 @@ def force(each: Constraint, t: float, e: float, rate: float) -> tuple[float]:
             return (force if force * beyond > 0 else 0.0,)
         case _:
             raise ValueError(f"{each.name}: a constraint has no force law")
+
+
+def turned_load(
+    link: Link, load: Pattern, R: Float[np.ndarray, "3 3"], u: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n d"]:
+    """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations from QR factors."""
+    drawn, weights = shown_by(link, load.forces)
+    if link.kind == "beam":
+        turn = Rotation.from_rotvec([0, 0, float(weights[0] @ u[:, 2])]).as_matrix() @ R
+        return np.asarray(
+            load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]])
+        )
+    moved = drawn @ R.T
+    moved[:, : link.d] += weights @ u
+    turn = _orthonormal(moved) @ _orthonormal(drawn).T
+    share = 1.0 if load.share is None else float(load.share[1] @ turn @ load.share[0])
+    return np.asarray(share * load.forces @ turn[: link.d, : link.d].T)
+
+
+def _orthonormal(pair: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "3 3"]:
+    q, r = np.linalg.qr(pair.T)
+    q = q * np.sign(np.diag(r))
+    return np.column_stack([q, np.cross(q[:, 0], q[:, 1])])
 
 
 @dataclass(frozen=True, slots=True)

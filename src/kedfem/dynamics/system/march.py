@@ -24,6 +24,7 @@ from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
+from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
@@ -98,8 +99,24 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
-    rows = motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), weights
+    rows = (
+        motion.t,
+        motion.R,
+        motion.p,
+        motion.v,
+        motion.omega,
+        drives,
+        np.concatenate(F, axis=1),
+        amounts(of, motion),
+        weights,
+    )
     return Driving(*(np.ascontiguousarray(x) for x in rows))  # other strides would be compiled for anew
+
+
+def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:
+    """Amounts of the loads that turn with bodies over time."""
+    every = [load.factor(motion.t, motion.phi) for _, load in turning(of.system.model.loads)]
+    return np.stack(every, axis=1) if every else np.zeros((len(motion.t), 0))
 
 
 def march(

@@ -97,7 +97,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         trial.angle[i] = state.angle[i]
     if not c.single:
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-        internal_forces(c, bodies, R, state, trial, work)
+        internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
         for i in range(len(bodies.motion)):
             if bodies.frame[i] != NOMINAL:
                 orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
@@ -125,7 +125,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore
         if not np.isfinite(size) or size > 1e30:
             break
         if not c.single:
-            internal_forces(c, bodies, R, state, trial, work)
+            internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
         if settled:
             state.passes[0] += count
             state.passes[1] += 1 if sweep >= PATIENCE else 0

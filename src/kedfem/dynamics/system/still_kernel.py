@@ -8,13 +8,13 @@ from kedfem.dynamics.system.reference import reference
 
 
 @compiled
-def still_forces(c, bodies, R, state, trial, work):  # type: ignore[no-untyped-def]
+def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-untyped-def]
     """trial.f becomes the internal force of bodies with frames of their own at trial.u, trial.Rp their orientation.
 
     Parameters
     ----------
     c : with Newmark's numbers and damping zero
-    R : (M, 3, 3) of the nominal motion
+    R : (M, 3, 3) of the nominal motion; amounts : (w,) of loads that turn with bodies
     state : as drawn
     """
     c, bodies, state, trial, work = (
@@ -26,7 +26,7 @@ def still_forces(c, bodies, R, state, trial, work):  # type: ignore[no-untyped-d
     )
     if len(bodies.beams.segment):
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-    internal_forces(c, bodies, R, state, trial, work)
+    internal_forces(c, bodies, R, amounts, state, trial, work)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] != NOMINAL:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
