@@ -214,7 +214,7 @@ def _corotational(
 
 def storable(solvers: Sequence[Steps]) -> bool:
     """Whether what these solvers remember is all in their states; some have memories of their own."""
-    return not any(isinstance(each, FollowingSteps | FollowingDense) for each in solvers)
+    return not any(isinstance(each, FollowingSteps) for each in solvers)
 
 
 def stresses_of(solver: Steps) -> Stiffening | None:
