@@ -230,14 +230,12 @@ def test_what_no_plane_end_sweeps_is_refused(tmp_path: Path) -> None:
 
 
 def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> None:
-    """The centre of volume of a ring of angle α: at sin(α/2) / (α/2) of its radius's mean, half way round."""
-    outline = [(0.0, 20.0), (4.0, 20.0), (4.0, 21.0), (0.0, 21.0)]
+    """The centre of volume of a part of a torus: R (1 + r²/4R²) sin(α/2) / (α/2) from its axis, half way round."""
+    R, r = 20.0, 3.0
     for angle in (0.8, 5.5):
-        mesh = swept(
-            drawn(tmp_path, lambda occ, a=angle: turned(occ, outline, a))[0], Sizing(size=2e-3), carried_mesh
-        )
-        basis = solid_basis(mesh)
+        file, _ = drawn(tmp_path, lambda occ, a=angle: occ.addTorus(0, 0, 0, R, r, angle=a))
+        basis = solid_basis(swept(file, Sizing(size=3e-3), carried_mesh))
         x = np.asarray(basis.default_parameters()["x"])
         centre = 1e3 * (x * basis.dx).sum(axis=(1, 2)) / basis.dx.sum()
-        radius = 2 / 3 * (21**3 - 20**3) / (21**2 - 20**2) * sin(angle / 2) / (angle / 2)
-        assert_allclose(centre, [2, radius * cos(angle / 2), radius * sin(angle / 2)], atol=2e-3)
+        far = R * (1 + r**2 / (4 * R**2)) * sin(angle / 2) / (angle / 2)
+        assert_allclose(centre, [far * cos(angle / 2), far * sin(angle / 2), 0], atol=2e-3)
