@@ -3,6 +3,7 @@
 Each is a function that draws one solid with gmsh's OpenCASCADE, in millimetres; the table goes to docs/catalogue.md.
 """
 
+import re
 import sys
 from collections.abc import Callable
 from math import cos, hypot, pi, radians, sin, tan
@@ -34,8 +35,10 @@ from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.bounds import determinant_bounds
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.ways import made_mesh
+from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from
 
+TURNED = re.compile("swept about|carried along")
 DOCS = Path(__file__).parents[1] / "docs"
 Occ = ModuleType
 PARTS: dict[str, Callable[[Occ], int]] = {}
@@ -710,6 +713,8 @@ Written by `python -m geometry.catalogue`: each part is drawn by geometry/catalo
 and in metres) and meshed as it comes. Seconds are of processor time. det J is the least proven in
 any element, over its mean there. {summary}
 
+![Swept about an axis, or along lines and arcs](pictures/swept.png)
+
 | part | outcome | unknowns | seconds | worst scaled Jacobian | least det J | volume against CAD [%] |
 |---|---|---:|---:|---:|---:|---:|
 """
@@ -730,6 +735,14 @@ def main() -> None:
     summary = (
         f"{len(sizes)} of {len(PARTS)} parts meshed, {swept} with hexahedra; median {sizes[len(sizes) // 2]:,} unknowns, "
         f"most {sizes[-1]:,}."
+    )
+    turned = [(name, mesh) for name, mesh in meshes if mesh and TURNED.search(mesh.way)]
+    titled = [
+        (f"{name}\n{mesh.way.partition(';')[0].partition('swept ')[2] or mesh.way}", mesh)
+        for name, mesh in turned
+    ]
+    write_mesh_picture(
+        titled, DOCS / "pictures" / "swept.png", "Swept about an axis, or along lines and arcs"
     )
     (DOCS / "catalogue.md").write_text(
         HEAD.format(summary=summary) + "\n".join(lines) + "\n", encoding="utf-8"

@@ -19,7 +19,7 @@ from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.shares import sized
 
 _TURN = np.radians(18)  # of an arc per element where no size is asked for, as about an axis
-_LONG = 1.5  # an element's length along the path by its size in the section, where no size is asked for
+_LONG = 2.5  # an element's length along the path by its size in the section, where no size is asked for
 
 
 def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
@@ -32,7 +32,7 @@ def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     solid : Solid
         The only solid in that model.
     sizing : Sizing
-        How fine: the rule of layers, in the section; along the path that size, or half as long again where none is
+        How fine: the rule of layers, in the section; along the path that size, or two and a half times it where none is
         asked for, and 20 elements to a turn.
 
     Returns
@@ -46,6 +46,8 @@ def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         There is no such path, or the elements are poor.
     """
     legs = path(gmsh, solid)
+    if not any(leg.radius for leg in legs):
+        raise OtherWayError(f"{solid.name}: a path of lines alone is one of layers")
 
     def mesh_of(share: float) -> SolidMesh:
         with _section_plan(gmsh, solid, legs) as plan:
