@@ -29,6 +29,10 @@ Quick = Annotated[
     bool,
     typer.Option("--quick", help="Plain defaults for what the scene leaves open."),
 ]
+Within = Annotated[
+    bool,
+    typer.Option("--within", help="Refuse a scene that names files or folders outside its own folder."),
+]
 
 
 @app.callback(invoke_without_command=True)
@@ -48,6 +52,7 @@ def _root(
 def run(
     scene: ScenePath,
     quick: Quick = False,
+    within: Within = False,
     resume: Annotated[
         bool,
         typer.Option("--resume", help="Go on from the last state that an interrupted or killed run stored."),
@@ -61,7 +66,8 @@ def run(
     from kedfem.resume import has_state
     from kedfem.scene import read_scene
 
-    loaded = _quick(read_scene(scene)) if quick else read_scene(scene)
+    loaded = read_scene(scene, within=within)
+    loaded = _quick(loaded) if quick else loaded
     file = loaded.results_folder / "results.h5"
     before = _version(file)
     if not resume and (rows := abandoned_rows(file)) is not None:
@@ -84,7 +90,7 @@ def run(
 
 
 @app.command()
-def check(scene: ScenePath, quick: Quick = False) -> None:
+def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> None:
     """Show what would be modelled and its cost; solve nothing."""
     from kedfem.accuracy.plan import plan_for
     from kedfem.accuracy.reduction import prepared
@@ -93,7 +99,8 @@ def check(scene: ScenePath, quick: Quick = False) -> None:
     from kedfem.report import assembly_tables, check_tables, size_line
     from kedfem.scene import read_scene
 
-    loaded, assembly = assembled(_quick(read_scene(scene)) if quick else read_scene(scene))
+    read = read_scene(scene, within=within)
+    loaded, assembly = assembled(_quick(read) if quick else read)
     with _progress() as watch:
 
         def stage(name: str) -> None:
@@ -112,13 +119,14 @@ def kinematics(
     folder: Annotated[
         Path | None, typer.Option(help="Where all goes; default: SCENE-kinematics beside the scene.")
     ] = None,
+    within: Within = False,
 ) -> None:
     """Move a scene's links as rigid bodies: motion, transmission, forces."""
     from kedfem.kinematics import kinematics as moved_by
     from kedfem.report import kinematics_tables
     from kedfem.scene import read_scene
 
-    loaded = read_scene(scene, sketch=True)
+    loaded = read_scene(scene, sketch=True, within=within)
     with _progress() as watch:
         done = moved_by(loaded, folder, watch)
     _show(kinematics_tables(loaded, done), done.warnings)

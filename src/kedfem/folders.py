@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from kedfem.processes import private
+
 KERNELS = "kernels"
 """Compiled code, in the cache folder."""
 
@@ -38,17 +40,3 @@ def _users() -> Path:
     from platformdirs import user_cache_path
 
     return user_cache_path("kedfem")
-
-
-def private(path: Path) -> bool:
-    """Whether only this user can write a file or folder; always, where the system does not know such owners.
-
-    Raises
-    ------
-    OSError
-        There is none.
-    """
-    if not hasattr(os, "getuid"):
-        return True
-    status = path.stat()
-    return status.st_uid == os.getuid() and not status.st_mode & 0o022

@@ -1,11 +1,19 @@
-"""What differs between systems about processes: how they are told to end, and that workers end with their parent."""
+"""What differs between systems: how processes are told to end, that workers end with parents, limits, owners of files.
+
+Nothing else in kedfem may need Linux; what a system does not know is left out here. Locks are filelock's.
+"""
 
 import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
+from math import ceil
+from pathlib import Path
 from types import FrameType
+from typing import IO
 
 POLL = 0.5  # seconds between two looks for the parent
 
@@ -40,3 +48,65 @@ def end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="end with parent", daemon=True).start()
+
+
+@contextmanager
+def bounded(seconds: float, memory: float) -> Iterator[None]:
+    """A limit of this process's further processor time [s] and of its memory [bytes], where the system knows such limits.
+
+    Past the first the system ends the process; past the second there is a MemoryError. No core is dumped.
+    """
+    try:
+        import resource
+    except ImportError:
+        yield
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+    resource.setrlimit(resource.RLIMIT_CPU, (ceil(time.process_time() + seconds), hard))
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    bound = int(memory) if most == resource.RLIM_INFINITY else min(int(memory), most)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+        resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
+
+
+def most_memory() -> float:
+    """The most that this process has held so far [bytes]; nan where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return float("nan")
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def reserve(file: IO[bytes], size: int) -> None:
+    """Take so many bytes of the disk for a file; written where the system cannot reserve them.
+
+    Raises
+    ------
+    OSError
+        There are not so many.
+    """
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file.fileno(), 0, size)
+    else:
+        file.write(bytes(size))
+        file.flush()
+
+
+def private(path: Path) -> bool:
+    """Whether only this user can write a file or folder; always, where the system does not know such owners.
+
+    Raises
+    ------
+    OSError
+        There is none.
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    status = path.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022

@@ -18,7 +18,8 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any, TypeVar
 
-from kedfem.folders import KERNELS, cache_folder, private
+from kedfem.folders import KERNELS, cache_folder
+from kedfem.processes import private
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")
 MOST = 1_000_000_000  # bytes that the cache may take

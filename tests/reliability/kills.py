@@ -29,7 +29,7 @@ SCENE = """
 [links.crank]
 material = "steel"
 fidelity = "solid"
-shape = { kind = "bar", between = [[0, 0], [0.1, 0]], width = 0.012, thickness = 0.01 }
+shape = { kind = "plate_link", between = [[0, 0], [0.1, 0]], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
 mesh = { size = 0.006 }
 [joints.A]
 kind = "revolute"
@@ -80,6 +80,17 @@ def started(folder: Path, *more: str, cache: Path | None = None, **how: Any) -> 
     return subprocess.Popen(
         command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
     )
+
+
+def new_cache(folder: Path) -> Path:
+    """A cold cache, but for compiled code, which is the user's."""
+    from kedfem.folders import compiled_folder
+
+    rmtree(folder, ignore_errors=True)
+    folder.mkdir(mode=0o700)
+    if (kernels := compiled_folder()) is not None:
+        (folder / kernels.name).symlink_to(kernels)
+    return folder
 
 
 def finished(running: "subprocess.Popen[str]") -> tuple[int, str]:
@@ -157,7 +168,7 @@ def torn(folder: Path) -> str:
 def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> None:
     """One run, ended at a part of its time, and gone on with."""
     folder = new_place(ground, name)
-    cache = folder / "cache"
+    cache = new_cache(folder / "cache")
     running = started(folder, "--states", "0.05", cache=cache, start_new_session=True)
     try:
         time.sleep(moment * ground.takes)
@@ -200,8 +211,7 @@ def _stage(folder: Path) -> str:
 
 def together(ground: Ground, count: int, shared: str) -> None:
     """Several runs at once in one folder, or each in its own on one cold cache."""
-    cache = ground.folder.parent / "shared-cache"
-    rmtree(cache, ignore_errors=True)
+    cache = new_cache(ground.folder.parent / "shared-cache")
     if shared == "folder":
         folders = [new_place(ground, "together")] * count
     else:

@@ -1,6 +1,7 @@
 """Scenes from others: whatever they hold, words come out, soon, and no commands to the terminal."""
 
 import io
+import json
 import os
 import re
 from pathlib import Path
@@ -87,6 +88,29 @@ def test_files_are_regular_and_not_too_large(tmp_path: Path) -> None:
     with (tmp_path / "motion.csv").open("wb") as file:
         file.truncate(60_000_000)
     assert re.search(r"must be at most 50 MB, got 60 MB", refusal(CSV, folder=tmp_path)[0])
+
+
+@pytest.mark.parametrize("name", ["../motion.csv", "/etc/passwd", "linked/motion.csv", "a\0b"])
+@pytest.mark.parametrize(
+    "place", ["drive.motion.file", "links.crank.shape.file", "loads.push.factor.file", "output.folder"]
+)
+def test_scenes_from_others_stay_in_their_folder(tmp_path: Path, name: str, place: str) -> None:
+    """Nothing is read before: the files need not even be there."""
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "linked").symlink_to(tmp_path)
+    table, _, key = place.rpartition(".")
+    scene = inner / "scene.toml"
+    scene.write_text(f"[{table}]\n{key} = {json.dumps(name)}\n", encoding="utf-8")
+    with pytest.raises(
+        SceneError, match=rf"^{place}: must be within the scene's folder \(--within\), got "
+    ) as refused:
+        read_scene(scene, within=True)
+    assert len(refused.value.faults) == 1
+    scene.write_text(f'[{table}]\n{key} = "deeper/motion.csv"\n', encoding="utf-8")
+    with pytest.raises(SceneError) as other:
+        read_scene(scene, within=True)
+    assert "--within" not in str(other.value)
 
 
 def test_the_terminal_gets_no_commands_from_names() -> None:

@@ -1,6 +1,7 @@
 """Processes end when they are told to, and workers with their parent."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+import kedfem
 
 BUSY = """
 import os, sys, time
@@ -81,3 +84,75 @@ def test_a_wish_to_end_is_ctrl_c_unless_it_was_ignored_before(name: str, before:
     process.send_signal(signal.Signals[name])
     said, _ = process.communicate(timeout=30)
     assert said.strip() == end
+
+
+MASKED = """
+import builtins, os, signal, sys
+from pathlib import Path
+real = builtins.__import__
+
+def masked(name, globals=None, locals=None, fromlist=(), level=0):
+    asks = str((globals or {}).get("__name__", ""))
+    if asks.startswith("kedfem") and name.split(".")[0] in {"resource", "fcntl", "pwd", "grp", "termios", "syslog"}:
+        raise ImportError(f"{name} is not on this system")
+    return real(name, globals, locals, fromlist, level)
+
+builtins.__import__ = masked
+for module, name in ((os, "getuid"), (os, "posix_fallocate"), (os, "O_NOFOLLOW"), (signal, "SIGHUP"), (os, "mkfifo")):
+    if hasattr(module, name):
+        delattr(module, name)
+from kedfem.cli import main
+main()
+"""
+
+
+@pytest.mark.long
+def test_nothing_needs_what_other_systems_lack(tmp_path: Path) -> None:
+    """The names that only Linux, or no Windows, has are taken away: a scene with a meshed link is run, drawn and kept."""
+    text = """
+[links.arm]
+material = "steel"
+fidelity = "solid"
+shape = { kind = "plate_link", between = [[0, 0], [0.1, 0]], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
+mesh = { size = 0.01 }
+[joints.A]
+kind = "revolute"
+links = ["ground", "arm"]
+at = [0, 0]
+[drive]
+joint = "A"
+motion = { kind = "constant_speed", speed = "60 rpm" }
+[analysis]
+turns = 0.1
+steps_per_turn = 100
+accuracy = "quick"
+initial = "quasi-static"
+"""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache"), "OMP_NUM_THREADS": "1"}
+    (tmp_path / "cache").mkdir(mode=0o700)
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", MASKED, "run", "scene.toml"], cwd=tmp_path, env=environment,
+            capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "Traceback" not in done.stderr
+    assert (tmp_path / "scene-results" / "results.h5").exists()
+    assert (tmp_path / "scene-results" / "worst.png").exists()
+
+
+def test_the_packages_imports_name_no_system() -> None:
+    """Modules that some systems lack are imported in `processes` alone, where their absence is provided for."""
+    package = Path(kedfem.__file__).parent
+    absent = re.compile(r"^\s*(?:import|from) (?:resource|fcntl|pwd|grp|termios|syslog)\b", re.MULTILINE)
+    named = {path.name for path in package.rglob("*.py") if absent.search(path.read_text(encoding="utf-8"))}
+    assert named == {"processes.py"}
+
+
+def test_drawing_scripts_end_with_their_parent() -> None:
+    """What they call is tried above; that they call it is read."""
+    package = Path(kedfem.__file__).parent
+    for name in ("rendering", "mesh_rendering"):
+        text = (package / "output" / f"{name}.py").read_text(encoding="utf-8")
+        assert 'if __name__ == "__main__":\n    end_with_parent()\n' in text

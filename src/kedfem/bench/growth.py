@@ -1,7 +1,6 @@
 """One link growing to half a million unknowns: assembling, factoring, solving, memory. Each size in its own process."""
 
 import json
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from kedfem.bench.machine import Watch, markdown, seconds, write_loglog, write_page
 from kedfem.errors import SolveError
+from kedfem.processes import most_memory
 
 SIZES = ((40, 8, 2), (64, 14, 2), (110, 24, 2), (200, 44, 2))  # a plate, 1 m x 0.22 m x 20 mm
 
@@ -73,7 +73,7 @@ def one_size(size: tuple[int, int, int]) -> dict[str, float]:
     factor = seconds(lambda: kept.update(factor=Cholesky(A, "block")), 1)
     b = np.random.default_rng(1).standard_normal(3 * link.n)
     solve = seconds(lambda: kept["factor"].solve(b), 5)
-    memory = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    memory = most_memory()
     return {"unknowns": 3 * link.n, "assemble": assemble, "factor": factor, "solve": solve, "memory": memory}
 
 

@@ -3,14 +3,11 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
-from time import process_time
 from typing import Any, TypeVar
-
-import numpy as np
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.file import silent
-from kedfem.processes import end_with_parent
+from kedfem.processes import bounded, end_with_parent
 
 LONGEST = 180  # seconds of processor time after which a part is given up
 READING = 60  # seconds of processor time after which a mesh file is given up
@@ -86,20 +83,5 @@ def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) ->
     """
     end_with_parent()
     os.chdir(folder)
-    try:
-        import resource
-    except ImportError:  # a system without such limits
-        with silent():
-            return work(*given)
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
-    resource.setrlimit(resource.RLIMIT_CPU, (int(np.ceil(process_time() + seconds)), hard))
-    _, most = resource.getrlimit(resource.RLIMIT_DATA)
-    bound = int(MOST_MEMORY) if most == resource.RLIM_INFINITY else min(int(MOST_MEMORY), most)
-    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
-    try:
-        with silent():
-            return work(*given)
-    finally:
-        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-        resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
+    with bounded(seconds, MOST_MEMORY), silent():
+        return work(*given)

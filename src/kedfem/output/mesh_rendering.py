@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.processes import end_with_parent
+
 SIZE = 1500
 """Pixels of the picture of one mesh, each way, before its margin is cut off."""
 
@@ -158,4 +160,5 @@ def trimmed(pixels: Any) -> Any:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     render(*sys.argv[1:])

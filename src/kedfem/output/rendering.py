@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.bars import LINES, THINNEST, bars, heights
+from kedfem.processes import end_with_parent
 
 WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)
 """Least and most pixels; in between as the linkage asks."""
@@ -290,4 +291,5 @@ def aim(plotter: Any, grid: Any, shown: View) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     render(*sys.argv[1:])

@@ -1,6 +1,5 @@
 """Folders and files that can be written, and files that appear only when they are whole."""
 
-import os
 import re
 import tempfile
 from collections.abc import Iterator
@@ -9,6 +8,7 @@ from pathlib import Path
 from secrets import token_hex
 
 from kedfem.errors import OutputError
+from kedfem.processes import reserve
 
 LOCK = ".kedfem.lock"
 PART = re.compile(r".+\.[0-9a-f]{8}\.part(\.\w+)?")
@@ -60,10 +60,7 @@ def require_space(folder: Path, size: int) -> None:
         There is not that much space.
     """
     with tempfile.TemporaryFile(dir=folder) as file:
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(file.fileno(), 0, size)
-        else:
-            file.write(bytes(size))
+        reserve(file, size)
 
 
 @contextmanager

@@ -67,10 +67,8 @@ def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n ..."]:
     """
     size = rows.dtype.itemsize * int(np.prod(rows.chunks)) + CHECKSUM
     for first in range(0, len(rows), rows.chunks[0]):
-        mask, stored = rows.id.read_direct_chunk(
-            (first,) + (0,) * (rows.ndim - 1)
-        )  # refuses one that is not found
-        if (len(stored), mask) != (size, 0):
+        chunk = rows.id.get_chunk_info_by_coord((first,) + (0,) * (rows.ndim - 1))
+        if chunk.byte_offset is None or (chunk.size, chunk.filter_mask) != (size, 0):
             raise ValueError(f"rows of {rows.name} that are not those that were written")
     values: np.ndarray = rows[:n]
     values.flags.writeable = False

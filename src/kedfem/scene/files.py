@@ -57,6 +57,34 @@ def file_text(path: Path) -> str:
         raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
 
 
+def outside(raw: Any, folder: Path, where: str = "") -> list[str]:
+    """Faults of all names of files and folders in a scene that lead out of its own folder, links followed.
+
+    Parameters
+    ----------
+    raw : a table of the scene
+    where : its key
+    """
+    if isinstance(raw, list):
+        return [fault for k, x in enumerate(raw) for fault in outside(x, folder, f"{where}[{k}]")]
+    if not isinstance(raw, Mapping):
+        return []
+    out = []
+    for key, x in raw.items():
+        place = f"{where}.{key}" if where else str(key)
+        if key in {"file", "folder"} and isinstance(x, str) and not _inside(folder, x):
+            out.append(f"{place}: must be within the scene's folder (--within), got {x!r}")
+        out += outside(x, folder, place)
+    return out
+
+
+def _inside(folder: Path, name: str) -> bool:
+    try:
+        return (folder / name).resolve().is_relative_to(folder.resolve())
+    except (ValueError, OSError, RuntimeError):  # no name of a file at all, or links in a circle
+        return False
+
+
 def toml_table(path: Path) -> tuple[dict[str, Any], str]:
     """Content and text of a TOML file.
 

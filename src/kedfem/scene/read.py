@@ -11,19 +11,20 @@ from pydantic import ValidationError
 from kedfem.errors import SceneError
 from kedfem.scene.checks import meshing_faults
 from kedfem.scene.faults import fault_lines
-from kedfem.scene.files import scene_folder, sketched, toml_table
+from kedfem.scene.files import outside, scene_folder, sketched, toml_table
 from kedfem.scene.links import LinkScene, spelt_out
 from kedfem.scene.parts import Entry
 from kedfem.scene.scene import Scene
 
 
-def read_scene(path: str | Path, *, sketch: bool = False) -> Scene:
+def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) -> Scene:
     """A scene from its TOML file.
 
     Parameters
     ----------
     path : the scene file; file names in it are relative to its folder.
     sketch : elastic links may lack shape and material: enough for their rigid motion, not for an analysis.
+    within : whether all files that it names, and its results, must be in its own folder: for scenes from others.
 
     Raises
     ------
@@ -32,6 +33,8 @@ def read_scene(path: str | Path, *, sketch: bool = False) -> Scene:
     """
     path = Path(path)
     raw, text = toml_table(path)
+    if within and (faults := outside(raw, path.parent)):
+        raise SceneError(faults)
     token = sketched.set(sketch)
     try:
         return scene_from(raw, path.parent, source=text, stem=path.stem)
