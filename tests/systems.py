@@ -80,9 +80,12 @@ def in_order(of: Ready, z: np.ndarray) -> np.ndarray:
     return z[:, near_diagonal(groups(of.system), of.system.unknowns)[0]]
 
 
-def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start."""
-    solver, start = Literal(of.ready.system, of.ready.scheme), of.state
+def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start.
+
+    keeps : see `Literal`; where forces bend sharply it may find another solution
+    """
+    solver, start = Literal(of.ready.system, of.ready.scheme, keeps), of.state
     links = of.ready.system.model.links
     u, v, a = (rows(of.ready, x[None])[0] for x in (start.u, start.v, start.a))
     at = of.motion(np.zeros(1))
@@ -92,7 +95,7 @@ def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
     )
     seen = [[(0.0, x.copy()) for _ in frames_of(link)] for link, x in zip(links, none, strict=True)]
     z = np.linalg.lstsq(solver.B, solver.W @ u, rcond=None)[0]
-    C = solver._coordinates(z, start.turned.copy(), at)[1]
+    C = solver.coordinates(z, start.turned.copy(), at)[1]
     now = Now(
         u, v, a, internal, solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
         C.T @ start.multiplier, none, in_order(of.ready, start.z),
@@ -104,10 +107,10 @@ def by_oracle(of: Begun, count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([u for u, _ in out]), np.stack([m for _, m in out])
 
 
-def against_oracle(of: Begun, count: int = 3) -> float:
+def against_oracle(of: Begun, count: int = 3, keeps: bool = False) -> float:
     """Largest difference of displacements, of their peak."""
     _, history = march(of.ready, of.state, of.steps(count))
-    wanted = by_oracle(of, count)[0]
+    wanted = by_oracle(of, count, keeps)[0]
     return float(np.abs(rows(of.ready, history.u) - wanted).max() / np.abs(wanted).max())
 
 

@@ -10,7 +10,7 @@ Nothing of `step_kernel` or what it calls is used here: internal forces are thos
 coordinates those of `motion.values`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -24,6 +24,7 @@ from kedfem.dynamics.ports import port_columns
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.substructure import mass_matrix
 from kedfem.dynamics.system.literal_places import force, placed, turned_load, valued
+from kedfem.dynamics.system.literal_tangent import Inverse, inverse, tangent
 from kedfem.dynamics.system.record import (
     Driven,
     Held,
@@ -33,13 +34,9 @@ from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
 ITERATIONS = 40
-DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
 RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
-REPEATED = 1e-9  # singular values of rows of length one that repeat each other
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
-SINGULAR = 1e-13  # singular values that redundant constraints leave
-Matrix = Float[np.ndarray, "_ _"]
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
 """Angle of a frame, and g, g', g'' (3, n, d) seen from it."""
@@ -67,10 +64,16 @@ class Now:
 
 @dataclass
 class Literal:
-    """Steps of a system by assembled tangents; `scheme` as any step's."""
+    """Steps of a system by assembled tangents; `scheme` as any step's.
+
+    keeps : whether steps go on with the tangent of the step before while changes fall with it, which is dear to assemble
+    kept : the tangent's inverse
+    """
 
     system: System
     scheme: Scheme
+    keeps: bool = False
+    kept: Inverse | None = None
 
     def __post_init__(self) -> None:
         model = self.system.model
@@ -78,6 +81,7 @@ class Literal:
         ends = np.cumsum([0, *sizes])
         self.of = [slice(a, b) for a, b in pairwise(ends)]
         self.N, self.k = int(ends[-1]), self.system.unknowns
+        self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
         self.M = np.zeros((self.N, self.N))
         for link, at in zip(model.links, self.of, strict=True):
             self.M[at, at] = mass_matrix(link).toarray()
@@ -104,15 +108,25 @@ class Literal:
         SolveError
             If the iterations do not converge.
         """
-        scheme, r = self.scheme, len(self.system.constraints)
-        hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
+        if self.keeps:
+            try:
+                return self._stepped(old, at, patience=1)
+            except SolveError:
+                pass
+        self.kept = None
+        return self._stepped(old, at, patience=0)
+
+    def _stepped(self, old: Now, at: RigidMotion, patience: int) -> Now:
+        """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
+        scheme, r, hard = self.scheme, len(self.system.constraints), self.hard
         now = self._guess(old, at)
-        q, size = len(self.W), np.inf
+        q, size, slow = len(self.W), np.inf, 0
         lam, m = np.zeros(q), np.zeros(r)
-        tangent: Matrix | None = None
+        if patience and len(old.multiplier):
+            m[hard] = (1 - scheme.alpha_f) * old.multiplier[hard]
         for _ in range(ITERATIONS):
             self._evaluated(now, old, at)
-            e, C = self._coordinates(now.z, now.turned, at)
+            e, C = self.coordinates(now.z, now.turned, at)
             now.e[0] = e
             now.e[1], now.e[2] = self.rates(e, *old.e)
             own = self._own_rates(now, old, at)
@@ -125,19 +139,22 @@ class Literal:
                 self.B.T @ lam - C.T @ m - scheme.alpha_f * old.bearing,
                 now.e[0, hard],
             ]
-            if tangent is None:
-                tangent = self._tangent(now, old, at, C, m, hard)
-            change = _solution(tangent, -np.concatenate(left), C[hard])
+            if self.kept is None:
+                self.kept = inverse(tangent(self, now, old, at, C, m), C[hard])
+            used = self.kept
+            change = used(-np.concatenate(left))
             now.u = now.u + change[: self.N]
             now.z = now.z + change[self.N : self.N + self.k]
             lam += change[self.N + self.k : self.N + self.k + q]
             m[hard] += change[self.N + self.k + q :]
             before, size = size, float(np.abs(change[: self.N]).max())
-            tangent = None if size > SLOW * before else tangent
+            slow = slow + 1 if size > SLOW * before else 0
+            self.kept = None if slow > patience else self.kept
             if size <= 1e-14 * max(1.0, np.abs(now.u).max()) or (size < 1e-11 and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
                 if float(np.abs(left[0]).max()) > BALANCED * borne:
                     break
+                self.kept = used
                 return self._ended(now, old, at, m, lam)
         raise SolveError(
             f"analysis.solver: the iterations of the literal solver must converge to a balance, got none at "
@@ -162,19 +179,17 @@ class Literal:
     def _evaluated(self, now: Now, old: Now, at: RigidMotion) -> None:
         """Rates, and internal forces of all bodies."""
         now.v, now.a = self.rates(now.u, old.u, old.v, old.a)
-        found = [self._force_of(k, now.u[own], old, at) for k, own in enumerate(self.of)]
+        found = [self.force_of(k, now.u[own], old, at) for k, own in enumerate(self.of)]
         now.f = np.concatenate([f for f, _, _ in found])
         now.g, now.damped = [g for _, g, _ in found], [C for _, _, C in found]
 
-    def _force_of(
-        self, k: int, u: Column, old: Now, at: RigidMotion
-    ) -> tuple[Column, list[Seen], np.ndarray]:
+    def force_of(self, k: int, u: Column, old: Now, at: RigidMotion) -> tuple[Column, list[Seen], np.ndarray]:
         """Internal force of body k, world components; deformations with their rates; damped quantities with theirs."""
         link, damping = self.system.model.links[k], self.system.model.damping
         whole = at.R[0, self.system.model.bodies[k]]
         R = whole[: link.d, : link.d]
         x = u.reshape(link.n, link.d) @ R
-        Mx = (mass_matrix(link) @ x.ravel()).reshape(x.shape)
+        Mx = (self.M[self.of[k], self.of[k]] @ x.ravel()).reshape(x.shape)
         if link.fit is None:
             Kx = (link.K0 @ x.ravel()).reshape(x.shape)
             C = damping.alpha * Mx + damping.beta * Kx
@@ -201,59 +216,16 @@ class Literal:
         inertia = self.M @ ((1 - s.alpha_m) * now.a + s.alpha_m * old.a)
         return np.asarray(inertia + (1 - s.alpha_f) * (now.f - now.F) + s.alpha_f * (old.f - old.F))
 
-    def _tangent(
-        self, now: Now, old: Now, at: RigidMotion, C: np.ndarray, m: np.ndarray, hard: Sequence[int]
-    ) -> Matrix:
-        """Of all equations by all unknowns."""
-        s, N, k, q = self.scheme, self.N, self.k, len(self.W)
-        J = np.zeros((N + k + q + len(hard),) * 2)
-        J[:N, :N] = (1 - s.alpha_m) * s.a0 * self.M
-        for n, own in enumerate(self.of):
-            if self.system.model.links[n].fit is None:
-                J[own, own] += (1 - s.alpha_f) * self._stiffness(n, at)
-                continue
-            columns = []
-            for x in np.eye(own.stop - own.start) * DIFFERENCE:
-                f = [self._force_of(n, now.u[own] + sign * x, old, at)[0] for sign in (1, -1)]
-                columns.append((f[0] - f[1]) / (2 * DIFFERENCE))
-            J[own, own] += (1 - s.alpha_f) * np.array(columns).T
-        J[:N, N + k : N + k + q] = -self.W.T
-        J[N : N + q, :N], J[N : N + q, N : N + k] = self.W, -self.B
-        balance = slice(N + q, N + q + k)
-        J[balance, N + k : N + k + q] = self.B.T
-        for column, x in enumerate(np.eye(k) * DIFFERENCE):
-            pushed = []
-            for sign in (1, -1):
-                e, moved = self._coordinates(now.z + sign * x, now.turned.copy(), at)
-                pull, rate = m.copy(), self.rates(e, *old.e)[0]
-                for n, each in enumerate(self.system.constraints):
-                    if n not in hard:
-                        pull[n] = -(1 - s.alpha_f) * force(each, float(at.t[0]), e[n], rate[n])[0]
-                pushed.append(moved.T @ pull)
-            J[balance, N + column] = -(pushed[0] - pushed[1]) / (2 * DIFFERENCE)
-        J[balance, N + k + q :] = -C[hard].T
-        J[N + q + k :, N : N + k] = C[hard]
-        return J
-
-    def _stiffness(self, k: int, at: RigidMotion) -> Matrix:
-        """K + a₁ C of a body with the nominal frame, world components."""
-        model, a1 = self.system.model, self.scheme.a1
-        link, M = model.links[k], self.M[self.of[k], self.of[k]]
-        R = np.kron(np.eye(link.n), at.R[0, model.bodies[k], : link.d, : link.d])
-        K = R @ (link.K0 @ R.T)
-        return np.asarray(K + a1 * (model.damping.alpha * M + model.damping.beta * K))
-
-    def _coordinates(
-        self, z: Column, turned: Column, at: RigidMotion
+    def coordinates(
+        self, z: Column, turned: Column, at: RigidMotion, which: Collection[int] | None = None
     ) -> tuple[Column, Float[np.ndarray, "r k"]]:
-        """All coordinates less their drives' travels, and their gradients."""
-        R, p = at.R[0], at.p[0]
-        e, C, place = (
-            np.zeros(len(self.system.constraints)),
-            np.zeros((len(self.system.constraints), self.k)),
-            0,
-        )
-        for n, each in enumerate(self.system.constraints):
+        """All coordinates less their drives' travels, and their gradients; zero but for some, if these are given."""
+        R, p, constraints, place = at.R[0], at.p[0], self.system.constraints, 0
+        e, C = np.zeros(len(constraints)), np.zeros((len(constraints), self.k))
+        for n, each in enumerate(constraints):
+            if which is not None and n not in which:
+                place += len(each.terms)
+                continue
             for term in each.terms:
                 where = np.zeros(self.k) if each.linear else z
                 poses = [placed(self.system.ends[x], R, p, where) for x in (term.i, term.j)]
@@ -273,12 +245,14 @@ class Literal:
         Of others by differences: the mechanism and z move on, and back, as their rates tell.
         """
         out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
+        if len(self.hard) == len(out):
+            return out
         ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)
         values = []
         for dt in ahead:
             turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
             moved = replace(at, R=turn[None], p=at.p + dt * at.v)
-            values.append(self._coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
+            values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
         rates = np.array([1, -8, 8, -1]) @ np.array(values) / (12 * RATES * self.scheme.h)
         for n, each in enumerate(self.system.constraints):
             if not each.linear and getattr(each.law, "drive", -1) < 0:
@@ -287,7 +261,7 @@ class Literal:
 
     def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column, lam: Column) -> Now:
         self._evaluated(now, old, at)
-        e, C = self._coordinates(now.z, now.turned, at)
+        e, C = self.coordinates(now.z, now.turned, at)
         now.e = np.stack([e, *self.rates(e, *old.e)])
         now.z_rates = np.stack([now.z, *self.rates(now.z, *old.z_rates)])
         now.multiplier = m / (1 - self.scheme.alpha_f)
@@ -295,15 +269,3 @@ class Literal:
         before = old.port_force if len(old.port_force) else 0 * lam
         now.port_force = (lam - self.scheme.alpha_f * before) / (1 - self.scheme.alpha_f)
         return now
-
-
-def _solution(J: Matrix, right: Column, C: Matrix) -> Column:
-    """Of scaled equations, of least size where constraints C repeat each other."""
-    rows = 1 / np.maximum(np.abs(J).max(axis=1), 1e-300)
-    scaled = J * rows[:, None]
-    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
-    size = np.linalg.norm(C, axis=1)
-    if np.linalg.matrix_rank(C / np.where(size > 0, size, 1.0)[:, None], tol=REPEATED) == len(C):
-        return np.asarray(np.linalg.solve(scaled * columns, right * rows) * columns)
-    found = np.linalg.lstsq(scaled * columns, right * rows, rcond=SINGULAR)[0]
-    return np.asarray(found * columns)
