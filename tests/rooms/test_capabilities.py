@@ -1,6 +1,5 @@
 """The table of capabilities: its page, a scene for each line, and each joint with all frames as its page says."""
 
-import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -9,8 +8,9 @@ import pytest
 
 from kedfem.errors import SceneError
 from kedfem.scene import capabilities, scene_from
-from kedfem.scene.capabilities import KINDS, REFUSALS, Refusal, refusals
+from kedfem.scene.capabilities import KINDS, REFUSALS, refusals
 from kedfem.scene.capability_page import COLUMNS, JOINTS, capabilities_page
+from tests.cells import as_said
 from tests.moving import bar, driven_slide, inverted, turning
 from tests.partners import chain
 from tests.rooms.test_bad_scenes import BASES, changed
@@ -31,25 +31,6 @@ def faults(raw: Raw) -> list[str]:
     except SceneError as error:
         return error.faults
     return []
-
-
-def as_said(refusal: Refusal, fault: str) -> bool:
-    """Whether a fault is in the words of a line, whatever scene it is about."""
-    text = refusal.said(_Any())
-    return re.fullmatch(".+".join(map(re.escape, text.split("\0"))), fault) is not None
-
-
-class _Any(dict[str, str]):
-    def __missing__(self, key: str) -> Any:
-        return _Word()
-
-
-class _Word(str):
-    def __new__(cls) -> "_Word":
-        return super().__new__(cls, "\0")
-
-    def __repr__(self) -> str:
-        return "\0"
 
 
 def slid(kind: str, **more: Any) -> Raw:

@@ -19,6 +19,7 @@ BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the way of the slider, where the link has them
 FEWEST, MOST = 4, 48
 KNOWN = 1e-3  # of the ball: a spread below cannot tell a gradient
+APART = 1e-3  # of the largest singular value of stations that move apart: 0.1 of two elements, 2e-6 of one, 1 of beams
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +63,31 @@ def stations(
     Raises
     ------
     MeshError
-        If the link does not reach along the line as far as the slider goes.
+        If the link does not reach along the line as far as the slider goes, or cannot bend there.
     """
     if link.full is not None and link.Q is not None:
         full = stations(link.full, where, origin, axis, way)
-        return Stations(full.s, full.points, full.weights @ link.Q)
+        return _apart(link, where, Stations(full.s, full.points, full.weights @ link.Q))
     if link.meshed:
-        return _in_balls(link, where, origin, axis, way)
+        return _apart(link, where, _in_balls(link, where, origin, axis, way))
     return _at_nodes(link, where, origin, axis, way)
+
+
+def _apart(link: Link, where: str, found: Stations) -> Stations:
+    """Stations, each of which can move without the others: what dependent ones bear is rounding."""
+    size = np.linalg.svd(found.weights, compute_uv=False)
+    told = int((size > APART * size[0]).sum())
+    if told == len(found.s):
+        return found
+    instead = (
+        "give it more basis functions"
+        if link.Q is not None
+        else "give it two elements along the line at least"
+    )
+    raise MeshError(
+        f"{where}: link '{link.name}' must be able to bend along its line in {len(found.s)} ways, as many as there are "
+        f"stations on it, got {told}: {instead}"
+    )
 
 
 def _at_nodes(

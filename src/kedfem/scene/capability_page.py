@@ -20,8 +20,16 @@ its links share for good, or by constraint equations, as joints are between link
 driven ones, gears and bushings. What a single part needs (a key of a kind of link, a surface at a joint, points of planar
 links in one plane) is in [scene.md](scene.md) and [meshing.md](meshing.md).
 
-The table is made by `python -m kedfem.scene.capability_page > docs/capabilities.md`.
+It is executed (`python -m tests.cells`). Of {all} cells, each kind of joint with all frames, with and without a drive, on
+13 pairs of kinds of links, and each pair of these with one of 17 loads and laws, {ran} ran three steps from a loaded,
+moving start: as by the oracle, which assembles all tangents anew, to 1e-8 of the peak, 1e-7 with co-rotational frames,
+5e-7 with nominal ones and beams in space, where rounding beside the stiff rigid parts at their ends is 2e-7. {refused}
+were refused by lines of the table.
+
+The page is made by `python -m kedfem.scene.capability_page > docs/capabilities.md`.
 """
+CELLS = (320, 432)
+"""Of `tests.cells`: those that ran, and those that were refused."""
 COLUMNS: dict[str, Facts] = {
     "nominal, driven": {"frames": "nominal", "drive": "given", "stiffening": "off"},
     "nominal with stiffening, driven": {"frames": "nominal", "drive": "given", "stiffening": "on"},
@@ -81,7 +89,7 @@ def capabilities_page() -> str:
         for k, each in enumerate(REFUSALS, start=1)
     ]
     return "\n".join((
-        INTRODUCTION,
+        INTRODUCTION.format(all=sum(CELLS), ran=CELLS[0], refused=CELLS[1]),
         "## Joints with frames and drives\n", table(["joint", *COLUMNS], joints),
         "## Drives, gears, motors and springs on joints\n", table(["on", *KINDS], elements),
         "## Loads on kinds of links\n", table(["load", *LINKS], loads),

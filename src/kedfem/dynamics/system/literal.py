@@ -246,7 +246,7 @@ class Literal:
         """
         out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
         if len(self.hard) == len(out):
-            return out
+            return np.asarray(out)
         ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)
         values = []
         for dt in ahead:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lu_factor, lu_solve, qr
 
 from kedfem.dynamics.system.literal_places import force
 from kedfem.motion.rigid import RigidMotion
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
 REPEATED = 1e-9  # singular values of rows of length one that repeat each other
-SINGULAR = 1e-13  # singular values that redundant constraints leave
 Matrix = Float[np.ndarray, "_ _"]
 Column = Float[np.ndarray, " _"]
 Inverse = Callable[[Column], Column]
@@ -86,14 +85,25 @@ def _felt(of: Literal, n: int) -> Bool[np.ndarray, " k"]:
 
 
 def inverse(J: Matrix, C: Matrix) -> Inverse:
-    """Of scaled equations; solutions of least size where constraints C repeat each other."""
-    rows = 1 / np.maximum(np.abs(J).max(axis=1), 1e-300)
-    scaled = J * rows[:, None]
-    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
-    scaled *= columns
+    """Of scaled equations; where constraints C, the last of them, repeat each other, with multipliers of least size."""
     size = np.linalg.norm(C, axis=1)
-    if np.linalg.matrix_rank(C / np.where(size > 0, size, 1.0)[:, None], tol=REPEATED) == len(C):
-        factors = lu_factor(scaled)
-        return lambda right: np.asarray(lu_solve(factors, right * rows) * columns)
-    least = np.linalg.pinv(scaled, rcond=SINGULAR)
-    return lambda right: np.asarray(least @ (right * rows) * columns)
+    some = size > REPEATED * size.max(initial=0.0)  # one that says nothing is rounding of any direction
+    unit = C * np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
+    R, order = qr(unit.T, mode="r", pivoting=True)
+    told = order[: int((np.abs(np.diag(R)) > REPEATED).sum())] if len(C) else order[:0]
+    first = len(J) - len(C)
+    kept = np.concatenate([np.arange(first), first + np.sort(told)])
+    own = J[np.ix_(kept, kept)]
+    rows = 1 / np.maximum(np.abs(own).max(axis=1), 1e-300)
+    scaled = own * rows[:, None]
+    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
+    factors = lu_factor(scaled * columns)
+    least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(told) < len(C) else np.eye(len(C))
+
+    def solution(right: Column) -> Column:
+        out = np.zeros(len(J))
+        out[kept] = lu_solve(factors, right[kept] * rows) * columns
+        out[first:] = least @ out[first:]
+        return out
+
+    return solution

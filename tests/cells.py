@@ -1,0 +1,294 @@
+"""Cells of the table of capabilities as scenes: a joint with frames, a drive or none, two kinds of links, and a law.
+
+All of them are executed by ``python -m tests.cells``.
+"""
+
+import argparse
+import re
+import sys
+import time
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.start import initial_rates
+from kedfem.dynamics.stiffening import stiffening
+from kedfem.dynamics.system.accelerations import accelerated_in_a_step
+from kedfem.dynamics.system.start import rest
+from kedfem.dynamics.transient import steps_of, transient
+from kedfem.errors import KedfemError
+from kedfem.scene.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
+from tests.moving import beam_in_space
+from tests.partners import IN_PLANE, chain
+from tests.systems import Begun, begun, by_oracle, marched, rows
+
+Raw = dict[str, Any]
+FRAMES = ("nominal", "stiffening", "following")
+#: kinds of links that a joint joins
+LINKS: dict[str, tuple[str, str]] = {
+    "beams in space": ("beam", "beam"), "solids": ("solid", "solid"), "reduced": ("reduced", "beam"),
+    "rigid": ("rigid", "beam"), "slider": ("bare", "beam"), "planar beams": ("planar beam", "planar beam"),
+    "plane links": ("plane", "plane"), "plane and beam": ("plane", "planar beam"),
+    "planar rigid": ("rigid", "planar beam"), "on the ground": ("beam", "ground"),
+    "plane on the ground": ("plane", "ground"), "solid on the ground": ("solid", "ground"),
+    "solid and beam": ("solid", "beam"),
+}  # fmt: skip
+IN_A_PLANE = ("planar beams", "plane links", "plane and beam", "planar rigid", "plane on the ground")
+LAWS = (
+    "loads", "loads that turn", "spring between points", "spring on the joint", "motor on the joint",
+    "motor at the crank", "bushing", "damped bushing", "bushing against turns", "shaft", "drive on the joint", "gear",
+    "rack", "point mass", "damping", "damping of mass", "no numerical damping",
+)  # fmt: skip
+WITHIN = {"nominal": 1e-8, "stiffening": 1e-8, "following": 1e-7}
+#: nominal, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
+#: changed by 1e-14 of itself changes what it finds by 8.5e-8 of the peak, and what the oracle finds by 4e-11
+ROUNDED = 5e-7
+STEPS = 3
+FAST = {("weld", "solids")}  # chains some of whose links are a hundred times faster than the crank's end
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One combination."""
+
+    joint: str
+    frames: str
+    driven: bool
+    links: str
+    law: str = "loads"
+
+    def __str__(self) -> str:
+        drive = "driven" if self.driven else "no drive"
+        return f"{self.joint}, {self.frames}, {drive}, {self.links}, {self.law}"
+
+    @property
+    def plane(self) -> bool:
+        return self.links in IN_A_PLANE
+
+    @property
+    def within(self) -> float:
+        """What its displacements may differ by from the oracle's, of their peak."""
+        return ROUNDED if self.frames == "nominal" and not self.plane else WITHIN[self.frames]
+
+    @property
+    def drawn(self) -> bool:
+        """Whether there is such a mechanism: planar links have planar joints, what has no drive no law of one."""
+        if self.plane and self.joint not in IN_PLANE:
+            return False
+        if self.law == "shaft" and not self.driven:
+            return False
+        if self.law == "drive on the joint" and (self.joint not in DRIVEN or not self.driven):
+            return False
+        return not (self.law in {"gear", "rack"} and self.plane)
+
+
+FACTORS: dict[str, tuple[Any, ...]] = {
+    "joint": KINDS, "frames": FRAMES, "driven": (True, False), "links": tuple(LINKS), "law": LAWS,
+}  # fmt: skip
+
+
+#: cheap ones, of all kinds of joints and nearly all laws
+QUICK = ("planar beams", "plane on the ground", "on the ground")
+
+
+def pairs(cell: Cell) -> set[tuple[tuple[str, Any], ...]]:
+    """All pairs of its levels."""
+    return set(combinations(((factor, getattr(cell, factor)) for factor in FACTORS), 2))
+
+
+def all_cells() -> list[Cell]:
+    """All joint × frames × driven or not × links under loads, and so many more that each pair of levels is in one."""
+    first = [Cell(*x) for x in product(KINDS, FRAMES, (True, False), LINKS)]
+    found = [cell for cell in first if cell.drawn]
+    every = [cell for x in product(*FACTORS.values()) if (cell := Cell(*x)).drawn]
+    np.random.default_rng(12).shuffle(every)  # type: ignore[arg-type]
+    left = set().union(*map(pairs, every)) - set().union(*map(pairs, found))
+    while left:
+        best = max(every[:2000], key=lambda cell: len(pairs(cell) & left))
+        if not pairs(best) & left:
+            best = next(cell for cell in every if pairs(cell) & left)
+        found.append(best)
+        left -= pairs(best)
+        every.remove(best)
+    return found
+
+
+def scene_of(cell: Cell) -> Raw:
+    """A closed chain that moves from the first step on under gravity and a force, of as few elements as can be."""
+    on_joint = cell.law == "drive on the joint"
+    raw = chain(cell.joint, LINKS[cell.links], driven=on_joint, plane=cell.plane)
+    for link in raw["links"].values():
+        if "mesh" in link:
+            counts = link["mesh"]["elements"]
+            along = 2 if cell.joint == "slot" else 1
+            link["mesh"] = {
+                "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
+            }
+        if link.get("reduced"):
+            link["functions"] = 6
+    raw["analysis"] |= {"initial": "rest", "end_time": STEPS * 5e-4}
+    raw["analysis"] |= {"frames": "following" if cell.frames == "following" else "nominal"}
+    if cell.frames == "stiffening":
+        raw["analysis"]["stiffening"] = True
+    speed = 0.3 if (on_joint and cell.joint == "prismatic") or (cell.joint, cell.links) in FAST else 3.0
+    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": speed}
+    if not cell.driven:
+        del raw["drive"]
+        raw["analysis"]["initial_speeds"] = {"A": speed}
+    crank = raw["joints"][next(name for name in raw["joints"] if name != "A")]["at"]
+    frame = "link" if cell.law == "loads that turn" else "world"
+    vector = [10.0, 20.0, 0.0 if cell.plane else 5.0]
+    raw["loads"] = {"f": {"kind": "force", "link": "crank", "at": crank, "vector": vector, "frame": frame}}
+    more: Raw = {**raw, **sections(cell, crank)}
+    J, laws = raw["joints"]["J"], BUSHINGS.get(cell.law)
+    if laws is not None:
+        J["bushing"] = dict(laws)
+    if cell.law == "shaft":
+        raw["drive"] |= {"shaft_stiffness": 500.0, "shaft_damping": 0.1}
+    if cell.law == "no numerical damping":
+        raw["analysis"]["rho_inf"] = 1.0
+    if cell.law in {"gear", "rack"}:
+        geared(more, cell)
+    return more
+
+
+BUSHINGS: dict[str, Raw] = {
+    "bushing": {"stiffness": 1e6}, "damped bushing": {"stiffness": 1e6, "damping": 300.0},
+    "bushing against turns": {"stiffness": 1e6, "turning_stiffness": 2e3, "turning_damping": 0.3},
+}  # fmt: skip
+
+
+def sections(cell: Cell, crank: Any) -> Raw:
+    """Sections that a law puts into a scene; `crank` is the place of its end."""
+    torque = {"over": "speed", "at": [-50, 50], "value": [5, -5]}
+    away = [crank[0] + 0.05, crank[1] + 0.1, *crank[2:]]
+    ends = [{"link": "crank", "at": crank}, {"link": "ground", "at": away}]
+    along, preloaded = cell.joint in SLID, {"stiffness": 200.0, "damping": 0.2, "preload": 3.0}
+    slides = cell.joint == "prismatic"
+    spring = {"kind": "spring", "between": ends, "stiffness": 2e4, "damping": 20.0, "preload": 30.0}
+    by_law: dict[str, Raw] = {
+        "spring between points": {"springs": {"s": spring}},
+        "spring on the joint": {
+            "springs": {"s": {"kind": "spring" if along else "torsion", "joint": "J", **preloaded}}
+        },
+        "motor on the joint": {"motors": {"m": {"joint": "J", "force" if slides else "torque": torque}}},
+        "motor at the crank": {"motors": {"m": {"joint": "A", "torque": torque}}},
+        "point mass": {"bodies": {"w": {"kind": "point_mass", "link": "crank", "at": crank, "mass": 0.4}}},
+        "damping": {"damping": {"beta": 1e-5}},
+        "damping of mass": {"damping": {"alpha": 2.0, "beta": 1e-5}},
+    }
+    return by_law.get(cell.law, {})
+
+
+def geared(raw: Raw, cell: Cell) -> None:
+    """A wheel that the crank's hinge turns, or a rack that it moves."""
+    raw["links"]["wheel"] = beam_in_space((0.0, -0.3, 0.1), (0.1, -0.35, 0.1), 1)
+    axis = {"at": [0.0, -0.3, 0.1], "axis": [0.2, 0.3, 1.0], "links": ["wheel", "ground"]}
+    slides = cell.law == "rack"
+    raw["joints"]["W"] = {"kind": "prismatic" if slides else "revolute", **axis}
+    raw["gears"] = {"g": {"joints": ["A", "W"], **({"radius": 0.08} if slides else {"ratio": -1.5})}}
+
+
+# -- what becomes of them -----------------------------------------------------------------------------------
+
+
+class _Any(dict[str, str]):
+    def __missing__(self, key: str) -> Any:
+        return _Word()
+
+
+class _Word(str):
+    def __new__(cls) -> "_Word":
+        return super().__new__(cls, "\0")
+
+    def __repr__(self) -> str:
+        return "\0"
+
+
+def as_said(refusal: Refusal, fault: str) -> bool:
+    """Whether a fault is in the words of a line of the table, whatever scene it is about."""
+    text = refusal.said(_Any())
+    return re.fullmatch(".+".join(map(re.escape, text.split("\0"))), fault) is not None
+
+
+def refused_by_the_table(error: KedfemError) -> bool:
+    """Whether each fault is in the words of a line."""
+    faults = getattr(error, "faults", None) or [str(error)]
+    return all(any(as_said(each, fault) for each in REFUSALS) for fault in faults)
+
+
+def executed(cell: Cell) -> tuple[str, float]:
+    """`ran` with the largest difference from the oracle's displacements, of their peak, or `refused`.
+
+    Both of the system's march and of a run. Not of one with rigid links, which are stiff ones there: that is of second
+    order in the step; nor of co-rotational ones with loads that turn with their link, which the system turns otherwise.
+    """
+    try:
+        of = begun(scene_of(cell))
+        run = run_of(of)
+        if cell.frames == "stiffening":
+            return "ran", apart(run, run_of(of, literal=True))
+        of = as_a_run(of) if cell.frames == "following" else of
+        wanted = by_oracle(of, STEPS, keeps=True)[0]
+        found = [rows(of.ready, marched(of, STEPS)[1].u)]
+        turning = cell.frames == "following" and cell.law == "loads that turn"
+        if "rigid" not in cell.links and not turning:
+            found.append(run)
+        return "ran", max(apart(each, wanted) for each in found)
+    except KedfemError as error:
+        if refused_by_the_table(error):
+            return "refused", 0.0
+        raise
+
+
+def apart(found: np.ndarray, wanted: np.ndarray) -> float:
+    """Largest difference, of the peak."""
+    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+
+
+def as_a_run(of: Begun) -> Begun:
+    """The same, begun as runs with co-rotational frames begin."""
+    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
+    return replace(of, state=rest(of.ready, of.motion, rates, accelerated=accelerated_in_a_step))
+
+
+def run_of(of: Begun, literal: bool = False) -> np.ndarray:
+    """Displacements (T, N) of all links by the solver that a run takes, or by the literal one."""
+    made, model = of.prepared, of.prepared.model
+    if literal:
+        links = model.links, model.joints
+        solver: Any = LiteralSteps(*links, of.ready.scheme, model.damping, stiffening(model))
+    else:
+        solver = steps_of(made.scene, model)
+    blocks = list(transient(made.scene, made.linkage, made.path, model, solver))
+    every = [np.concatenate([x.links[k].u for x in blocks])[1:] for k in range(len(model.links))]
+    return np.concatenate([u.reshape(len(u), -1) for u in every], axis=1)
+
+
+def main() -> None:
+    """Executes all cells, or those whose names hold given words."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("words", nargs="*")
+    words = parser.parse_args().words
+    count: dict[str, int] = {}
+    for cell in all_cells():
+        if not all(word in str(cell) for word in words):
+            continue
+        start = time.process_time()
+        try:
+            what, differs = executed(cell)
+        except Exception as error:  # noqa: BLE001  all of them are listed
+            what, differs = f"failed: {error}", 0.0
+        if what == "ran" and differs > cell.within:
+            what = "differs"
+        count[what.split(":")[0]] = count.get(what.split(":")[0], 0) + 1
+        said = f"{time.process_time() - start:6.2f} s  {differs:8.1e}  {cell}: {what}"
+        sys.stdout.write(said + "\n")
+    sys.stdout.write(f"{count}\n")
+
+
+if __name__ == "__main__":
+    main()
