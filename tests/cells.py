@@ -223,8 +223,8 @@ def refused_by_the_table(error: KedfemError) -> bool:
 def executed(cell: Cell) -> tuple[str, float]:
     """`ran` with the largest difference from the oracle's displacements, of their peak, or `refused`.
 
-    Both of the system's march and of a run. Not of one with rigid links, which are stiff ones there: that is of second
-    order in the step; nor of co-rotational ones with loads that turn with their link, which the system turns otherwise.
+    Both of the system's march and of a run; not of one with rigid links, which are stiff ones there: that is of second
+    order in the step.
     """
     try:
         of = begun(scene_of(cell))
@@ -234,8 +234,7 @@ def executed(cell: Cell) -> tuple[str, float]:
         of = as_a_run(of) if cell.frames == "following" else of
         wanted = by_oracle(of, STEPS, keeps=True)[0]
         found = [rows(of.ready, marched(of, STEPS)[1].u)]
-        turning = cell.frames == "following" and cell.law == "loads that turn"
-        if "rigid" not in cell.links and not turning:
+        if "rigid" not in cell.links:
             found.append(run)
         return "ran", max(apart(each, wanted) for each in found)
     except KedfemError as error:
