@@ -101,8 +101,9 @@ def pieces(name: str) -> tuple[int, int, float]:
             gmsh_copy(gmsh, 1 / solid.extent) as copy,
         ):
             occ = copy.model.occ
+            whole = copy.model.getEntities(3)
             tools = [each for face in cutting_faces(solid) for each in surface(copy, face, solid.extent)]
-            tags = [tag for dim, tag in occ.fragment(copy.model.getEntities(3), tools)[1][0] if dim == 3]
+            tags = [tag for dim, tag in occ.fragment(whole, tools)[1][0] if dim == 3]
             occ.synchronize()
             good = [swept(copy, tag) for tag in tags]
             volumes = np.array([occ.getMass(3, tag) for tag in tags])

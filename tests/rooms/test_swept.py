@@ -154,6 +154,23 @@ def test_parts_are_swept_in_any_place(name: str, tmp_path: Path) -> None:
     assert volume(meshes[0]) == pytest.approx(volume(meshes[1]), rel=1e-4)
 
 
+@pytest.mark.long
+def test_shafts_and_bushings_of_random_steps_are_swept(tmp_path: Path) -> None:
+    """Cylinders and cones one behind the other, hollow or solid, with a centre hole or not: none is refused."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        x = np.cumsum(np.append(0.0, rng.uniform(3, 25, 4)))
+        ends = [(r, r if rng.random() < 0.6 else rng.uniform(6, 20)) for r in rng.uniform(6, 20, 4)]
+        outline = [(x[k + j], r) for k, pair in enumerate(ends) for j, r in enumerate(pair)]
+        drilled = [(x[-1], 3.0), (x[-1] - 2, 3.0), (x[-1] - 3, 0.0), (0.0, 0.0)]
+        inner = [drilled, [(x[-1], 4.0), (0.0, rng.uniform(1, 5))], [(x[-1], 0.0), (0.0, 0.0)]][seed % 3]
+        file, exact = drawn(tmp_path, lambda occ, all_=outline + inner: turned(occ, all_), bool(seed % 2))
+        mesh = swept(file)
+        assert valid_everywhere(mesh.points, mesh.cells).all()
+        assert mesh_quality(mesh).least > 0.2
+        assert volume(mesh) == pytest.approx(exact, rel=5e-4)
+
+
 def test_the_surface_is_the_parts_own(tmp_path: Path) -> None:
     """Nodes on a bore and a journal have its radius to rounding, at corners, sides and middles."""
     mesh = swept(drawn(tmp_path, PARTS["pulley"][0])[0])

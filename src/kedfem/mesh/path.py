@@ -92,16 +92,16 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
 def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFace) -> tuple[Leg, ...]:
     """The legs from one end on, if they lead past all faces to another end; else none."""
     legs: tuple[Leg, ...] = ()
-    frame, seen = Frame(end.centre, plan_axes(-end.direction)), {end.tag}
-    walls = _behind(gmsh, _edges(gmsh, end.tag), seen)
+    frame, left = Frame(end.centre, plan_axes(-end.direction)), set(every) - {end.tag}
+    walls = _behind(gmsh, _edges(gmsh, end.tag), left)
     while walls:
         leg, far = _leg(gmsh, solid, [every[tag] for tag in sorted(walls)], frame)
         if leg is None:
             return ()
-        legs, seen, frame = (*legs, leg), seen | walls, leg.at(1.0)
-        walls = _behind(gmsh, far, seen)
+        legs, left, frame = (*legs, leg), left - walls, leg.at(1.0)
+        walls = _behind(gmsh, far, left)
         if len(walls) == 1 and _is_across(solid, every[min(walls)], frame):
-            return legs if len(seen) + 1 == len(every) else ()
+            return legs if left == walls else ()
     return ()
 
 
@@ -110,9 +110,9 @@ def _edges(gmsh: ModuleType, face: int) -> set[int]:
     return {int(tag) for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, oriented=False)}
 
 
-def _behind(gmsh: ModuleType, edges: set[int], seen: set[int]) -> set[int]:
-    """The faces at edges that have not been passed."""
-    return {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]} - seen
+def _behind(gmsh: ModuleType, edges: set[int], left: set[int]) -> set[int]:
+    """The faces at edges, of those that have not been passed."""
+    return {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]} & left
 
 
 def _is_across(solid: Solid, look: Looks, frame: Frame) -> bool:
