@@ -38,7 +38,7 @@ from kedfem.mesh.ways import made_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from
 
-TURNED = re.compile("swept about|carried along")
+TURNED = re.compile("(swept about|carried along)[^;]*")
 DOCS = Path(__file__).parents[1] / "docs"
 Occ = ModuleType
 PARTS: dict[str, Callable[[Occ], int]] = {}
@@ -736,10 +736,8 @@ def main() -> None:
         f"{len(sizes)} of {len(PARTS)} parts meshed, {swept} with hexahedra; median {sizes[len(sizes) // 2]:,} unknowns, "
         f"most {sizes[-1]:,}."
     )
-    turned = [(name, mesh) for name, mesh in meshes if mesh and TURNED.search(mesh.way)]
     titled = [
-        (f"{name}\n{mesh.way.partition(';')[0].partition('swept ')[2] or mesh.way}", mesh)
-        for name, mesh in turned
+        (f"{name}\n{found[0]}", mesh) for name, mesh in meshes if mesh and (found := TURNED.search(mesh.way))
     ]
     write_mesh_picture(
         titled, DOCS / "pictures" / "swept.png", "Swept about an axis, or along lines and arcs"
