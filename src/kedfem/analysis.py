@@ -27,6 +27,7 @@ from kedfem.output.derived import (
     WORST,
     fields,
     peak_warning,
+    refuse_foreign,
     write_derived,
     write_envelope,
 )
@@ -99,6 +100,7 @@ def analyse(
         With a message for the user; rows and frames up to there are kept and marked as interrupted.
     """
     with claimed(scene.results_folder) as folder:
+        refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
         run = _analysed(scene, folder, watch, keeper)
         remove_state(folder)

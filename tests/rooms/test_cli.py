@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import h5py
 import pytest
 
 import kedfem
@@ -454,6 +455,24 @@ def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
         "results.h5",
         "worst.vtu",
     ]
+
+
+@pytest.mark.parametrize("name", ["results.csv", "worst.png", "animation.pvd", "envelope.vtu", "results.h5"])
+def test_files_that_are_not_kedfems_are_left_alone(run_kedfem: Command, arm: Path, name: str) -> None:
+    """A scene may name any folder for its results: what others keep there under such names stays."""
+    arm.write_text(arm.read_text("utf-8").replace("[output]", '[output]\nfolder = "mine"'), encoding="utf-8")
+    file = arm.with_name("mine") / name
+    file.parent.mkdir()
+    if name == "results.h5":
+        with h5py.File(file, "w") as foreign:
+            foreign["precious"] = [1.0]
+    else:
+        file.write_text("precious", encoding="utf-8")
+    before = file.read_bytes()
+    said = run_kedfem("run", arm)
+    assert said.code == USER_ERROR
+    assert f"must be a folder of kedfem's results or one without {name}" in said.err
+    assert file.read_bytes() == before
 
 
 def wait_for(condition: Callable[[], bool], running: "subprocess.Popen[str]") -> None:

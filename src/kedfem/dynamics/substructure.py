@@ -3,7 +3,8 @@
 Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -148,9 +149,27 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
-    return substructure(
-        joint, link.n, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
-    )
+    with _condensing(link):
+        return substructure(
+            joint,
+            link.n,
+            lambda r: factor.solve(r.ravel()).reshape(r.shape),
+            factor.solve_many,
+            anchors,
+            kappa,
+        )
+
+
+@contextmanager
+def _condensing(link: Link) -> Iterator[None]:
+    """Says which link has stiffnesses so far apart that nothing is left of its flexibility at its interface points."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"links.{link.name}: must have a flexibility at its joints that is more than rounding beside its least stiff "
+            "motion, got none: it may be very thin beside its length, or its sizes in other units than meant"
+        ) from error
 
 
 def mass_substructure(link: Link, joint: Attachment) -> Substructure:
@@ -166,7 +185,8 @@ def mass_substructure(link: Link, joint: Attachment) -> Substructure:
     def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
         return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
 
-    return substructure(joint, link.n, solve, solve_many)
+    with _condensing(link):
+        return substructure(joint, link.n, solve, solve_many)
 
 
 def _dense_factored(
@@ -186,9 +206,10 @@ def _dense_factored(
     def solve_many(B: np.ndarray) -> np.ndarray:
         return np.asarray(scipy.linalg.cho_solve(factor, B, check_finite=False))
 
-    return substructure(
-        joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
-    )
+    with _condensing(link):
+        return substructure(
+            joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
+        )
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:

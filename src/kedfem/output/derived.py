@@ -17,6 +17,7 @@ from kedfem.output.words import clock, moment, stress_at
 from kedfem.results import Peak, Results, write_csv
 from kedfem.results.doubtful import AWAY, reason
 from kedfem.results.envelope import Envelope
+from kedfem.results.reader import foreign
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
@@ -56,6 +57,22 @@ def fields(
     """What a frame shows of each link, deformed as the animation exaggerates it."""
     animation = scene.output.animation
     return link_fields(model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
+
+
+def refuse_foreign(folder: Path) -> None:
+    """A folder with files of the names that a run replaces, but without results of kedfem, holds somebody's own files.
+
+    Raises
+    ------
+    OutputError
+    """
+    file = folder / "results.h5"
+    names = [TABLE, PICTURE, MESH, WORST, ENVELOPE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
+    found = [] if file.exists() else [name for name in names if (folder / name).exists()]
+    if found or foreign(file):
+        wanted = f"output.folder: must be a folder of kedfem's results or one without {', '.join(found) or file.name}"
+        got = f"{folder}, where it is not known to be kedfem's"
+        raise OutputError(f"{wanted}, got {got}: move it away, or name another folder")
 
 
 def remove_derived(folder: Path) -> None:

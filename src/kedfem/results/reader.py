@@ -70,6 +70,15 @@ def run_status(path: Path) -> str:
         return ""
 
 
+def foreign(path: Path) -> bool:
+    """Whether there is an HDF5 file that is not of kedfem."""
+    try:
+        with _opened(path) as file:
+            return "kedfem_version" not in file.attrs
+    except (OSError, RuntimeError):
+        return False
+
+
 def _opened(path: Path) -> Any:
     """The file, whether or not a run is writing it."""
     try:
