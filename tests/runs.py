@@ -6,16 +6,13 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.actions import actions
-from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import on_segment
-from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.links.record import in_space, mass_times
 from kedfem.links.recovery import point_rows
 from kedfem.results.recording import recording
-from kedfem.scene import scene_from, time_grid
+from kedfem.scene import scene_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +89,12 @@ def point(at: Any) -> np.ndarray:
     return np.concatenate([np.asarray(at, float), np.zeros(3 - len(at))])
 
 
-def ran(raw: dict[str, Any], compiled: bool = True) -> Ran:
-    """All time points of a scene; with the general path, which is the compiled loop's oracle, if not compiled."""
+def ran(raw: dict[str, Any]) -> Ran:
+    """All time points of a scene."""
     scene = scene_from(raw)
     ready = meshed(scene)
     model = ready.model
     solver: Any = steps_of(scene, model)
-    if not compiled:
-        scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-        solver = FollowingSteps(model.links, model.joints, scheme, model.damping, actions(scene, model))
     return Ran(ready, solver, list(transient(scene, ready.linkage, ready.path, model, solver)))
 
 

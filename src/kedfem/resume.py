@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import Prepared
-from kedfem.dynamics.marks import Marks, refuse_unstorable
+from kedfem.dynamics.marks import Marks
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
@@ -86,13 +86,10 @@ class Keeper:
         ------
         SceneError
             It does not.
-        SolveError
-            The run's states cannot be stored.
         """
         self.origin |= {f"planned {key}": value for key, value in flat(ready.scene).items()}
         self.origin["model"] = _digest(ready)
         if self.stored:
-            refuse_unstorable(marks)
             remedy = "planned and meshed again as before (it is, where KEDFEM_CACHE still has both)"
             _refuse_other(self.stored.put_back("all"), self.origin, remedy)
 

@@ -16,7 +16,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.levels import leveled
 from kedfem.dynamics.marks import Marks
 from kedfem.dynamics.model import segments, ways
-from kedfem.dynamics.transient import Steps, storable
+from kedfem.dynamics.transient import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.derived import STEM, fields, remove_derived
@@ -80,7 +80,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
     notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
     notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
-    marks = Marks.of(len(solvers), keeper is not None and storable(solvers))
+    marks = Marks.of(len(solvers), keeper is not None)
     memories = {
         "marks": marks, "frames": frames, "envelope": envelope, "seen": seen, "errors": errors,
         "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
@@ -111,7 +111,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
                         now = block.at(k)
                         frames.add(now.t, fields(scene, model, watched.recoveries, now))
                 watch("steps", block.step + len(block) - 1, steps)
-                if keeper is not None and marks.storable and keeper.due(envelope.waits):
+                if keeper is not None and keeper.due(envelope.waits):
                     table.flush()
                     keeper.keep(writer.rows, memories)
         finally:

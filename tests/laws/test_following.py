@@ -309,18 +309,6 @@ def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_s
     assert np.all(order > -2.1)
 
 
-@pytest.mark.parametrize("kind", ["planar", "spatial", "plane"])
-def test_the_compiled_loop_is_the_general_path(kind: str) -> None:
-    """Both stop sweeping at 1e-7 of a step's change."""
-    raw = elbow(kind, 16, step=4e-4)
-    if kind == "plane":
-        raw["links"]["arm"] |= {"mesh": {"size": 0.02}, "segments": 3}
-    raw["damping"] = {"alpha": 5, "beta": 1e-5}
-    fast, general = ran(raw), ran(raw, compiled=False)
-    assert type(fast.solver) is not type(general.solver)
-    assert_allclose(tip(fast), tip(general), rtol=0, atol=1e-6 * np.abs(tip(general)).max())
-
-
 @pytest.mark.parametrize("kind", ["spatial", "rigid"])
 def test_the_same_whichever_way_the_whole_scene_is_turned(kind: str) -> None:
     """A bent arm on a hinge that falls under gravity and a spring: all points and vectors turned at random."""
@@ -394,15 +382,14 @@ def flight(kind: str, h: float) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_joints_stay_closed_and_work_is_as_counted(compiled: bool) -> None:
+def test_joints_stay_closed_and_work_is_as_counted() -> None:
     """One factorisation per segment, at most four sweeps a step, in the source's four-bar at 600 rpm."""
     raw = four_bar(
-        {"turns": 0.1 if not compiled else 0.5, "steps_per_turn": 1000, "frames": "following", "initial": "rest"},
+        {"turns": 0.5, "steps_per_turn": 1000, "frames": "following", "initial": "rest"},
         {"mesh": {"elements": 4}},
         damping={"ratio": 0.02, "frequencies": [20, 200]},
     ).model_dump(mode="json", exclude_unset=True)  # fmt: skip
-    made = ran(raw, compiled)
+    made = ran(raw)
     assert made.solver.factorisations == len(made.ready.model.links) == 12
     assert 1 < made.sweeps <= 4
     for at, (one, other) in {"B": ("crank", "coupler"), "C": ("coupler", "rocker")}.items():

@@ -88,6 +88,14 @@ def test_a_driven_arm_under_all_its_loads_moves_as_by_the_oracle(kind: str) -> N
     assert against_oracle(as_a_run(begun(moving(kind, R, driven=True)))) < 1e-7
 
 
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_bodies_with_sparse_factors_move_as_by_the_oracle(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kedfem.dynamics.system.layout.SMALL", 0)
+    of = as_a_run(begun(moving(kind, ASKEW if kind == "solid" else np.eye(3), driven=False)))
+    assert not of.ready.bodies.dense.any()
+    assert against_oracle(of) < 1e-7
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("drawn", DRAWN)
 @pytest.mark.parametrize(("kind", "load"), CASES)

@@ -1,4 +1,4 @@
-"""Co-rotational frames by the system: as the loop that it replaces, and joints by constraint equations in them."""
+"""Co-rotational frames in runs: large bodies as small ones, and joints by constraint equations in them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,20 +8,19 @@ import pytest
 
 import kedfem.dynamics.transient as runs
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import FREE
+from kedfem.dynamics.system import layout
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.transient import Steps, steps_of, transient
-from kedfem.errors import SceneError
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.recording import recording
-from kedfem.scene import scene_from, time_grid
-from tests.laws.test_following import slow_four_bar
+from kedfem.scene import scene_from
+from tests.laws.test_capabilities import as_a_run
 from tests.moving import bar, cardan, geared, inverted, turned, two_drives
 from tests.rooms.test_acted import four_bar
 from tests.spatial_joints import BEAMS
+from tests.systems import against_oracle, begun
 
 Raw = dict[str, Any]
 Channels = dict[str, np.ndarray]
@@ -44,12 +43,6 @@ def channels(raw: Raw, solver_of: Any = steps_of) -> tuple[Steps, Channels, floa
     return solver, {name: np.concatenate(x) for name, x in out.items()}, checks.unworked
 
 
-def replaced(scene: Any, model: Any) -> FollowingSteps:
-    """The loop of before."""
-    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    return FollowingSteps(model.links, model.joints, scheme, model.damping, (), FREE)
-
-
 def alike(got: Channels, wanted: Channels, within: float) -> None:
     """Of the largest value of all channels of the same kind."""
     assert got.keys() == wanted.keys()
@@ -66,13 +59,13 @@ def first_alone(every: Mapping[str, Any]) -> list[Any]:
     return [pytest.param(name, marks=[pytest.mark.long] * bool(k)) for k, name in enumerate(every)]
 
 
-OLD = {
-    "planar beams": lambda: four_bar("following", steps=72, analysis=REST),
-    "damped, rho_inf 0.8": lambda: four_bar(
-        "following", steps=72, damping={"beta": 1e-5, "alpha": 1.0}, analysis={**REST, "rho_inf": 0.8}
-    ),
+MESHED = {
     "plane links": lambda: four_bar("following", "plane", steps=36, analysis=REST),
-    "beams in space": lambda: with_analysis(slow_four_bar(1.0, True), **REST),
+    "damped, rho_inf 0.8": lambda: four_bar(
+        "following", "plane", steps=36, damping={"beta": 1e-5, "alpha": 1.0}, analysis={**REST, "rho_inf": 0.8}
+    ),
+    "quasi-static solids": lambda: four_bar("following", "solid", steps=36),
+    "a sliding block": lambda: with_analysis(inverted("plane"), turns=0.02, frames="following"),
 }  # fmt: skip
 
 
@@ -80,13 +73,16 @@ def with_analysis(raw: Raw, **more: Any) -> Raw:
     return {**raw, "analysis": {**raw["analysis"], **more}}
 
 
-@pytest.mark.parametrize("name", first_alone(OLD))
-def test_all_that_is_recorded_is_as_by_the_loop_of_before(name: str, monkeypatch: Any) -> None:
-    """From rest, where both begin alike; both to the tolerance of scenes without a drive."""
+@pytest.mark.parametrize("name", first_alone(MESHED))
+def test_bodies_with_sparse_factors_move_as_those_with_dense_matrices(name: str, monkeypatch: Any) -> None:
+    """All that is recorded; both to the tolerance of scenes without a drive."""
     monkeypatch.setattr(runs, "CONVERGED", FREE)
-    solver, got, _ = channels(OLD[name]())
+    _, dense, _ = channels(MESHED[name]())
+    monkeypatch.setattr(layout, "SMALL", 0)
+    solver, sparse, _ = channels(MESHED[name]())
     assert isinstance(solver, CorotationalSteps)
-    alike(got, channels(OLD[name](), replaced)[1], 1e-7)
+    assert not any(solver.ready.bodies.dense)
+    alike(sparse, dense, 1e-7)
 
 
 def stiffer(raw: Raw, times: float) -> Raw:
@@ -222,13 +218,8 @@ def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
         assert unworked < 1e-3
 
 
-def test_what_joints_by_constraint_equations_do_not_stand_beside_is_refused() -> None:
-    raw = with_analysis(inverted(), frames="following")
-    load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1.0], "frame": "link"}
-    ready, _ = prepared(scene_from({**raw, "loads": {"P": load}}))
-    assert isinstance(steps_of(ready.scene, ready.model), CorotationalSteps)
-    raw = with_analysis(inverted("plane"), frames="following")
-    raw["links"]["arm"] |= {"segments": 1, "mesh": {"elements": [100, 4]}}
-    ready, _ = prepared(scene_from(raw))
-    with pytest.raises(SceneError, match=r"links\.arm: must have at most 1500 unknowns .* joints\.S .* got"):
-        steps_of(ready.scene, ready.model)
+def test_loads_that_turn_stand_beside_joints_by_constraint_equations() -> None:
+    """As by the oracle, with a block that slides on the loaded arm."""
+    load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 100.0], "frame": "link"}
+    raw = with_analysis(inverted(), frames="following", initial="rest", rho_inf=0.8) | {"loads": {"P": load}}
+    assert against_oracle(as_a_run(begun(raw))) < 1e-7

@@ -330,29 +330,6 @@ def test_a_load_turns_with_a_link_that_nothing_leads(name: str) -> None:
     assert_allclose(found["energy/kinetic"][-1], moment * angle[-1], rtol=2e-2)
 
 
-def test_both_solvers_of_frames_that_follow_turn_a_load_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Raised slowly: their starts take a sudden torque each in a way of its own."""
-    kind, load, _ = SPUN["torque on a solid"]
-    load = load | {"factor": {"time": [0.0, 0.02], "value": [0.0, 1.0]}}
-    small = spun(kind, load)["joints/A/angle"]
-    monkeypatch.setattr("kedfem.dynamics.transient.SMALL", 0)
-    assert_allclose(spun(kind, load)["joints/A/angle"], small, atol=1e-5)
-
-
-def test_a_torque_that_keeps_its_direction_in_space_needs_small_segments(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    raw = arm(
-        "bar", {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, 1]}}, initial="rest"
-    )
-    del raw["drive"]
-    ready, _ = prepared(scene_from(raw))
-    steps_of(ready.scene, ready.model)
-    monkeypatch.setattr("kedfem.dynamics.transient.SMALL", 0)
-    with pytest.raises(SceneError, match="must act on segments of at most 360 unknowns, got"):
-        steps_of(ready.scene, ready.model)
-
-
 def test_a_table_over_time_is_written_out_period_by_period() -> None:
     factor = factor_of(at=[0.1, 0.2, 0.5], value=[0.0, 1.0, -1.0], period=0.6)
     at, value = factor_table(factor, 2.0)

@@ -8,7 +8,7 @@ import pytest
 
 from kedfem.analysis import Run, analyse
 from kedfem.dynamics import transient
-from kedfem.errors import KedfemError, OutputError, SceneError
+from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import read_results
 from kedfem.resume import STATE
@@ -237,12 +237,3 @@ def test_what_cannot_be_stored_is_no_fault_of_the_run(
     run = analyse(turning(tmp_path), every=0.0)
     assert run.results.status == "complete"
     assert any("it could not have gone on" in each for each in run.warnings)
-
-
-def test_a_loop_with_memories_of_its_own_is_refused_in_words(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ended_early(turning(tmp_path), 0.5)
-    monkeypatch.setattr("kedfem.stepping.storable", lambda solvers: False)
-    with pytest.raises(KedfemError, match="--resume: must be of a run whose states can be stored"):
-        analyse(turning(tmp_path), resumes=True)

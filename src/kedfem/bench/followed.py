@@ -11,7 +11,6 @@ from jaxtyping import Float
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.bench.scenes import four_bar_of
-from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
@@ -123,8 +122,6 @@ def advanced(
 ) -> Any:
     """A solver's state after some steps."""
     known: tuple[Any, ...] = (forcing,)
-    if isinstance(solver, FollowingSteps | CorotationalSteps):
-        known = (forcing, motion)
     if isinstance(solver, CorotationalSteps):
         known = (forcing, motion, _motion_at(ready))
     return solver.advance(state, *known)[-1]

@@ -9,7 +9,6 @@ import numpy as np
 
 from kedfem.bench.followed import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
 from kedfem.bench.machine import Watch, markdown, table, write_page
-from kedfem.dynamics.following import FollowingSteps
 from kedfem.dynamics.system.corotational import CorotationalSteps
 
 STEPS = 3000  # usual number
@@ -199,19 +198,14 @@ def _costs(watch: Watch) -> list[str]:
         linear, _ = cost(four_bar(link, STEPS))
         for count in segments:
             step, solver = cost(four_bar({**link, "segments": count}, STEPS, frames="following"))
-            kind = "compiled" if isinstance(solver, CorotationalSteps) else "general"
             unknowns = sum(each.unknowns for each in solver.links)
-            sweeps = (
-                solver.sweeps / (BLOCKS * POINTS)
-                if isinstance(solver, FollowingSteps | CorotationalSteps)
-                else 0.0
-            )
+            sweeps = solver.sweeps / (BLOCKS * POINTS) if isinstance(solver, CorotationalSteps) else 0.0
             rows.append((
                 " × ".join(map(str, elements)), str(count), f"{unknowns:,}", f"{1e3 * linear:.2f}", f"{1e3 * step:.2f}",
-                f"{step / linear:.1f}", f"{sweeps:.2f}", str(solver.factorisations), kind,
+                f"{step / linear:.1f}", f"{sweeps:.2f}", str(solver.factorisations),
             ))  # fmt: skip
     header = ("hex20 of a link", "segments", "unknowns", "linear step [ms]", "following step [ms]", "ratio", "sweeps",
-              "factorisations", "loop")  # fmt: skip
+              "factorisations")  # fmt: skip
     return ["## What a step costs", "", *table(header, rows)]
 
 

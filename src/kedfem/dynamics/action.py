@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.rows import cross, perpendiculars
 
-TURN, SLIDE, DISTANCE, FOLLOW = 0, 1, 2, 3
+TURN, SLIDE, DISTANCE = 0, 1, 2
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
 TIME, SPEED, POSITION = 0, 1, 2
 OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION}
@@ -53,10 +53,10 @@ class Action:
     """A force law on one coordinate: the turn of a hinge, the travel of a slide, the distance of two points.
 
     name : ``motors/NAME``, ``springs/NAME`` or ``joints/NAME``
-    kind : TURN, SLIDE, DISTANCE; FOLLOW: a force on the second end that turns with the first
+    kind : TURN, SLIDE, DISTANCE
     ends : the coordinate is that of the first against the second
     stiffness, damping, free : of a spring, free where it has no force
-    axis : of a hinge or slide, as drawn; of a force its vector
+    axis : of a hinge or slide, as drawn
     over, at, value : of a motor, its curve; none: no points
     """
 
@@ -137,33 +137,6 @@ def vectors(every: Sequence[Action], block: Block) -> tuple[Float[np.ndarray, "T
                 x[:, i, e] += elastic_vectors(end, history.u)
                 v[:, i, e] += elastic_vectors(end, history.v)
     return x, v
-
-
-def end_weights(
-    every: Sequence[Action],
-    shape: tuple[int, int],
-    bases: Sequence[Sequence[Float[np.ndarray, "n s"]]] | None = None,
-) -> tuple[Int[np.ndarray, "A 2"], Float[np.ndarray, "A 2 2 D S"]]:
-    """Owners and padded weights of all ends, for the kernel's `seen` and `borne`.
-
-    Parameters
-    ----------
-    shape : components D and functions S that states are padded to
-    bases : per link and component, its rows from other coordinates: u[:, c] = basis[c] @ x[c]; none: rows as they are
-
-    Returns
-    -------
-    Number of the link of each end or -1; what component c of each of its two vectors has of each coordinate.
-    """
-    owners = np.array([[end.k for end in action.ends] for action in every], int).reshape(-1, 2)
-    weights = np.zeros((len(every), 2, 2, *shape))
-    for row, action in zip(weights, every, strict=True):
-        for out, end in zip(row, action.ends, strict=True):
-            for c in range(shape[0] if end.k >= 0 else 0):
-                if end.mask[c] and (bases is None or c < len(bases[end.k])):
-                    w = end.weights if bases is None else end.weights @ bases[end.k][c]
-                    out[: len(w), c, : w.shape[1]] = w
-    return owners, weights
 
 
 def elastic_vectors(end: End, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T 2 3"]:

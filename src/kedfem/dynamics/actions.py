@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.dynamics.action import (
     ANGLE,
     DISTANCE,
-    FOLLOW,
     IN_SPACE,
     OVER,
     PAIR,
@@ -22,17 +20,15 @@ from kedfem.dynamics.action import (
     End,
     Vector,
 )
-from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.model import Model, Slider, on_segment
 from kedfem.dynamics.places import seat_of, slider_axis
-from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import Seat, face_normal, holds, port_weights
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rows import perpendiculars
-from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring, path_parameter, time_grid
+from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
 
 
 def actions(scene: Scene, model: Model) -> tuple[Action, ...]:
@@ -67,59 +63,6 @@ def hinges(scene: Scene, model: Model) -> tuple[Action, ...]:
     find = _Ends(scene, model)
     names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
-
-
-def followers(scene: Scene, model: Model) -> tuple[Action, ...]:
-    """Loads that turn with links as these themselves do, at the time steps, one for each component in the link.
-
-    Raises
-    ------
-    SceneError
-        If a torque is fixed in the world.
-    """
-    for k, load in turning(model.loads):
-        if load.share is not None:
-            raise SceneError(
-                f"loads: a torque in space that does not turn with link '{model.links[k].name}' in co-rotational "
-                f"frames must act on segments of at most {SMALL} unknowns, got {model.links[k].unknowns}: give it more "
-                "segments or larger elements"
-            )
-    grid = time_grid(scene)
-    t = grid.step * np.arange(grid.steps + 1)
-    phi = path_parameter(scene, t)[0]
-    return tuple(
-        Action(
-            f"loads/{k}",
-            FOLLOW,
-            (_shown(model, k, w), _bearing(model, k, w)),
-            axis=axis,
-            at=tuple(t.tolist()),
-            value=tuple(load.factor(t, phi).tolist()),
-        )
-        for k, (link, loads) in enumerate(zip(model.links, model.loads, strict=True))
-        for load in loads
-        if load.own
-        for axis, w in zip(np.eye(3), load.forces.T[: 2 if link.planar else 3], strict=False)
-        if w.any()
-    )
-
-
-def _bearing(model: Model, k: int, weights: Float[np.ndarray, " n"]) -> End:
-    """What takes a force with its share on each function."""
-    return End(k, model.bodies[k], POINT, weights[None], np.zeros((1, 3)), _plane(model.links[k]))
-
-
-def _shown(model: Model, k: int, weights: Float[np.ndarray, " n"]) -> End:
-    """How a segment has turned: of a planar beam ψ where a load is, of others two directions of its affine fit."""
-    link, body = model.links[k], model.bodies[k]
-    if link.kind == "beam":
-        share = np.abs(weights) / np.abs(weights).sum()
-        return End(k, body, ANGLE, share[None], np.zeros((1, 3)), (0.0, 0.0, 1.0))
-    if link.fit is None:
-        raise ValueError(f"link {link.name} must have a frame that follows it")
-    s = 2 if link.planar else 3
-    fit = np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])
-    return End(k, body, PAIR, fit[:2], np.eye(3)[:2], _plane(link))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ A : actions; every array has a row per action
     forces : (A, 2, 2, 3) out
     values : (A, 4) out: q, q', Q, energy stored
 
-    kinds : (A,) TURN, SLIDE, DISTANCE, FOLLOW
+    kinds : (A,) TURN, SLIDE, DISTANCE
     forms : (A, 2) POINT, PAIR, SINGLE, ANGLE: what the vectors of an end are
     numbers : (A, 14) stiffness, damping, free q; axis, e1, e2 as drawn; of each pair of directions its angle as drawn
     over : (A,) TIME, SPEED, POSITION: what the curve is over
@@ -22,7 +22,7 @@ A : actions; every array has a row per action
 import numpy as np
 
 from kedfem.compiled import compiled_in_order as compiled
-from kedfem.dynamics.action import ANGLE, FOLLOW, PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
+from kedfem.dynamics.action import PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
 
 STIFFNESS, DAMPING, FREE, AXIS, E1, E2, DRAWN = 0, 1, 2, 3, 6, 9, 12
 
@@ -38,9 +38,6 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
             q = turn(x[i], forms[i], numbers[i], before[i], gradient)
         elif kinds[i] == SLIDE:
             q = travel(x[i], numbers[i], gradient)
-        elif kinds[i] == FOLLOW:
-            q = 0.0
-            followed(x[i], forms[i], numbers[i], gradient)
         else:
             q = distance(x[i], gradient)
         rate = 0.0
@@ -59,55 +56,6 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
                     gradient[e, k, c] *= Q
         values[i, 0], values[i, 1], values[i, 2] = q, rate, Q
         values[i, 3] = 0.5 * numbers[i, STIFFNESS] * stretch * stretch
-
-
-@compiled
-def seen(owners, weights, nominal, u, out):  # type: ignore[no-untyped-def]
-    """Vectors of all ends, nominal + Σ w u, from padded states u (L, D, n); see `action.end_weights`."""
-    A, _, M, D, n = weights.shape
-    out[:] = nominal
-    for i in range(A):
-        for e in range(2):
-            k = owners[i, e]
-            if k >= 0:
-                for m in range(M):
-                    for c in range(D):
-                        for j in range(n):
-                            out[i, e, m, c] += weights[i, e, m, c, j] * u[k, c, j]
-
-
-@compiled
-def borne(owners, weights, forces, out):  # type: ignore[no-untyped-def]
-    """Add to padded forces (L, D, n) on the links what forces on the ends are on their states: Σ w f."""
-    A, _, M, D, n = weights.shape
-    for i in range(A):
-        for e in range(2):
-            k = owners[i, e]
-            if k >= 0:
-                for m in range(M):
-                    for c in range(D):
-                        f = forces[i, e, m, c]
-                        if f != 0.0:
-                            for j in range(n):
-                                out[k, c, j] += weights[i, e, m, c, j] * f
-
-
-@compiled
-def external(acting, t, u, v, turned, F):  # type: ignore[no-untyped-def]
-    """Add the forces of all actions to F (L, D, n), u and v being the states and their rates; coordinates (A,).
-
-    Parameters
-    ----------
-    acting : of `dynamics.acting.over_block`
-    t : number of the time point in the block
-    turned : (A,) coordinates at the time point before
-    """
-    owners, weights, table, times, x0, v0, x, x1, forces, values = acting
-    seen(owners, weights, x0[t], u, x)
-    seen(owners, weights, v0[t], v, x1)
-    evaluate(times[t], x, x1, turned, table, forces, values)
-    borne(owners, weights, forces, F)
-    return values[:, 0]
 
 
 @compiled
@@ -139,22 +87,6 @@ def distance(x, gradient):  # type: ignore[no-untyped-def]
         gradient[0, 0] = d / q
         gradient[1, 0] = -d / q
     return q
-
-
-@compiled
-def followed(x, forms, numbers, gradient):  # type: ignore[no-untyped-def]
-    """A vector, as drawn, turned with the first end, on the second: no coordinate's gradient, Q is its factor."""
-    d = numbers[AXIS : AXIS + 3]
-    if forms[0] == ANGLE:
-        c, s = np.cos(x[0, 0, 2]), np.sin(x[0, 0, 2])
-        gradient[1, 0, 0] = c * d[0] - s * d[1]
-        gradient[1, 0, 1] = s * d[0] + c * d[1]
-        gradient[1, 0, 2] = d[2]
-        return
-    a = x[0, 0] / np.sqrt(dot(x[0, 0], x[0, 0]))
-    n = cross(a, x[0, 1])
-    n /= np.sqrt(dot(n, n))
-    gradient[1, 0] = d[0] * a + d[1] * cross(n, a) + d[2] * n
 
 
 @compiled

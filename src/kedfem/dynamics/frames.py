@@ -8,7 +8,6 @@ The force is the gradient of that energy: with f = K0 g and τ = Σ g_a × f_a, 
 segment, turning Q costs τ, and so F_a = f_a − (G⁻¹ τ) × c_a with G = tr(U) 1 − U; F has neither resultant nor moment.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,12 +149,3 @@ def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) 
 
 def _times(K: np.ndarray, g: Nodal) -> Nodal:
     return np.asarray((K @ g.ravel()).reshape(g.shape))
-
-
-def stress_deformation(link: Link, frames: Sequence[Frame], seen: Sequence[Nodal]) -> Nodal:
-    """The g from which stresses come: that of a single frame, or of a beam one with the strains that its points see."""
-    points = [frame.point for frame in frames if frame.point]
-    if not points:
-        return seen[0]
-    strains = (point.share @ (point.strains @ g.ravel()) for point, g in zip(points, seen, strict=True))
-    return np.asarray(sum(strains)).reshape(link.n, link.d)

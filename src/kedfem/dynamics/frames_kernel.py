@@ -1,4 +1,4 @@
-"""Segments with one frame that follows them, or a nominal one, compiled by numba: as `dynamics.frames` has it."""
+"""Segments with one frame that follows them, compiled by numba: as `dynamics.frames` has it."""
 
 import numpy as np
 
@@ -9,18 +9,19 @@ TURNS = 50
 
 
 @compiled
-def held_together(rates, i, kind, follows, shapes, fit, K, R, u, before, now, Q, angle, f, work):  # type: ignore[no-untyped-def]
-    """Internal force of segment i at the displacement u, added to f, world components.
+def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work):  # type: ignore[no-untyped-def]
+    """What segment i sees of the displacement u from its frame, with its rates; out becomes g + β g'.
 
     Parameters
     ----------
     rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
     before, now : g (3, L, N) seen from the frame, and its rates, at the beginning and at the end of the step
     Q, angle : (L, 3, 3) and (L,) of the frame in the nominal one; at the beginning an earlier one
+    work : y (D, n) becomes its shape in the nominal frame
     """
     n0, n1, n2, h1, h0, beta = rates
     X, one = shapes
-    y, turned, strained, A, U, change = work
+    y, _, _, A, U, change = work
     D, n = u.shape[1:]
     d = 2 if kind == PLANE else D
     for b in range(d):
@@ -29,26 +30,31 @@ def held_together(rates, i, kind, follows, shapes, fit, K, R, u, before, now, Q,
             for m in range(d):
                 x += R[i, m, b] * u[i, m, j]
             y[b, j] = x
-    if follows:
-        rotation(i, kind, fit, y, Q, angle, A, U, change)
-    deformation(i, kind, y, X, one, Q[i], angle[i], now[0, i], follows)
+    rotation(i, kind, fit, y, Q, angle, A, U, change)
+    deformation(i, kind, y, X, one, Q[i], angle[i], now[0, i])
     for r in range(D * n):
         x = now[0, i, r]
-        strained[r] = x
+        out[r] = x
         if beta != 0.0:
             x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
             x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
             now[1, i, r], now[2, i, r] = x1, x2
-            strained[r] += beta * x1
-    for b in range(d):
-        for j in range(n):
-            x = 0.0
-            for r in range(D * n):
-                x += K[i, b * n + j, r] * strained[r]
-            turned[b, j] = x
-    if follows and kind == SPACE:
+            out[r] += beta * x1
+
+
+@compiled
+def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
+    """Add to f (L, D, n), world components, the force of segment i that K makes of its strain, balanced.
+
+    Parameters
+    ----------
+    work : y (D, n) the shape in the nominal frame; turned (D, n) K of what is strained
+    """
+    y, turned, _, _, U, change = work
+    d, n = (2 if kind == PLANE else len(turned)), turned.shape[1]
+    if kind == SPACE:
         balanced_space(fit[i], y, Q[i], now[0, i], turned, U, change)
-    elif follows:
+    else:
         balanced_plane(fit[i], y, Q[i], now[0, i], turned)
     for b in range(d):  # R Q: from the frame to the world
         for m in range(d):
@@ -57,51 +63,6 @@ def held_together(rates, i, kind, follows, shapes, fit, K, R, u, before, now, Q,
                 x += R[i, b, k] * entry(kind, Q[i], k, m)
             for j in range(n):
                 f[i, b, j] += x * turned[m, j]
-
-
-@compiled
-def elastic_energy(i, K, g):  # type: ignore[no-untyped-def]
-    """½ gᵀ K g of segment i."""
-    total = 0.0
-    for r in range(g.shape[2]):
-        x = 0.0
-        for m in range(g.shape[2]):
-            x += K[i, r, m] * g[0, i, m]
-        total += x * g[0, i, r]
-    return 0.5 * total
-
-
-@compiled
-def mean_rotation(which, fit, X, R, u, Q):  # type: ignore[no-untyped-def]
-    """Q of some planar beams in the nominal frame: that of Σ y_a ⊗ fit_a; its angle is not needed."""
-    for i in range(len(which)):
-        if which[i]:
-            c, s = 0.0, 0.0
-            for j in range(u.shape[2]):
-                x = X[i, 0, j] + R[i, 0, 0] * u[i, 0, j] + R[i, 1, 0] * u[i, 1, j]
-                y = X[i, 1, j] + R[i, 0, 1] * u[i, 0, j] + R[i, 1, 1] * u[i, 1, j]
-                c += x * fit[i, 0, j] + y * fit[i, 1, j]
-                s += y * fit[i, 0, j] - x * fit[i, 1, j]
-            size = np.sqrt(c * c + s * s)
-            c, s = c / size, s / size
-            Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
-
-
-@compiled
-def oriented(kinds, R, Q, out):  # type: ignore[no-untyped-def]
-    """R Q of each segment's frame: link to world."""
-    L, D = R.shape[:2]
-    for i in range(L):
-        if kinds[i] != SPACE:
-            for b in range(2):
-                for m in range(2):
-                    out[i, b, m] = R[i, b, 0] * Q[i, 0, m] + R[i, b, 1] * Q[i, 1, m]
-            if D == 3:
-                out[i, 2, 2] = R[i, 2, 2]
-        else:
-            for b in range(3):
-                for m in range(3):
-                    out[i, b, m] = R[i, b, 0] * Q[i, 0, m] + R[i, b, 1] * Q[i, 1, m] + R[i, b, 2] * Q[i, 2, m]
 
 
 @compiled
@@ -184,14 +145,9 @@ def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def deformation(i, kind, y, X, one, Q, angle, g, follows):  # type: ignore[no-untyped-def]
-    """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle. In the nominal frame y − X."""
-    D, n = y.shape
-    if not follows:
-        for b in range(D):
-            for j in range(n):
-                g[b * n + j] = y[b, j] - X[i, b, j]
-        return
+def deformation(i, kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def]
+    """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle."""
+    n = y.shape[1]
     k = 3 if kind == SPACE else 2
     for b in range(k):
         mean, total = 0.0, 0.0

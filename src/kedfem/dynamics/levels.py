@@ -122,7 +122,7 @@ def leveled(
     SolveError
         As `transient`, by the first level that fails; what all of them have is handed on before.
     """
-    marks = fine if isinstance(fine, Marks) else Marks.of(len(solvers), storable=False)
+    marks = fine if isinstance(fine, Marks) else Marks.of(len(solvers), kept=False)
     for each, mark in zip(solvers, marks.levels, strict=True):
         if isinstance(each, CorotationalSteps):
             each.eased = mark.eased

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from kedfem.dynamics.system.arrays import State
-from kedfem.errors import SolveError
 
 
 @dataclass
@@ -52,25 +51,9 @@ class Marks:
     done: int = 0
     levels: list[Mark] = field(default_factory=list)
     corrections: list[dict[str, np.ndarray]] = field(default_factory=list)
-    storable: bool = True
     REMEMBERED: ClassVar = ("done", "levels", "corrections")
 
     @classmethod
-    def of(cls, solvers: int, storable: bool = True) -> "Marks":
+    def of(cls, solvers: int, kept: bool = True) -> "Marks":
         """Before the first time point, of so many levels whose states are kept."""
-        return cls(levels=[Mark(kept=storable) for _ in range(solvers)], storable=storable)
-
-
-def refuse_unstorable(marks: Marks) -> None:
-    """Only loops whose whole state is known can be gone on with.
-
-    Raises
-    ------
-    SolveError
-        This one's is not.
-    """
-    if not marks.storable:
-        raise SolveError(
-            "--resume: must be of a run whose states can be stored, got co-rotational frames with segments or loads that "
-            "only the loop with memory of its own takes; run without --resume"
-        )
+        return cls(levels=[Mark(kept=kept) for _ in range(solvers)])

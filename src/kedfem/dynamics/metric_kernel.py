@@ -17,8 +17,8 @@ def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, 
 
     Parameters
     ----------
-    X, fit, before, now, Q : as in `frames_kernel.held_together`; g is a displacement that has the strains
-    work : of `held_together`
+    X, fit, before, now, Q : as in `frames_kernel.strained`; g is a displacement that has the strains
+    work : of `frames_kernel.strained`
     """
     n0, n1, n2, h1, h0, beta = rates
     y, forces, strained, A, U, change = work

@@ -16,7 +16,7 @@ RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 @compiled
 def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
-    """Anderson's mixing, see `dynamics.following.Mixing`: the change asked for becomes the step to take."""
+    """Anderson's mixing, see `dynamics.mixing.Mixing`: the change asked for becomes the step to take."""
     pairs, products, last, room = memory
     depth, N = pairs.shape[1:]
     known, slot = int(counts[2]), int(counts[3])

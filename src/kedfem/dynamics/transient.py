@@ -7,15 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.acted import Forces, loaded, still_forces
-from kedfem.dynamics.acting import first_forces
-from kedfem.dynamics.actions import actions, followers
-from kedfem.dynamics.bridging import HALVINGS, Bridge, Stuck
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.first_rows import FIRST, INSTANTS, FirstRows, first_rows
-from kedfem.dynamics.following import FollowingSteps
-from kedfem.dynamics.following_start import excess, far_deflected
 from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
 from kedfem.dynamics.interface import static_tie
 from kedfem.dynamics.joint_rows import joint_rows
@@ -23,35 +17,29 @@ from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.marks import Mark
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_start import rigid_start
-from kedfem.dynamics.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.segment import CONVERGED, EASIER, FREE, first_history
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.segment import CONVERGED, FREE
 from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
-from kedfem.dynamics.state import LinkState, Nodal
+from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
-from kedfem.dynamics.system.march import ConvergenceError
+from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.errors import MeshError, SceneError, SolveError
+from kedfem.errors import SolveError
 from kedfem.links.record import Link
-from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
-from kedfem.scene.capabilities import LARGE_SEGMENTS
 
 POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
-LARGE = (
-    1500  # unknowns of a segment whose dense matrices, 18 MB each, joints by constraint equations can do with
-)
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
-ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps | FollowingSteps
+ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps
 Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
 UNSETTLED = (
@@ -67,10 +55,12 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     ------
     SolveError
         If an effective matrix is not positive definite.
+    MeshError
+        If a force element finds no seat on its link that tells how it turns.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if following(scene):
-        return _follower(scene, model, scheme)
+        return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
     literal = scene.analysis.solver == "literal"
     stresses = stiffening(model) if scene.analysis.stiffening else None
     # dampers of bushings only the system's starts know; stiff hubs of beams in space cost their rates too many digits
@@ -83,44 +73,6 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if literal:
         solver = LiteralSteps
     return solver(model.links, model.joints, scheme, model.damping, stresses)
-
-
-def _follower(scene: Scene, model: Model, scheme: Scheme) -> Steps:
-    """The solver of links with co-rotational frames.
-
-    Raises
-    ------
-    MeshError, SceneError
-        If joints by constraint equations stand beside what the system does not know yet.
-    """
-    tolerance = FREE if scene.driven is None else CONVERGED
-    large = [link for link in model.links if link.unknowns > SMALL]
-    if model.rows:
-        _refuse_beside_rows(model)
-        return CorotationalSteps(scene, model, scheme, tolerance)
-    if not large:
-        try:
-            return CorotationalSteps(scene, model, scheme, tolerance)
-        except (
-            MeshError
-        ):  # a seat that does not tell how it turns as a whole: actions know one direction of it
-            pass
-    every = (*actions(scene, model), *followers(scene, model))
-    return FollowingSteps(model.links, model.joints, scheme, model.damping, every, tolerance)
-
-
-def _refuse_beside_rows(model: Model) -> None:
-    """What co-rotational frames with joints by constraint equations do not know yet: large segments."""
-    names = ", ".join(x.name if x.name.startswith("gears.") else f"joints.{x.name}" for x in model.rows)
-    for link in model.links:
-        if link.unknowns > LARGE:
-            words = {
-                "where": f"links.{link.name}",
-                "most": str(LARGE),
-                "names": names,
-                "count": str(link.unknowns),
-            }
-            raise SceneError(LARGE_SEGMENTS.said(words))
 
 
 def _is_small(link: Link) -> bool:
@@ -157,26 +109,17 @@ def transient(
         yield Block(0, drawn, _first(model, solver, states, drawn))
         state = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
-    bridge = bridged(scene, linkage, along, model)
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
                 continue
             mark.set(first + k, state, solver)
             part = motion.part(k, k + length)
-            if isinstance(solver, FollowingSteps):
-                try:
-                    links, state = bridge.block(solver, state, part)
-                except Stuck as stuck:
-                    if stuck.taken:
-                        yield Block(first + k, part.part(0, stuck.taken), stuck.histories)
-                    raise SolveError(_stuck(model, first + k + stuck.taken, part, stuck)) from None
+            forcing = forcings(model, part)
+            if isinstance(solver, SystemSteps):
+                links, state = solver.advance(state, forcing, part)
             else:
-                forcing = forcings(model, part)
-                if isinstance(solver, SystemSteps):
-                    links, state = solver.advance(state, forcing, part)
-                else:
-                    links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
+                links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
             yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
 
 
@@ -207,21 +150,13 @@ def _corotational(
                 if failed.taken:
                     links, exerted = solver.handed_on(failed.history, forcing, part)
                     yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
-                stuck = Stuck(failed.taken, [], failed.moves)
-                raise SolveError(_stuck(model, first + k + failed.taken, part, stuck)) from None
+                raise SolveError(_stuck(model, first + k + failed.taken, part, failed)) from None
             yield from _finite(Block(first + k, part, links, exerted=exerted), "")
-
-
-def storable(solvers: Sequence[Steps]) -> bool:
-    """Whether what these solvers remember is all in their states; some have memories of their own."""
-    return not any(isinstance(each, FollowingSteps) for each in solvers)
 
 
 def stresses_of(solver: Steps) -> Stiffening | None:
     """Geometric stiffening that a solver knows, if any."""
-    if isinstance(solver, FollowingSteps | CorotationalSteps):
-        return None
-    return solver.stiffening
+    return None if isinstance(solver, CorotationalSteps) else solver.stiffening
 
 
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
@@ -245,7 +180,7 @@ def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByL
     """A solver's state at the first time point."""
     if isinstance(states, State) or isinstance(solver, SystemSteps):
         return states
-    if not model.rows or isinstance(solver, FollowingSteps):
+    if not model.rows:
         return solver.begin(states)
     rows = rows_at_start(scene, linkage, along, model)
     return solver.begin(states, None if rows is None else rows.state(model.joints, states))
@@ -268,27 +203,15 @@ def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> l
         return solver.first(states, forcings(model, drawn), drawn)
     if isinstance(states, State):
         raise ValueError("the start of links must be their states, got a system's")
-    if not isinstance(solver, FollowingSteps):
-        return [history([state]) for state in states]
-    every = zip(model.links, model.joints, states, strict=True)
-    return [first_history(link, joint, model.damping, state) for link, joint, state in every]
+    return [history([state]) for state in states]
 
 
-def bridged(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Bridge:
-    """Smaller steps for where those of the analysis do not settle."""
-    return Bridge(
-        time_grid(scene).step, scene.analysis.rho_inf,
-        lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)),
-        lambda solver, state, motion: solver.advance(state, forcings(model, motion), motion),
-    )  # fmt: skip
-
-
-def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
+def _stuck(model: Model, step: int, part: RigidMotion, failed: ConvergenceError) -> str:
     """What to do about a step that does not settle."""
-    k, beams = stuck.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
-    moves = f"link '{stuck.link}'" if stuck.link else "a joint or force element"
+    k, beams = failed.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
+    moves = f"link '{failed.moves}'" if failed.moves else "a joint or force element"
     needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)" * (
-        stuck.link in beams
+        failed.moves in beams
     )
     return (
         f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
@@ -302,11 +225,11 @@ def _stuck(model: Model, step: int, part: RigidMotion, stuck: Stuck) -> str:
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     """A warning where iterations of steps were taken as converged at an eased tolerance."""
-    eased = sum(each.eased for each in solvers if isinstance(each, FollowingSteps | CorotationalSteps))
+    eased = sum(each.eased for each in solvers if isinstance(each, CorotationalSteps))
     if not eased:
         return ()
     return (
-        f"the iterations of {eased} steps with frames that follow converged to {EASIER:g} times the tolerance only "
+        f"the iterations of {eased} steps with frames that follow converged to a hundred times the tolerance only "
         "(stiff springs or hubs): take a smaller step to see whether results change",
     )
 
@@ -366,44 +289,18 @@ def first_states(
     scene: Scene, linkage: Linkage, along: Path, model: Model,
     stresses: Stiffening | None = None,
 ) -> list[LinkState]:  # fmt: skip
-    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants.
-
-    Motors and springs are those of links with frames that follow: others begin by the system.
-    """
+    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants."""
     at_rest = scene.analysis.initial == "rest"
     grid = time_grid(scene)
     h = min(grid.step, grid.end / (INSTANTS - 1))
     t = h * np.arange(1 if at_rest else INSTANTS)
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     moments = instants(model, motion, stresses)
-    every = actions(scene, model)
     if at_rest:
         start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        forces = first_forces(
-            (*every, *followers(scene, model)), model.links, motion, [(x.u, x.v) for x in start]
-        )
         rows = rows_at_start(scene, linkage, along, model)
-        states = initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
-        # a motor's torque would at first accelerate the hub alone, so that it has no part in δ'': no step resolves that
-        states = [replace(state, F=state.F + f) for state, f in zip(states, forces, strict=True)]
-        if not any(link.rigid and link.fit is not None for link in model.links):
-            return states
-        turning = motion.omega[0] + initial_twists(scene, linkage)[1]
-        spin = cross_matrix(turning) @ cross_matrix(turning) - cross_matrix(motion.omega[0]) @ cross_matrix(
-            motion.omega[0]
-        )
-        each = [spin[body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)]
-        return rigid_start(model.links, model.joints, states, each)
-    every = (*every, *followers(scene, model))
-    if every:
-        more = still_forces(
-            Forces(every, model.links, h), motion,
-            lambda k, x: quasi_static(model.links, model.joints, _acted(moments[k : k + 1], [x]))[0],
-        )  # fmt: skip
-        moments = _acted(moments, more)
+        return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
     u = quasi_static(model.links, model.joints, moments)
-    if following(scene):
-        u = far_deflected(model.links, model.joints, moments, u)
     g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
     rates = ([np.tensordot(FIRST, each, 1) / h for each in zip(*x, strict=True)] for x in (u, g))
     start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
@@ -411,18 +308,8 @@ def first_states(
         start = [
             replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
         ]
-    if following(scene):
-        start = [
-            replace(x, stressed=excess(link, model.damping, x.u, x.g_rate, now.R))
-            for x, link, now in zip(start, model.links, moments[0].at, strict=True)
-        ]
     rows = rows_at_start(scene, linkage, along, model)
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
-
-
-def _acted(moments: Sequence[Instant], rows: Sequence[Sequence[Nodal]]) -> list[Instant]:
-    """Instants with more forces on the links."""
-    return [replace(now, at=loaded(now.at, more)) for now, more in zip(moments, rows, strict=True)]
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:

@@ -61,17 +61,11 @@ class Refusal:
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("following",)}, "{where}.kind",
     'be another than slot with frames = "following"', "the pin of a slot slides as the nominal motion tells",
     "a slot", 'take frames = "nominal", or a slide with a hinge')  # fmt: skip
-LARGE_SEGMENTS = Refusal("model", {"enforced": (CONSTRAINED,), "frames": ("following",),
-    "unknowns": ("too many for dense matrices",)},
-    "{where}", "have at most {most} unknowns in each segment beside {names} with frames that follow",
-    "which are held by constraint equations", "{count}",
-    "give it more segments or larger elements, or reduced = true")  # fmt: skip
 SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
     "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",
     "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
 REFUSALS = (
     SLOTS,
-    LARGE_SEGMENTS,
     SLIDERS,
     Refusal("joints", {"enforced": (CONSTRAINED,), "stiffening": ("on",)}, "{where}.{key}",
         "stand without analysis.stiffening", "which knows no constraint equations", "{noun}",

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import coordinates
-from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, mass_body
+from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, mass_body, stepped_body
 from kedfem.dynamics.system.instant import Flat, Instant
 from kedfem.dynamics.system.internal import drawn, own, rows, turned_rate
 from kedfem.dynamics.system.sparse import SparsePart
@@ -59,22 +59,22 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
 
     Their whole force would at first accelerate next to no mass about their points: no step resolves that, and laws would
     see its rates. What stands against it in that matrix, c_K/c_M K x, is internal force at the start, so that all
-    forces balance there. Large bodies, which are not stepped so, have their mass alone.
+    forces balance there.
     """
     of, K, pushed = now.of, now.always.still.K, now.pushed(u)
     share = of.c.c_K / of.c.c_M
     alone = accelerations(now, r - pushed, u, v, replace(asked, known=0 * asked.known))
     if not (asked.known.any() or pushed.any()):
         return alone
-    small = [not isinstance(part, SparsePart) for part in of.parts]
     held = [
-        held_body(np.eye(K[k].shape[0]) + share * K[k], part.W) if small[k] else mass_body(of, k)
+        stepped_body(part, of.c.c_M) if isinstance(part, SparsePart)
+        else held_body(np.eye(K[k].shape[0]) + share * K[k], part.W)
         for k, part in enumerate(of.parts)
-    ]
+    ]  # fmt: skip
     balance = Balance(of, held, now.R, replace(asked, target=0 * asked.target))
     more = balance.solved(pushed)
     x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
-    f = np.concatenate([balance.turned(k, small[k] * share * (K[k] @ x[k])) for k in range(len(K))])
+    f = np.concatenate([balance.turned(k, share * (K[k] @ x[k])) for k in range(len(K))])
     return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, f)
 
 

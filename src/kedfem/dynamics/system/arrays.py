@@ -72,7 +72,7 @@ class TurningLoads(NamedTuple):
 
 
 class Masses(NamedTuple):
-    """Mass of sparse bodies, whose coordinates are nodal: matrices m of components, row by row, one after the other.
+    """Matrices of sparse bodies, whose coordinates are nodal: of components, row by row, one after the other.
 
     of : (i, 3) number of the matrix of each component; at : where its rows' ends begin in `row`
     """
@@ -97,6 +97,8 @@ class Bodies(NamedTuple):
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
     beams : those that know their strains at points; elements : of beams in space, whose strains need no frame
     turning : loads that turn with bodies
+    stiffness : K0 of sparse co-rotational bodies, row by row, the number of its matrix first in `of`
+    size : √ of the mass that a coordinate of a body counts with where passes are judged: one of dense ones [kg^½]
     """
 
     at: Any
@@ -130,6 +132,8 @@ class Bodies(NamedTuple):
     elements: Elements
     mass: Masses
     turning: TurningLoads
+    stiffness: Masses
+    size: Any
 
 
 class Ends(NamedTuple):

@@ -81,13 +81,17 @@ def held_body(A: Float[np.ndarray, "N N"], W: Float[np.ndarray, "q N"]) -> HeldB
 
 def sparse_body(link: Link, joint: Attachment, of: Substructure) -> HeldBody:
     """A sparse body with the symmetric matrix that was factored."""
-    part = sparse_part(link, joint, of)
+    return stepped_body(sparse_part(link, joint, of), 1.0)
+
+
+def stepped_body(part: SparsePart, share: float) -> HeldBody:
+    """A sparse body with the matrix that it is factored for, divided by a share."""
 
     def applied(r: Flat) -> Flat:
-        return np.asarray(part.held(r.reshape(link.d, -1).T)[0].T).ravel()
+        return share * np.asarray(part.held(r.reshape(part.components, -1).T)[0].T).ravel()
 
-    G = LinearOperator((link.unknowns,) * 2, applied, dtype=float)
-    return HeldBody(G, part.Y, part.Y, part.S, part.W)
+    G = LinearOperator((len(part.Y),) * 2, applied, dtype=float)
+    return HeldBody(G, part.Y, part.Y, part.S / share, part.W)
 
 
 def mass_body(of: Ready, k: int) -> HeldBody:

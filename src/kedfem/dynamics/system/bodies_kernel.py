@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.compiled import inner
 from kedfem.dynamics.beams_kernel import bent
-from kedfem.dynamics.frames_kernel import entry, held_together
+from kedfem.dynamics.frames_kernel import balanced, entry, strained
 from kedfem.dynamics.metric_kernel import metric_force
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.record import COROTATIONAL, NOMINAL, TANGENTIAL
@@ -167,7 +167,6 @@ def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-
     moved, f = trial.u[first:last].reshape(1, d, n), trial.f[first:last].reshape(1, d, n)
     X, one = bodies.X[first:last].reshape(1, d, n), bodies.one[first:last].reshape(1, d, n)
     fit = bodies.fit[first:last].reshape(1, d, n)
-    K = bodies.K[bodies.G_at[i] : bodies.G_at[i + 1]].reshape(1, N, N)
     before = state.seen[3 * first : 3 * last].reshape(3, 1, N)
     now = trial.seen[3 * first : 3 * last].reshape(3, 1, N)
     rooms = (
@@ -177,8 +176,26 @@ def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-
         metric_force(newmark(c), 0, bodies.elements.number[i], bodies.elements, X, fit, R[body : body + 1], moved, before,
                      now, trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms, work.element)  # fmt: skip
         return
-    held_together(newmark(c), 0, bodies.kind[i], True, (X, one), fit, K, R[body : body + 1], moved, before, now,
-                  trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms)  # fmt: skip
+    strained(newmark(c), 0, bodies.kind[i], (X, one), fit, R[body : body + 1], moved, before, now, trial.Q[i : i + 1],
+             trial.angle[i : i + 1], work.strained, rooms)  # fmt: skip
+    stiffness_times(bodies, i, work.strained, work.turned)
+    balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
+
+
+@inner
+def stiffness_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
+    """out becomes K0 x of a co-rotational body."""
+    N = bodies.at[i + 1] - bodies.at[i]
+    if bodies.dense[i]:
+        product(bodies.K, bodies.G_at[i], N, N, x, out)
+        return
+    of = bodies.stiffness
+    row, column, value, at = of.row, of.column, of.value, of.at[of.of[i, 0]]
+    for j in range(N):
+        total = 0.0
+        for m in range(row[at + j], row[at + j + 1]):
+            total += value[m] * x[column[m]]
+        out[j] = total
 
 
 @inner
@@ -186,7 +203,11 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
     """Add to trial.f the rate of α M δ in the nominal frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
-    turned_back(R, d, u[first:last], work.y[:N])
+    if bodies.dense[i]:
+        turned_back(R, d, u[first:last], work.y[:N])
+    else:
+        mass_times(bodies, i, u[first:last], work.turned)
+        turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
         of = 3 * first + x
         y = c.alpha * work.y[x]
@@ -240,10 +261,18 @@ def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no
     n0, n1, n2 = c.acceleration
     u0, v0, a0, F0, f0, f1 = state.u, state.v, state.a, state.F, state.f, trial.f
     c_m, c_f, alpha_m, alpha_f = 1 - c.alpha_m, 1 - c.alpha_f, c.alpha_m, c.alpha_f
-    for x in range(first, last):
-        a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
-        r = c_f * (F[x] - f1[x]) - c_m * a
-        room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
+    if bodies.dense[i]:
+        for x in range(first, last):
+            a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
+            r = c_f * (F[x] - f1[x]) - c_m * a
+            room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
+    else:
+        N, momentum = last - first, state.momentum[3 * first : 3 * last]
+        mass_times(bodies, i, u[first:last], out[first:last])
+        for x in range(N):
+            later = n0 * (out[first + x] - momentum[x]) - n1 * momentum[x + N] - n2 * momentum[x + 2 * N]
+            r = c_f * (F[first + x] - f1[first + x]) - c_m * later
+            room[x] = r + alpha_f * (F0[first + x] - f0[first + x]) - alpha_m * momentum[x + 2 * N]
     turned_back(R, d, room[: last - first], out[first:last])
 
 
@@ -253,6 +282,9 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     first, last = bodies.at[i], bodies.at[i + 1]
     N = last - first
     moved_to(c, first, last, u[first:last], F, state, history, t)
+    if not bodies.dense[i]:
+        mass_times(bodies, i, u[first:last], work.y)
+        carried_on(c, work.y, state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
     if c.alpha != 0.0:
         copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])
@@ -261,7 +293,7 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
         copied(trial.seen[3 * first : 3 * last], state.seen[3 * first : 3 * last])
         copied(g, history.g[t, first:last])
         energy = 0.0
-        product(bodies.K, bodies.G_at[i], N, N, g, work.y)
+        stiffness_times(bodies, i, g, work.y)
         for x in range(N):
             energy += 0.5 * g[x] * work.y[x]
         history.energy[t, i] = energy

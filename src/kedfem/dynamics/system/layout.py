@@ -37,7 +37,14 @@ from kedfem.dynamics.system.record import (
     Spring,
     Stop,
 )
-from kedfem.dynamics.system.sparse import Part, SparsePart, mass_tables, sparse_part
+from kedfem.dynamics.system.sparse import (
+    Part,
+    SparsePart,
+    mass_of,
+    mass_tables,
+    sparse_part,
+    stiffness_tables,
+)
 from kedfem.dynamics.system.turning_loads import Loads, turning_loads
 from kedfem.links.record import BeamPoint, Link
 
@@ -119,7 +126,7 @@ def body_arrays(
     fits = [_fitted(link, part) for link, part in zip(links, parts, strict=True)]
     dense = np.array([not isinstance(part, SparsePart) for part in parts], bool)
     stiff = [
-        component_first(part.T, link.K0) if frame == COROTATIONAL else np.zeros(part.G.shape)
+        component_first(part.T, link.K0) if frame == COROTATIONAL and part.G.size else np.zeros(part.G.shape)
         for link, part, frame in zip(links, parts, frames, strict=True)
     ]
     return Bodies(
@@ -141,6 +148,8 @@ def body_arrays(
         ),
         elements=element_tables(links, parts), mass=mass_tables(links, parts),
         turning=turning_loads(links, parts, loads),
+        stiffness=stiffness_tables(links, parts, [frame == COROTATIONAL for frame in frames]),
+        size=np.array([1.0 if whole else mass_of(link) for link, whole in zip(links, dense, strict=True)]),
     )  # fmt: skip
 
 
@@ -257,8 +266,8 @@ def factored(
 
 
 def is_large(link: Link) -> bool:
-    """Whether a body has a sparse factor; those with frames of their own have none yet."""
-    return link.unknowns > SMALL and link.fit is None
+    """Whether a body has a sparse factor: elements of beams with frames of their own never do."""
+    return link.unknowns > SMALL and (frame_of(link) != TANGENTIAL and link.element is None)
 
 
 def groups(system: Any) -> list[Int[np.ndarray, " c"]]:

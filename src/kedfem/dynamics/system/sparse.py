@@ -1,7 +1,7 @@
 """Large bodies of a system: a sparse factor seen from interface points, solved between what is compiled of a step.
 
 Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them is one
-call a step: G r and Yᵀ r of its right-hand side.
+call a step, or a pass of those with frames of their own: G r and Yᵀ r of its right-hand side.
 """
 
 import ctypes
@@ -76,21 +76,39 @@ def sparse_frequency(link: Link, rigid: int) -> float:
                        return_eigenvectors=False, tol=1e-3).max())  # fmt: skip
 
 
+def mass_of(link: Link) -> float:
+    """√ of the mass of a link for each of its functions [kg^½]."""
+    return float(np.sqrt(link.one @ link.m1[:, 0] / link.n))
+
+
 def mass_tables(links: Sequence[Link], parts: Sequence[Part]) -> Masses:
-    """Matrices m of all components of sparse bodies, each once, row by row."""
+    """Matrices m of all components of sparse bodies, each once."""
     of, every = np.full((len(links), 3), -1), dict[int, tuple[int, Any]]()
     for row, link, part in zip(of, links, parts, strict=True):
         for c, m in enumerate(link.mass if isinstance(part, SparsePart) else ()):
             row[c] = every.setdefault(id(m), (len(every), m.tocsr()))[0]
-    rows = [m for _, m in every.values()]
-    ends = np.cumsum([0, *(m.nnz for m in rows)])
+    return _row_by_row(of, [m for _, m in every.values()])
+
+
+def stiffness_tables(links: Sequence[Link], parts: Sequence[Part], which: Sequence[bool]) -> Masses:
+    """K0 of some of the sparse bodies, in the order of their coordinates."""
+    of, every = np.full((len(links), 3), -1), list[sp.csr_array]()
+    for row, link, part, wanted in zip(of, links, parts, which, strict=True):
+        if wanted and isinstance(part, SparsePart):
+            row[0], order = len(every), component_order(link)
+            every.append(sp.csr_array(sp.csr_array(link.K0)[order][:, order]))
+    return _row_by_row(of, every)
+
+
+def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
+    ends = np.cumsum([0, *(m.nnz for m in every)])
     none = np.zeros(1, int)
     return Masses(
         of,
-        np.cumsum([0, *(m.shape[0] + 1 for m in rows)]),
-        np.concatenate([none, *(m.indptr + end for m, end in zip(rows, ends, strict=False))])[1:],
-        np.concatenate([none, *(m.indices for m in rows)])[1:],
-        np.concatenate([np.zeros(1), *(m.data for m in rows)])[1:],
+        np.cumsum([0, *(m.shape[0] + 1 for m in every)]),
+        np.concatenate([none, *(m.indptr + end for m, end in zip(every, ends, strict=False))])[1:],
+        np.concatenate([none, *(m.indices for m in every)])[1:],
+        np.concatenate([np.zeros(1), *(m.data for m in every)])[1:],
     )
 
 

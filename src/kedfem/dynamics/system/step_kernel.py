@@ -64,7 +64,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
     state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
     for t in range(len(driving.t)):
         begin(c, bodies, ends, of, driving, t, state, trial, work, solved)
-        converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work)
+        converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work, solved)
         if not converged:
             return t, worst
         finish(c, bodies, ends, of, driving, t, state, trial, work, history)
@@ -109,13 +109,13 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
 
 
 @inner
-def passes(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
+def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
     memory = (state.pairs, state.products, state.last, trial.mixing)
     R, worst, count = driving.R[t], -1, 0
     for sweep in range(PASSES):
         count = sweep + 1
-        asked(c, bodies, ends, of, driving, t, sweep, state, trial, work)
+        asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved)
         size, reached, worst = sizes(c, bodies, state, trial)
         allowed = c.tolerance if sweep < PATIENCE else EASIER * c.tolerance
         settled = c.single or size <= allowed * allowed * reached + c.floor * c.floor
@@ -137,7 +137,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore
 
 
 @inner
-def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work):  # type: ignore[no-untyped-def]
+def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The change of bodies with frames of their own, and of z, that a pass asks for."""
     trial.right[:] = 0.0
     for m in range(len(trial.z)):
@@ -147,8 +147,11 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work):  # type: 
         q, N, own = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.frame[i] != NOMINAL
         if own:
             residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work.room)
-            reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
-            product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
+            if bodies.dense[i]:
+                reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
+                product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
+            else:
+                solved(i)
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
@@ -159,11 +162,16 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work):  # type: 
         if bodies.frame[i] != NOMINAL:
             first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
             q, N, to = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.passed[i]
-            product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
+            if bodies.dense[i]:
+                product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
+            else:
+                copied(trial.held[first:last], work.y[:N])
             add_transposed(
                 bodies.Y, bodies.Y_at[i], q, N, trial.w[bodies.port_at[i] : bodies.port_at[i + 1]], work.y
             )
             turned(trial.Rp[i], d, work.y[:N], trial.change[to : to + N])
+            for x in range(to, to + N):
+                trial.change[x] *= bodies.size[i]
     k = len(trial.z)
     for m in range(k):
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]
@@ -199,7 +207,7 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
         own, to = 0.0, bodies.passed[i]
         for x in range(bodies.at[i], bodies.at[i + 1]):
             own += change[to + x - bodies.at[i]] ** 2
-            reached += (u[x] - u0[x]) ** 2
+            reached += (bodies.size[i] * (u[x] - u0[x])) ** 2
         size += own
         if own > most:
             most, worst = own, i
@@ -217,7 +225,7 @@ def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
     for i in range(len(bodies.motion)):
         if bodies.frame[i] != NOMINAL:
             for x in range(bodies.at[i + 1] - bodies.at[i]):
-                u[bodies.at[i] + x] += change[bodies.passed[i] + x]
+                u[bodies.at[i] + x] += change[bodies.passed[i] + x] / bodies.size[i]
     k = len(trial.z)
     for m in range(k):
         trial.z[m] += trial.change[len(trial.change) - k + m] / c.weight
