@@ -28,6 +28,7 @@ MODULES = (
     "nominal_frames",
     "following",
     "cad",
+    "concentrations",
 )
 
 

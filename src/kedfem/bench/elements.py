@@ -1,6 +1,6 @@
 """Hexahedra of 27, 20 and 8 nodes, tetrahedra of 10: error against work, on parts that bend and on bad meshes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from kedfem.bench.parts import FORMS, PARTS, Answer, BenchPart, Size, answer
 TARGETS = {"1 %": 1e-2, "0.1 %": 1e-3}
 QUANTITIES = ("deflection", "frequencies", "stress")
 REPEATS = 3
+MARKS = dict(zip(FORMS, "osd^", strict=True))
 
 Found = dict[str, list[tuple[Size, Answer, dict[str, float]]]]
 
@@ -87,14 +88,23 @@ def cost(work: Sequence[float], errors: Sequence[float], target: float) -> float
     )
 
 
-def _costs(found: dict[str, Found]) -> dict[tuple[str, str, str], dict[str, float]]:
-    """Milliseconds of a solve that each error target costs: by part, target, quantity; by element."""
+WORKS: dict[str, Callable[[Answer], float]] = {
+    "unknowns": lambda a: a.unknowns,
+    "factor [ms]": lambda a: 1e3 * a.factor,
+    "solve [ms]": lambda a: 1e3 * a.solve,
+}
+
+
+def _costs(
+    found: dict[str, Found], of: Callable[[Answer], float] = WORKS["solve [ms]"]
+) -> dict[tuple[str, str, str], dict[str, float]]:
+    """The work that each error target costs, milliseconds of a solve: by part, target, quantity; by element."""
     out = {}
     for part, elements in found.items():
         for name, target in TARGETS.items():
             for q in QUANTITIES:
                 ms = {
-                    e: cost([1e3 * a.solve for _, a, _ in m], [x[q] for *_, x in m], target)
+                    e: cost([of(a) for _, a, _ in m], [x[q] for *_, x in m], target)
                     for e, m in elements.items()
                 }
                 out[part, name, q] = {e: c for e, c in ms.items() if c is not None}
@@ -104,23 +114,33 @@ def _costs(found: dict[str, Found]) -> dict[tuple[str, str, str], dict[str, floa
 def _after(found: dict[str, Found]) -> str:
     """The second table and the words that follow from it."""
     costs = _costs(found)
+    works = {name: _costs(found, of) for name, of in WORKS.items()}
     lines = [
         "A mesh is named by its elements along, across and through a bar, or across and through a plate. The load",
         "is a force spread over one end or bore, balanced by the other's mean reactions; the frequencies are the",
-        "first three of the free part, the stress is the equivalent one at mid-span or behind the bore. Errors are",
-        "relative to a finer mesh of hex27. Factor and solve are those of a step's constant matrix. In the distorted",
-        "mesh corners lie up to a quarter of an element's side away from their place: in such elements hex20 holds",
-        "linear fields only, hex27 quadratic ones too. Tetrahedra are six in each hexahedron, on the nodes of hex27.",
+        "first three of the free part, the stress is the equivalent one at mid-span, behind the bore or in the fillet.",
+        "Errors are relative to a finer mesh of hex27. Factor and solve are those of a step's constant matrix. In the",
+        "distorted mesh corners lie up to a quarter of an element's side away from their place: in such elements",
+        "hex20 holds linear fields only, hex27 quadratic ones too. Tetrahedra are six in each hexahedron, on the nodes",
+        "of hex27.",
         "", "![elements](elements.png)", "",
         "## What an error costs", "",
-        "Milliseconds of a solve from which the error stays below the target, between meshes interpolated; — where",
-        "no mesh here reaches it.", "",
+        "Unknowns / milliseconds to factor / milliseconds of a solve from which the error stays below the target,",
+        "between meshes interpolated; — where no mesh here reaches it. The cheapest is that of a solve.", "",
         f"| part | error | of | {' | '.join(FORMS)} | cheapest |", "|---|---|---|" + "---:|" * len(FORMS) + "---|",
     ]  # fmt: skip
     for (part, target, q), ms in costs.items():
-        shown = [f"{ms[e]:.2g}" if e in ms else "—" for e in FORMS]
+        shown = [
+            " / ".join(_short(w[part, target, q][e]) for w in works.values()) if e in ms else "—"
+            for e in FORMS
+        ]
         lines.append(f"| {part} | {target} | {q} | {' | '.join(shown)} | {_cheapest(ms)} |")
     return "\n".join([*lines, "", "## Which element", "", *_words(costs)])
+
+
+def _short(number: float) -> str:
+    """Two digits, or a whole number."""
+    return f"{number:.2g}" if number < 100 else f"{number:,.0f}"
 
 
 def _cheapest(ms: dict[str, float]) -> str:
@@ -170,11 +190,12 @@ def _write_plot(folder: Path, found: dict[str, Found]) -> None:
     for column, (part, elements) in zip(grid.T, found.items(), strict=True):
         column[0].set_title(part, fontsize=10)
         for axes, q in zip(column, QUANTITIES, strict=True):
-            for (element, meshes), marker in zip(elements.items(), "osd^", strict=False):
+            for element, meshes in elements.items():
                 axes.loglog(
                     [1e3 * a.solve for _, a, _ in meshes],
                     [x[q] for *_, x in meshes],
-                    f"{marker}-",
+                    f"{MARKS[element]}-",
+                    color=f"C{list(MARKS).index(element)}",
                     label=element,
                 )
             axes.grid(visible=True, alpha=0.3)

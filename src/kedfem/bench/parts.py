@@ -24,7 +24,7 @@ from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.tetrahedra import tetrahedral
-from kedfem.scene import Bar, LinkScene, Material, Meshing, PlateLink
+from kedfem.scene import Arc, Bar, Extrusion, LinkScene, Material, Meshing, PlateLink
 
 STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
 FORMS = {"hex27": quadratic, "hex20": serendipity, "tet10": tetrahedral, "hex8": linear}
@@ -41,6 +41,7 @@ class BenchPart:
 
     name : in tables
     shape : from one seat, that reacts, to the other, that is loaded
+    ends : the seats of an extrusion [m]; of others where the shape says
     force : (3,) its direction
     stressed : (3,) where the stress is read [m]
     near : of the order of the first free frequency [Hz]
@@ -50,13 +51,14 @@ class BenchPart:
     """
 
     name: str
-    shape: Bar | PlateLink
+    shape: Bar | PlateLink | Extrusion
     force: tuple[float, float, float]
     stressed: tuple[float, float, float]
     near: float
     sizes: dict[str, tuple[Size, ...]]
     reference: Size
     moved: float = 0.0
+    ends: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +116,17 @@ def _moved(mesh: SolidMesh, part: float, counts: Size) -> SolidMesh:
 
 def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]]:
     """Mean deflection of the loaded seat under a unit force, along it, as seen from the other; and the link's state."""
-    fixed, moved = (joint_seat(link, "seat", np.asarray(end), None) for end in part.shape.between)
+    fixed, moved = (joint_seat(link, "seat", np.asarray(end), None) for end in ends(part))
     force = np.outer(moved.fit[0], np.asarray(part.force) / np.linalg.norm(part.force))
     modes = _rigid_modes(link, fixed.origin)
     u = _free_solution(link, modes, force + _reaction(fixed, modes, force))
     seen = np.linalg.lstsq(_fits(fixed, modes), (fixed.fit @ u).ravel(), rcond=None)[0]
     return float((force * (u - modes @ seen)).sum()), u
+
+
+def ends(part: BenchPart) -> tuple[tuple[float, float, float], ...]:
+    """The seats, the loaded one last."""
+    return part.ends if isinstance(part.shape, Extrusion) else part.shape.between
 
 
 def _rigid_modes(link: Link, origin: Float[np.ndarray, "3"]) -> Float[np.ndarray, "n 3 6"]:
@@ -201,6 +208,20 @@ BAR = BenchPart(
     | {"hex8": ((12, 2, 2), (24, 4, 4), (48, 6, 6), (72, 8, 8))},
     reference=(44, 5, 5),
 )
+#: A bar 40 mm high that steps down to 20 mm with fillets of 6 mm, anticlockwise from below left.
+_MIDDLE = 0.006 * (1 - np.sqrt(0.5))
+_SHOULDER = (
+    (0.0, -0.02, 0.0),
+    (0.06, -0.02, 0.0),
+    (0.06, -0.016, 0.0),
+    Arc(via=(0.06 + _MIDDLE, -0.01 - _MIDDLE, 0.0), to=(0.066, -0.01, 0.0)),
+    (0.14, -0.01, 0.0),
+    (0.14, 0.01, 0.0),
+    (0.066, 0.01, 0.0),
+    Arc(via=(0.06 + _MIDDLE, 0.01 + _MIDDLE, 0.0), to=(0.06, 0.016, 0.0)),
+    (0.06, 0.02, 0.0),
+    (0.0, 0.02, 0.0),
+)
 PARTS = (
     BAR,
     replace(
@@ -222,6 +243,17 @@ PARTS = (
         sizes=dict.fromkeys(("hex27", "hex20", "tet10"), ((2, 1), (4, 1), (6, 2), (9, 2), (12, 3)))
         | {"hex8": ((4, 1), (8, 2), (16, 3), (20, 4))},
         reference=(16, 3),
+    ),
+    BenchPart(
+        "bar with shoulder fillets",
+        Extrusion(outline=_SHOULDER, thickness=0.01),
+        force=(0.0, 1.0, 0.0),
+        stressed=(0.066 - 0.006 * np.sin(np.pi / 8), 0.016 - 0.006 * np.cos(np.pi / 8), 0.0),
+        near=5000.0,
+        sizes=dict.fromkeys(("hex27", "hex20", "tet10"), ((1, 1), (2, 1), (3, 2), (4, 2), (6, 3)))
+        | {"hex8": ((2, 1), (4, 2), (8, 4), (12, 6))},
+        reference=(10, 4),
+        ends=((0.0, 0.0, 0.0), (0.14, 0.0, 0.0)),
     ),
     BenchPart(
         "thin plate",

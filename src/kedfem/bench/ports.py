@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.bench.machine import Watch, markdown, table, write_page
-from kedfem.bench.parts import PARTS, BenchPart, Size, frequencies, loaded, part_link
+from kedfem.bench.parts import PARTS, BenchPart, Size, ends, frequencies, loaded, part_link
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix
@@ -72,7 +72,7 @@ def _stiffened(link: Link, times: float) -> Link:
 
 
 def _bores(link: Link) -> list[Seat]:
-    return [joint_seat(link, "seat", np.asarray(end), None) for end in PLATE.shape.between]
+    return [joint_seat(link, "seat", np.asarray(end), None) for end in ends(PLATE)]
 
 
 def _found(link: Link) -> _Found:
