@@ -85,7 +85,10 @@ def _least(
     x = scipy.linalg.lstsq(A, b, cond=RANK_TOLERANCE)[0]
     Z = scipy.linalg.null_space(A, rcond=RANK_TOLERANCE)
     if Z.shape[1] and len(C):
-        x = x - Z @ scipy.linalg.lstsq(C @ Z, C @ x, cond=RANK_TOLERANCE)[0]
+        # of the size of C: where x leaves C x no way to change, C Z is rounding, and its own size tells nothing
+        U, s, Vt = np.linalg.svd(C @ Z, full_matrices=False)
+        told = s > RANK_TOLERANCE * np.linalg.norm(C, 2)
+        x = x - Z @ (Vt[told].T @ ((U[:, told].T @ (C @ x)) / s[told]))
     return np.asarray(x)
 
 
