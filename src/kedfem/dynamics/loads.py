@@ -3,7 +3,7 @@
 [KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ; couples on the turn of a seat.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
@@ -175,6 +175,31 @@ def _couples(
     except MeshError:
         seat = joint_seat(link, f"{where}.at", at, None)  # a bore or journal across the torque
     return seat_couples(link, seat, where)
+
+
+def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray, "n d"]]:
+    """Nodal forces (n, d) on all links, or on their segments, that are let go at the start, world components [N].
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a point is not on its link, or this is rigid and has no elastic state.
+    """
+    out = [np.zeros((link.n, link.d)) for link in links]
+    parts = {str(k): link for k, link in enumerate(links)}
+    for name, force in scene.analysis.initial_deflection.items():
+        where, at = f"analysis.initial_deflection.{name}", np.asarray(force.at)
+        if all(link.name != force.link or link.rigid for link in links):
+            raise SceneError(
+                f"{where}.link: must name an elastic link, got '{force.link}', which does not deform"
+            )
+        key, weights = on_part(parts, force.link, at, partial(_point_weights_of, where, at))
+        out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
+    return out
+
+
+def _point_weights_of(where: str, at: Vector, link: Link) -> Float[np.ndarray, " n"]:
+    return _point_weights(where, link, at)
 
 
 def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:

@@ -66,7 +66,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     # dampers of bushings only the system's starts know; stiff hubs of beams in space cost their rates too many digits
     hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
     damped = not hubs and any(row.damping.any() for row in model.rows)
-    if (scene.springs or scene.motors or damped) and stresses is None:
+    let_go = scene.analysis.initial_deflection
+    if (scene.springs or scene.motors or damped or let_go) and stresses is None:
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps

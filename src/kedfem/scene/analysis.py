@@ -18,7 +18,7 @@ from pydantic import (
 
 from kedfem.scene.base import Fault, FileName, Name, Record, refuse
 from kedfem.scene.frames import Frames
-from kedfem.scene.initial import InitialMotion, JointSpeed
+from kedfem.scene.initial import InitialForce, InitialMotion, JointSpeed
 from kedfem.scene.links import Count
 from kedfem.scene.points import Point
 from kedfem.scene.units import PositiveTime, Quantity, fault
@@ -63,6 +63,9 @@ class Analysis(Record):
     the ground against the other, about or along its axis; other joints then move as little as they can"""
     initial_motions: dict[str, InitialMotion] = Field(default_factory=dict)
     """velocities of links at the start, by name of the link"""
+    initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
+    """forces that have deflected the mechanism and are let go at the start, by name: without a drive from static balance,
+    with one beside the deflection of `initial = "quasi-static"`"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
     it by short trial runs: frames, elements, mesh sizes, segments, functions, step and levels in time, and fidelities

@@ -148,6 +148,12 @@ def analysis(parts: Parts) -> Iterator[Told]:
         if isinstance(speeds, Mapping) and speeds and parts.links:
             facts = {"start": key, "stiffening": "", "solver": "", "drive": ""}
             yield "analysis", facts, {**words, "given": shown(list(speeds))}
+    forces = entry.raw.get("initial_deflection")
+    if isinstance(forces, Mapping) and forces:
+        speeds = any(entry.raw.get(key) for key in ("initial_speeds", "initial_motions"))
+        for each in (*(["speeds"] if speeds else []), entry.word("initial") or "rest"):
+            facts = {"start": "initial_deflection", "beside": each, "frames": "", "solver": ""}
+            yield "analysis", facts, {**words, "given": shown(list(forces))}
     alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
     if alpha:
         words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}

@@ -81,7 +81,13 @@ def end_links(spring: Entry) -> list[str | None]:
 
 
 def initial_faults(parts: Parts) -> Iterator[str]:
-    """Velocities at the start of what has none of its own."""
+    """Velocities at the start of what has none of its own, and forces on links that are not there."""
+    forces = parts.analysis.raw.get("initial_deflection")
+    for name, force in forces.items() if isinstance(forces, Mapping) and parts.links else ():
+        link = force.get("link") if isinstance(force, Mapping) else None
+        if isinstance(link, str) and link not in parts.links:
+            message = unknown_name("a link", link, parts.links)
+            yield parts.analysis.fault("initial_deflection", message, str(name), "link")
     for key, known, what in (
         ("initial_speeds", parts.joints, "a joint"),
         ("initial_motions", parts.links, "a link"),

@@ -1,4 +1,4 @@
-"""Velocities at the start, of joints and of links."""
+"""The start: velocities of joints and of links, and forces that are let go."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Record, refuse
 from kedfem.scene.drives import EitherSpeed
+from kedfem.scene.loads import ForceVector
 from kedfem.scene.points import Point, as_vector
 from kedfem.scene.units import Quantity, Speed, fault
 
@@ -25,6 +26,17 @@ def joint_speed(value: object) -> float:
         if not isinstance(value, str):
             raise
         raise fault(f"{reason.message()} (of a slider in m/s)") from None
+
+
+class InitialForce(Record):
+    """A force at a point of a link that has deflected the mechanism, and is let go at the start."""
+
+    link: str
+    """the link it acts on, an elastic one"""
+    at: Point
+    """where, in the drawn position"""
+    force: ForceVector
+    """the force, in the world"""
 
 
 JointSpeed = Annotated[float, PlainValidator(joint_speed)]

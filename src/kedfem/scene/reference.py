@@ -118,6 +118,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("[damping]", "", [damping.Damping]),
     ("[analysis]", "", [analysis.Analysis]),
     ("[analysis.initial_motions.NAME]", "", [initial.InitialMotion]),
+    ("[analysis.initial_deflection.NAME]", "", [initial.InitialForce]),
     ("[output]", "", [analysis.Output]),
     ("[output.animation]", "", [analysis.Animation]),
     ("[output.probes.NAME]", "", [analysis.Probe]),

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from kedfem.dynamics.coupling import joined
 from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
+from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.ports import port_columns, turned_ports
 from kedfem.dynamics.row_ports import Ways
@@ -21,7 +22,7 @@ from kedfem.dynamics.system.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.deflected import quasi_static
+from kedfem.dynamics.system.deflected import plucked, quasi_static
 from kedfem.dynamics.system.exerted import exerted, on_links
 from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.internal import own
@@ -87,7 +88,7 @@ class CorotationalSteps:
         ]
 
     def begin(self, motion_at: Motion) -> State:
-        """The state at t = 0 that the scene asks for: at rest, or without vibration.
+        """The state at t = 0 that the scene asks for: at rest, without vibration, or as forces are let go.
 
         Parameters
         ----------
@@ -98,6 +99,8 @@ class CorotationalSteps:
         SolveError
             If no deflection without vibration is found.
         """
+        if self.scene.analysis.initial_deflection:
+            return plucked(self.ready, motion_at, initial_forces(self.scene, self.links))
         rates = initial_rates(self.scene, self.linkage, self.model)
         if self.scene.analysis.initial == "rest":
             return rest(self.ready, motion_at, rates, accelerated=accelerated_in_a_step)

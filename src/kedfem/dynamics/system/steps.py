@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment, joined
 from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import port_columns, turned_ports
 from kedfem.dynamics.row_joints import RowJoint
@@ -18,7 +19,7 @@ from kedfem.dynamics.row_ports import Ways
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.deflected import quasi_static
+from kedfem.dynamics.system.deflected import plucked, quasi_static
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.instant import Motion
 from kedfem.dynamics.system.literal import Now
@@ -128,6 +129,8 @@ class SystemSteps:
         SolveError
             If no quasi-static deflection is found.
         """
+        if self.scene.analysis.initial_deflection:
+            return plucked(self.ready, motion_at, initial_forces(self.scene, self.links))
         return rest(self.ready, motion_at, rates) if at_rest else quasi_static(self.ready, motion_at, rates)
 
     def first(self, state: State, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
