@@ -9,6 +9,7 @@ from tests.rooms.test_acted import four_bar as hinged
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED
 from kedfem.dynamics.substructure import factored
@@ -17,7 +18,7 @@ from kedfem.dynamics.system.march import march, ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.dynamics.transient import forcings, motions, started, steps_of, transient
+from kedfem.dynamics.transient import started, steps_of, transient
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 

@@ -10,8 +10,8 @@ from jaxtyping import Float
 from kedfem.accuracy.prepared import moving
 from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
+from kedfem.dynamics.nominal import motions
 from kedfem.dynamics.places import slider_axis
-from kedfem.dynamics.transient import motions
 from kedfem.errors import MeshError, MotionError
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link

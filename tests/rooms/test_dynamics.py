@@ -16,9 +16,10 @@ from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.ports import port_values, port_vectors
 from kedfem.dynamics.substructure import mass_substructure
-from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
+from kedfem.dynamics.transient import Steps, snapshots, steps_of
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path

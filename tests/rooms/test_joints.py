@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.transient import drive_range, steps_of, transient
+from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.transient import steps_of, transient
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.results.recording import recording, rows
@@ -136,7 +137,7 @@ def test_a_ball_leaves_turning_free_and_holds_the_point() -> None:
 
 
 def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.dynamics.transient.POINTS", 256)
+    monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
     raw = four_bar("beam", steps_per_turn=2000)
     scene = scene_from(raw)
     joined = linkage(scene)

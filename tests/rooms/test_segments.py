@@ -16,8 +16,9 @@ from kedfem.accuracy.reduction import _training, prepared
 from kedfem.analysis import analyse
 from kedfem.dynamics.bases import bases
 from kedfem.dynamics.model import Model, restored_model, segments, stored_model
+from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduction import energy_sorted, excited, port_functions, static_parts
-from kedfem.dynamics.transient import instants, snapshots, steps_of, transient
+from kedfem.dynamics.transient import snapshots, steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery

@@ -14,8 +14,9 @@ from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.nominal import motions
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.transient import Steps, motions, snapshots, steps_of, transient
+from kedfem.dynamics.transient import Steps, snapshots, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel
@@ -125,7 +126,7 @@ class Breaking:
 
 
 def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.dynamics.transient.POINTS", 256)
+    monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
     ready = meshed(scene_from(four_bar("beam", turns=1, steps_per_turn=300)))
     solver: Any = Breaking(steps_of(ready.scene, ready.model), 270)  # in the second block
     seen = []

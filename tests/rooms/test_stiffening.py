@@ -14,10 +14,11 @@ from kedfem.dynamics import stiffened_kernel, stiffening
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.ports import add_port_forces
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import coupled
-from kedfem.dynamics.transient import forcings, steps_of, transient
+from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.recovery import point_rows
 from kedfem.links.reduced import rigid_modes

@@ -14,8 +14,8 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import resolution
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.loads import applied
+from kedfem.dynamics.nominal import drive_range, forcings, motions
 from kedfem.dynamics.start import initial_rates
-from kedfem.dynamics.transient import drive_range, forcings, motions
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting

@@ -5,7 +5,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.transient import drive_range, snapshots, steps_of
+from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.transient import snapshots, steps_of
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.seats import face_seat

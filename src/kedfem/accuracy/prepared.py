@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.transient import drive_range
+from kedfem.dynamics.nominal import drive_range
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path

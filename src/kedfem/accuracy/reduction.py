@@ -23,10 +23,10 @@ from kedfem.dynamics.bases import bases
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
+from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.residual import residual_deflections
 from kedfem.dynamics.substructure import Substructure
-from kedfem.dynamics.transient import instants
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage

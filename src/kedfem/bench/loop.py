@@ -13,8 +13,9 @@ from kedfem.bench.machine import seconds
 from kedfem.bench.scenes import mechanisms
 from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.transient import first_states, forcings, motions, steps_of
+from kedfem.dynamics.transient import first_states, steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 

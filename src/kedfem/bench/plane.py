@@ -10,7 +10,8 @@ import numpy as np
 from kedfem.bench.machine import Watch, markdown, write_page
 from kedfem.bench.scenes import plate_four_bar
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.transient import drive_range, steps_of, transient
+from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.transient import steps_of, transient
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.results.recording import recording

@@ -15,8 +15,9 @@ from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.state import LinkState, Nominal
-from kedfem.dynamics.transient import Steps, drive_range, snapshots, steps_of
+from kedfem.dynamics.transient import Steps, snapshots, steps_of
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 

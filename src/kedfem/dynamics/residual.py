@@ -9,11 +9,11 @@ from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.interface import static_tie
 from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.ports import add_port_forces
 from kedfem.dynamics.start import damping_times
 from kedfem.dynamics.state import NodalOf, Rayleigh
 from kedfem.dynamics.substructure import Substructure, coupled
-from kedfem.dynamics.transient import forcings
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix
 

@@ -9,17 +9,16 @@ from jaxtyping import Float
 
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import SMALL, DenseSteps
-from kedfem.dynamics.first_rows import FIRST, INSTANTS, FirstRows, first_rows
-from kedfem.dynamics.history import Block, Forcing, LinkHistory, Snapshot, history
-from kedfem.dynamics.interface import static_tie
+from kedfem.dynamics.first_rows import FIRST, INSTANTS
+from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
 from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
-from kedfem.dynamics.loads import applied
 from kedfem.dynamics.marks import Mark
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.nominal import POINTS, forcings, instants, motions, rows_at_start
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED, FREE
-from kedfem.dynamics.start import Deflected, Instant, initial_rates, initial_states, quasi_static
+from kedfem.dynamics.start import Deflected, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
@@ -29,15 +28,12 @@ from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, Scene, following, path_parameter, time_grid, turn_steps
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import Scene, following, path_parameter, time_grid
 
-POINTS = 1024  # time points of rigid motion found together
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
-KEPT = 20_000  # time points of a turn whose rigid motion is kept
 
 ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps
 Steps = ByLink | CorotationalSteps
@@ -187,17 +183,6 @@ def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByL
     return solver.begin(states, None if rows is None else rows.state(model.joints, states))
 
 
-def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> FirstRows | None:
-    """Rows of joints at t = 0 with their derivatives in time; None without any."""
-    if not model.rows:
-        return None
-    grid = time_grid(scene)
-    h = min(grid.step, grid.end / (INSTANTS - 1))
-    t = h * np.arange(INSTANTS)
-    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, path_parameter(scene, t)))
-    return None if rows is None else first_rows(rows, h)
-
-
 def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
     """The first time point of all links, as their frames see it."""
     if isinstance(solver, SystemSteps) and isinstance(states, State):
@@ -241,49 +226,9 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         yield from (block.at(k) for k in range(len(block)))
 
 
-def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iterator[tuple[int, RigidMotion]]:
-    """Rigid motion at all time points after the first, block after block with the number of its first point.
-
-    Blocks that end before the time point `since` are left out.
-
-    A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved.
-    """
-    grid, law = time_grid(scene), scene.motion
-    turn = (turn_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
-    returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
-    kept: list[RigidMotion] = []
-    for first in range(1, grid.steps + 1, POINTS):
-        steps = np.arange(first, min(first + POINTS, grid.steps + 1))
-        if steps[-1] < since and not (returns and first <= turn <= KEPT):
-            continue
-        t = grid.step * steps
-        drive = path_parameter(scene, t)
-        if kept and first > round(turn):
-            if len(kept) > 1:
-                kept = [joined(kept)]
-            yield (
-                first,
-                replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0], drives=drive[0][:, None]),
-            )
-            continue
-        motion = rigid_motion(linkage, along, t, drive)
-        if returns and first <= turn <= KEPT and grid.steps > turn:
-            kept.append(motion)
-        if steps[-1] >= since:
-            yield first, motion
-
-
 def block_length(model: Model) -> int:
     """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
     return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
-
-
-def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
-    """Orientation and P − M R0'' of all links over time."""
-    return [
-        Forcing(motion.R[:, body, : link.d, : link.d], applied(link, loads, motion, body))
-        for link, loads, body in zip(model.links, model.loads, model.bodies, strict=True)
-    ]
 
 
 def first_states(
@@ -311,33 +256,6 @@ def first_states(
         ]
     rows = rows_at_start(scene, linkage, along, model)
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
-
-
-def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
-    """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
-    forcing = forcings(model, motion)
-    if stresses is not None:
-        forcing = stresses.stressed(forcing)
-    W = cross_matrix(motion.omega)
-    spin = cross_matrix(motion.alpha) + W @ W
-    rows = joint_rows(model.rows, motion)
-    return [
-        Instant(
-            [each.at(k) for each in forcing],
-            [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
-            None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
-            None if rows is None else static_tie(rows, k),
-        )
-        for k in range(len(motion.t))
-    ]
-
-
-def drive_range(scene: Scene) -> tuple[float, float]:
-    """Least and greatest drive angle of the analysis [rad]."""
-    grid = time_grid(scene)
-    t = grid.step * np.arange(grid.steps + 1)
-    phi = path_parameter(scene, t)[0]
-    return min(float(phi.min()), 0.0), max(float(phi.max()), 0.0)
 
 
 def _finite(block: Block, advice: str) -> Iterator[Block]:
