@@ -7,6 +7,7 @@ beside the package where that cannot be used. Numba takes a while to load: impor
 that it compiles.
 """
 
+import atexit
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from typing import Any
 import numba
 from numba.core import event
 
+from kedfem.digests import drop_changed, note
 from kedfem.folders import KERNELS, compiled_folder
 
 ROOT = Path(__file__).parent
@@ -65,7 +67,10 @@ class _Compiling(event.Listener):
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    vars(numba.config)["CACHE_DIR"] = str(kernel_folder(ROOT))
+    _FOLDER = kernel_folder(ROOT)
+    drop_changed(_FOLDER)
+    atexit.register(note, _FOLDER)
+    vars(numba.config)["CACHE_DIR"] = str(_FOLDER)
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 _FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}

@@ -111,3 +111,39 @@ def test_the_user_is_told_while_it_compiles() -> None:
 def test_after_compiling_beforehand_no_scene_compiles_anything(tmp_path: Path) -> None:
     scenes = [shutil.copytree(ROOT / "examples" / each, tmp_path / each) / "scene.toml" for each in EXAMPLES]
     subprocess.run([sys.executable, "-c", BEFOREHAND, *scenes], check=True, timeout=600)
+
+
+PRODUCT = """
+import numpy as np
+from kedfem.compiled import compiling
+from kedfem.dynamics.kernel import times
+told, out = [], np.zeros(2)
+with compiling(told.append):
+    times(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([1.0, 1.0]), out)
+assert out.tolist() == [3.0, 7.0]
+print("compiled" if told else "read")
+"""
+
+
+@pytest.mark.parametrize("end", ["nbi", "nbc"])
+def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word(
+    end: str, tmp_path: Path
+) -> None:
+    environment = {k: x for k, x in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {
+        "KEDFEM_CACHE": str(tmp_path)
+    }
+
+    def ran() -> str:
+        command = [sys.executable, "-W", "error", "-c", PRODUCT]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert not done.stderr
+        return done.stdout.strip()
+
+    assert (ran(), ran()) == ("compiled", "read")
+    for file in (tmp_path / "kernels").rglob(f"*.{end}"):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+    assert (ran(), ran()) == ("compiled", "read")

@@ -1,0 +1,57 @@
+"""Digests of a folder of files that others write and read, so that changed ones go before they are read.
+
+numba reads what it compiled by unpickling and linking it: a flipped bit there would end in a library's error, or worse.
+"""
+
+import json
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from secrets import token_hex
+
+DIGESTS = "digests.json"
+
+
+def drop_changed(folder: Path) -> None:
+    """Remove the files of a folder's own folders that are not as `note` found them; new ones stay."""
+    known = _known(folder)
+    for file in _files(folder) if known else ():
+        with suppress(OSError):
+            if known.get(_name(file), digest := _digest(file)) != digest:
+                file.unlink()
+
+
+def note(folder: Path) -> None:
+    """Write the digests of all files, where some are newer than these are; nothing where nothing can be written."""
+    with suppress(OSError):
+        known, written = _known(folder), folder / DIGESTS
+        last = written.stat().st_mtime_ns if known else 0
+        new = [file for file in _files(folder) if _name(file) not in known or file.stat().st_mtime_ns > last]
+        if not new:
+            return
+        part = written.with_name(f"{DIGESTS}.{token_hex(4)}.part")
+        try:
+            part.write_text(json.dumps(known | {_name(file): _digest(file) for file in new}))
+            part.replace(written)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def _files(folder: Path) -> list[Path]:
+    return [file for file in folder.glob("*/*.nb[ci]") if file.is_file()]
+
+
+def _name(file: Path) -> str:
+    return f"{file.parent.name}/{file.name}"
+
+
+def _digest(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
+
+
+def _known(folder: Path) -> dict[str, str]:
+    try:
+        known = json.loads((folder / DIGESTS).read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
