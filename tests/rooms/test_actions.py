@@ -21,11 +21,10 @@ from kedfem.dynamics.action import (
     TURN,
     Action,
     End,
-    end_weights,
     kernel_table,
 )
 from kedfem.dynamics.actions import actions, hinges
-from kedfem.dynamics.actions_kernel import borne, evaluate, evaluate_all, seen
+from kedfem.dynamics.actions_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import MeshError, SceneError
@@ -395,30 +394,6 @@ def test_ends_must_be_on_their_links() -> None:
     scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
     with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
         actions(scene, model)
-
-
-@pytest.mark.parametrize("kind", ["beam", "plane", "solid"])
-def test_padded_states_are_seen_and_bear_forces_as_rows_do(kind: str) -> None:
-    """In other coordinates, too: u = T x, component by component; forces there are Tᵀ f."""
-    scene, model = built(
-        arm(kind, springs={"tip": spring("arm", [0.98 if kind != "beam" else 1, 0], [1, 2])})
-    )
-    every, rng = actions(scene, model), np.random.default_rng(0)
-    n, d = max(link.n for link in model.links), max(link.d for link in model.links)
-    T = [[rng.normal(size=(link.n, link.n)) for _ in range(link.d)] for link in model.links]
-    x = [rng.normal(size=(link.d, link.n)) for link in model.links]
-    u = [np.stack([T[k][c] @ x[k][c] for c in range(link.d)], axis=1) for k, link in enumerate(model.links)]
-    padded = np.zeros((len(model.links), d, n))
-    for k, link in enumerate(model.links):
-        padded[k, : link.d, : link.n] = x[k]
-    owners, weights = end_weights(every, (d, n), T)
-    out, drawn_now = np.zeros((len(every), 2, 2, 3)), drawn(every)
-    seen(owners, weights, drawn_now, padded, out)
-    expected = [state_of(action, model, lambda k, X: u[k]) for action in every]
-    np.testing.assert_allclose(out, expected, atol=1e-9)
-    forces, change = rng.normal(size=out.shape), np.zeros_like(padded)
-    borne(owners, weights, forces, change)
-    np.testing.assert_allclose(np.vdot(change, padded), np.vdot(forces, out - drawn_now))  # the same work
 
 
 # -- recorded -----------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kedfem.analysis import Run, analyse
-from kedfem.dynamics import transient
+from kedfem.dynamics import nominal, transient
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import read_results
@@ -56,6 +56,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
 @pytest.fixture(autouse=True)
 def _states_at_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of few steps, and a state after each, however long that takes."""
+    monkeypatch.setattr(nominal, "POINTS", 16)
     monkeypatch.setattr(transient, "POINTS", 16)
     monkeypatch.setattr("kedfem.resume.SHARE", 0.0)
 
@@ -106,7 +107,10 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
 
 
 @pytest.mark.parametrize("at", [pytest.param(0.1, marks=pytest.mark.long), 0.7])
-def test_poses_that_return_are_found_again(tmp_path: Path, at: float) -> None:
+@pytest.mark.parametrize("points", [16, 1024])
+def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: int, monkeypatch: Any) -> None:
+    """Wherever blocks of the nominal motion end: beyond the first turn its poses are those of the first."""
+    monkeypatch.setattr(nominal, "POINTS", points)
     whole = content(analyse(turning(tmp_path / "whole")))
     ended_early(turning(tmp_path / "ended"), at)
     assert_same(whole, content(analyse(turning(tmp_path / "ended"), resumes=True)))

@@ -28,15 +28,21 @@ def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iter
 
     Blocks that end before the time point `since` are left out.
 
-    A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved.
+    A drive at constant speed brings the linkage back after a period, a turn or a few: then only the first is solved, and
+    no block goes on beyond its end.
     """
     grid, law = time_grid(scene), scene.motion
     turn = (turn_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
+    returns = returns and turn <= KEPT
     kept: list[RigidMotion] = []
-    for first in range(1, grid.steps + 1, POINTS):
-        steps = np.arange(first, min(first + POINTS, grid.steps + 1))
-        if steps[-1] < since and not (returns and first <= turn <= KEPT):
+    last = 0
+    while last < grid.steps:
+        first, last = last + 1, min(last + POINTS, grid.steps)
+        if returns and first <= round(turn):
+            last = min(last, round(turn))
+        steps = np.arange(first, last + 1)
+        if last < since and not (returns and first <= turn):
             continue
         t = grid.step * steps
         drive = path_parameter(scene, t)
@@ -49,9 +55,9 @@ def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iter
             )
             continue
         motion = rigid_motion(linkage, along, t, drive)
-        if returns and first <= turn <= KEPT and grid.steps > turn:
+        if returns and first <= turn and grid.steps > turn:
             kept.append(motion)
-        if steps[-1] >= since:
+        if last >= since:
             yield first, motion
 
 

@@ -52,7 +52,7 @@ def stations(
     axis: Float[np.ndarray, "3"],
     way: tuple[float, float],
 ) -> Stations:
-    """Stations for a slider on a line of a link.
+    """Stations for a slider on a line of a link; each of one that bends can move without the others.
 
     Parameters
     ----------
@@ -65,12 +65,21 @@ def stations(
     MeshError
         If the link does not reach along the line as far as the slider goes, or cannot bend there.
     """
-    if link.full is not None and link.Q is not None:
-        full = stations(link.full, where, origin, axis, way)
-        return _apart(link, where, Stations(full.s, full.points, full.weights @ link.Q))
-    if link.meshed:
-        return _apart(link, where, _in_balls(link, where, origin, axis, way))
-    return _at_nodes(link, where, origin, axis, way)
+    full, rigid = link.full, link.rigid
+    if full is None or link.Q is None:
+        found = _along_line(link, where, origin, axis, way)
+        return found if rigid or not link.meshed else _apart(link, where, found)
+    found = _along_line(full, where, origin, axis, way)
+    if full.meshed and not rigid:
+        _apart(full, where, found)
+    own = Stations(found.s, found.points, found.weights @ link.Q)
+    return own if rigid else _apart(link, where, own)
+
+
+def _along_line(
+    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, way: tuple[float, float]
+) -> Stations:
+    return (_in_balls if link.meshed else _at_nodes)(link, where, origin, axis, way)
 
 
 def _apart(link: Link, where: str, found: Stations) -> Stations:
