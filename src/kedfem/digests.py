@@ -1,6 +1,7 @@
-"""Digests of a folder of files that others write and read, so that changed ones go before they are read.
+"""Digests by which changed bytes are noticed before anything is made of them.
 
-numba reads what it compiled by unpickling and linking it: a flipped bit there would end in a library's error, or worse.
+Of content: it is kept behind its digest. Of a folder of files that others write and read, so that changed ones go: numba
+reads what it compiled by unpickling and linking it, where a flipped bit would end in a library's error, or worse.
 """
 
 import json
@@ -10,6 +11,18 @@ from pathlib import Path
 from secrets import token_hex
 
 DIGESTS = "digests.json"
+_LENGTH = sha256().digest_size
+
+
+def sealed(content: bytes) -> bytes:
+    """Content behind its digest."""
+    return sha256(content).digest() + content
+
+
+def unsealed(whole: bytes) -> bytes | None:
+    """The content that was sealed; None if any byte is another."""
+    digest, content = whole[:_LENGTH], whole[_LENGTH:]
+    return content if sha256(content).digest() == digest else None
 
 
 def drop_changed(folder: Path) -> None:

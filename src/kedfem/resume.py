@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import Prepared
-from kedfem.dynamics.marks import Marks
+from kedfem.digests import sealed, unsealed
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
@@ -79,7 +79,7 @@ class Keeper:
         """Rows that belong to the state to go on from."""
         return int(self.stored.said["rows"]) if self.stored else 0
 
-    def prepared(self, ready: Prepared, marks: Marks) -> None:
+    def prepared(self, ready: Prepared) -> None:
         """What was planned and meshed belongs to the state to go on from.
 
         Raises
@@ -122,9 +122,8 @@ class Keeper:
         }
         content = packed(said | dict(memories))
         try:
-            with replacing(self.folder / STATE) as part, part.open("wb") as file:
-                file.write(sha256(content).digest())
-                file.write(content)
+            with replacing(self.folder / STATE) as part:
+                part.write_bytes(sealed(content))
             self.failed = ""
         except OutputError as error:
             self.failed = str(error)
@@ -193,9 +192,10 @@ def _read(path: Path) -> Packed:
     except OSError as error:
         raise OutputError(f"{path}: must be a readable file, got {error.strerror}") from error
     try:
-        if sha256(whole[32:]).digest() != whole[:32]:
+        content = unsealed(whole)
+        if content is None:
             raise ValueError("other bytes than were written")
-        found = Packed(whole[32:])
+        found = Packed(content)
         if found.said.get("format") != FORMAT:
             raise ValueError("another layout")
         return found

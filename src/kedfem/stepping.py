@@ -86,7 +86,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
     }  # fmt: skip
     if keeper is not None:
-        keeper.prepared(ready, marks)
+        keeper.prepared(ready)
         keeper.put_back(memories)
         refuse_without(frames)
     written = ResultsWriter(

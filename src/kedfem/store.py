@@ -18,6 +18,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any, TypeVar
 
+from kedfem.digests import sealed, unsealed
 from kedfem.folders import KERNELS, cache_folder
 from kedfem.processes import private
 
@@ -83,8 +84,7 @@ def _read(entry: Path) -> bytes | None:
         os.utime(entry)  # what is used stays longest
     except OSError:
         return None
-    digest, content = whole[:32], whole[32:]
-    return content if sha256(content).digest() == digest else None
+    return unsealed(whole)
 
 
 def _write(entry: Path, content: bytes) -> None:
@@ -93,8 +93,7 @@ def _write(entry: Path, content: bytes) -> None:
     part = entry.with_name(f"{entry.stem}.{token_hex(4)}.part")
     try:
         with os.fdopen(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
-            file.write(sha256(content).digest())
-            file.write(content)
+            file.write(sealed(content))
         part.replace(entry)
     finally:
         part.unlink(missing_ok=True)

@@ -188,18 +188,14 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     out = [np.zeros((link.n, link.d)) for link in links]
     parts = {str(k): link for k, link in enumerate(links)}
     for name, force in scene.analysis.initial_deflection.items():
-        where, at = f"analysis.initial_deflection.{name}", np.asarray(force.at)
+        where = f"analysis.initial_deflection.{name}"
         if all(link.name != force.link or link.rigid for link in links):
             raise SceneError(
                 f"{where}.link: must name an elastic link, got '{force.link}', which does not deform"
             )
-        key, weights = on_part(parts, force.link, at, partial(_point_weights_of, where, at))
+        key, weights = _at_point(where, force.link, np.asarray(force.at), parts)
         out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
     return out
-
-
-def _point_weights_of(where: str, at: Vector, link: Link) -> Float[np.ndarray, " n"]:
-    return _point_weights(where, link, at)
 
 
 def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
@@ -216,13 +212,18 @@ def _weights(
         return {}
     match load:
         case ForceLoad():
-            at = np.asarray(load.at)
-            key, weights = on_part(parts, load.link, at, lambda x: _point_weights(where, x, at))
-            return {key: weights}
+            return dict([_at_point(where, load.link, np.asarray(load.at), parts)])
         case BodyLoad():
             return {key: link.volume for key, link in parts.items()}
         case SurfaceLoad():
             return {key: surface_weights(parts[key], seat) for key, seat in _face(where, load, parts).items()}
+
+
+def _at_point(
+    where: str, name: str, at: Vector, parts: Mapping[str, Link]
+) -> tuple[str, Float[np.ndarray, " n"]]:
+    """The segment of a link that a force at a point acts on, and how much of it each function takes."""
+    return on_part(parts, name, at, lambda link: _point_weights(where, link, at))
 
 
 def _point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:

@@ -7,13 +7,12 @@ from types import ModuleType
 
 import numpy as np
 
-from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, section
+from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
 from kedfem.mesh.path import Frame, Leg, path
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.shares import sized
@@ -91,16 +90,10 @@ def _section_plan(gmsh: ModuleType, solid: Solid, legs: tuple[Leg, ...]) -> Iter
     """The plan of the section half way along the first leg, about its centre, as thick as the path is long."""
     frame = legs[0].at(0.5)
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
-        try:
+        with told(solid, "it must have a section across its path"):
             faces = _section(copy, solid, frame)
             length = sum(leg.length for leg in legs) / solid.extent
             plan = laid_over(copy, [faces], frame.axes, solid.extent, np.array([0.0, length]))
-        except KedfemError:
-            raise
-        except Exception as error:  # gmsh raises nothing more special
-            raise OtherWayError(
-                f"{solid.name}: it must have a section across its path, got none from OpenCASCADE: {error}"
-            ) from error
         check_volume(solid, plan)
         yield replace(plan, origin=frame.origin)
 

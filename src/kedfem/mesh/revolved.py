@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
-from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.core import NEAR, core_mesh, core_radius
@@ -18,7 +17,7 @@ from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, section
+from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
 from kedfem.mesh.revolution import Revolution, revolution
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.shares import sized
@@ -95,7 +94,7 @@ def _meridian(
     radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
     axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
-        try:
+        with told(solid, "it must have a section through its axis"):
             faces = _section(copy, solid, turn, axes)
             whole = _plan(copy, solid, turn, axes, faces)
             check_volume(solid, whole)
@@ -103,12 +102,6 @@ def _meridian(
             radius = core_radius(whole)
             if radius > 0:
                 whole = _plan(copy, solid, turn, axes, _cut(copy, faces, axes, radius))
-        except KedfemError:
-            raise
-        except Exception as error:  # gmsh raises nothing more special
-            raise OtherWayError(
-                f"{solid.name}: it must have a section through its axis, got none from OpenCASCADE: {error}"
-            ) from error
         inside = tuple(region for region in whole.regions if _reach(whole, region) <= radius + NEAR)
         outside = tuple(region for region in whole.regions if _reach(whole, region) > radius + NEAR)
         yield _Meridian(without_spare_curves(replace(whole, regions=outside)), whole, inside, radius, size)

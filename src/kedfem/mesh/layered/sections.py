@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import OtherWayError, Solid
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, loop_samples, signed_area
 from kedfem.mesh.session import gmsh_copy
@@ -113,6 +114,17 @@ def _slab_section(
     cut = section(gmsh, solid, np.array(corners))
     occ.translate(cut, *(-height * axes[2]))
     return cut
+
+
+@contextmanager
+def told(solid: Solid, must: str) -> Iterator[None]:
+    """What OpenCASCADE cannot cut is told with what must be."""
+    try:
+        yield
+    except KedfemError:
+        raise
+    except Exception as error:  # gmsh raises nothing more special
+        raise OtherWayError(f"{solid.name}: {must}, got none from OpenCASCADE: {error}") from error
 
 
 def section(gmsh: ModuleType, solid: int, corners: Float[np.ndarray, "4 3"]) -> list[tuple[int, int]]:
