@@ -66,8 +66,8 @@ def cited() -> set[tuple[int, str]]:
 
 
 def table(file: str, heading: str) -> list[list[str]]:
-    """Rows of all tables of a page from a heading on."""
-    text = (DOCS / file).read_text("utf-8").split(f"{heading}\n", 1)[1]
+    """Rows of all tables of a page from a heading on, up to the table of words."""
+    text = (DOCS / file).read_text("utf-8").split(f"{heading}\n", 1)[1].split("\n## Words\n", 1)[0]
     rows = [line.strip().strip("|").split("|") for line in text.splitlines() if line.startswith("|")]
     body = [[cell.strip() for cell in row] for row in rows]
     return [row for row in body if not set(row[0]) <= set("-:") and row[0] not in {"equation", "symbol"}]
