@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import stat
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from kedfem.errors import SceneError
-from kedfem.scene.faults import fault_lines
+from kedfem.scene.faults import fault_lines, place
+from kedfem.scene.hints import Where
 from kedfem.scene.loads import FACTOR_UNITS
 from kedfem.scene.placing import Placement
 from kedfem.scene.points import known_points
@@ -57,28 +58,42 @@ def file_text(path: Path) -> str:
         raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
 
 
-def outside(raw: Any, folder: Path, where: str = "") -> list[str]:
-    """Faults of all names of files and folders in a scene that lead out of its own folder, links followed.
+def outside(raw: Any, folder: Path) -> list[str]:
+    """Faults of all names of files and folders in a raw scene that lead out of its own folder, links followed."""
+    names: list[tuple[str, str]] = []
 
-    Parameters
-    ----------
-    raw : a table of the scene
-    where : its key
-    """
-    if isinstance(raw, list):
-        return [fault for k, x in enumerate(raw) for fault in outside(x, folder, f"{where}[{k}]")]
-    if not isinstance(raw, Mapping):
-        return []
-    out = []
-    for key, x in raw.items():
-        place = f"{where}.{key}" if where else str(key)
-        if key in {"file", "folder"} and isinstance(x, str) and not _inside(folder, x):
-            out.append(f"{place}: must be within the scene's folder (--within), got {x!r}")
-        out += outside(x, folder, place)
-    return out
+    def noted(where: Where, name: str) -> str:
+        names.append((place(where), name))
+        return name
+
+    _with_names(raw, (), noted)
+    wanted = "must be within the scene's folder (--within)"
+    return [f"{where}: {wanted}, got {name!r}" for where, name in names if not inside(folder, name)]
 
 
-def _inside(folder: Path, name: str) -> bool:
+def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
+    """A raw scene with its names of files made relative to the folder that its own is `beside` of."""
+    changed: dict[str, Any] = _with_names(raw, (), lambda where, name: str(beside / name) if name else name)
+    return changed
+
+
+def _with_names(x: Any, where: Where, of: Callable[[Where, str], str]) -> Any:
+    """Raw input with something in place of its names of files and folders."""
+    if isinstance(x, list):
+        return [_with_names(each, (*where, k), of) for k, each in enumerate(x)]
+    if isinstance(x, Mapping):
+        return {key: _with_names(each, (*where, str(key)), of) for key, each in x.items()}
+    names = where and isinstance(x, str) and (where[-1] in {"file", "folder"} or is_step_file(where))
+    return of(where, x) if names else x
+
+
+def is_step_file(where: Where) -> bool:
+    """Whether a key is the CAD file of a link, not the step of an analysis."""
+    return len(where) == 3 and where[0] == "links" and where[2] == "step"
+
+
+def inside(folder: Path, name: str | Path) -> bool:
+    """Whether a file is in a folder, links followed."""
     try:
         return (folder / name).resolve().is_relative_to(folder.resolve())
     except (ValueError, OSError, RuntimeError):  # no name of a file at all, or links in a circle

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from kedfem.errors import SceneError
 from kedfem.scene.checks import meshing_faults
 from kedfem.scene.faults import fault_lines
-from kedfem.scene.files import outside, scene_folder, sketched, toml_table
+from kedfem.scene.files import inside, outside, scene_folder, sketched, toml_table
+from kedfem.scene.including import KEY, toml_text, with_includes
 from kedfem.scene.links import LinkScene, spelt_out
 from kedfem.scene.parts import Entry
 from kedfem.scene.scene import Scene
@@ -32,12 +33,15 @@ def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) 
         With all faults: of the file, or of the scene in it.
     """
     path = Path(path)
-    raw, text = toml_table(path)
-    if within and (faults := outside(raw, path.parent)):
+    folder = path.parent
+    found, text = toml_table(path)
+    raw = with_includes(found, folder, path, lambda each: not within or inside(folder, each.absolute()))
+    if within and (faults := outside(raw, folder)):
         raise SceneError(faults)
+    text = toml_text(raw) if KEY in found else text
     token = sketched.set(sketch)
     try:
-        return scene_from(raw, path.parent, source=text, stem=path.stem)
+        return scene_from(raw, folder, source=text, stem=path.stem)
     finally:
         sketched.reset(token)
 
@@ -80,6 +84,7 @@ def scene_from(
     """
     token = scene_folder.set(Path(folder))
     try:
+        raw = with_includes(raw, Path(folder)) if isinstance(raw, Mapping) and KEY in raw else raw
         scene = Scene.model_validate(raw)
     except RecursionError:
         wanted = "must not be nested, nor have points that are constructed from each other, hundreds deep"

@@ -20,6 +20,7 @@ from kedfem.scene import (
     bushings,
     damping,
     drives,
+    expressions,
     faces,
     initial,
     links,
@@ -27,6 +28,7 @@ from kedfem.scene import (
     materials,
     motors,
     outlines,
+    parameters,
     points,
     scene,
     sections,
@@ -45,6 +47,16 @@ as *where: what was wanted, what was got*.
 
 * **Units** are SI (m, kg, s, N, Pa, rad, Hz). A string may carry another unit of the same kind: `"25.4 mm"`,
   `"600 rpm"`, `"60 deg"`, `"70 GPa"`. Hertz do not count as a rotational speed nor rpm as a frequency.
+* **Parameters and expressions:** `[parameters]` holds numbers by name, `r = "25 mm"`, and any number of the scene may be
+  an expression of them: `width = "=2*r + 5 mm"`. `+ - * / ^` and brackets, `pi`, `sqrt`, `abs`, `min`, `max`, `hypot`,
+  `sin`, `cos`, `tan` (of angles), `asin`, `acos`, `atan`, `atan2`, `exp`, `log`. A unit follows its number and belongs to
+  it, powers and quotients included: `1/5 N/m` is 1/(5 N/m). Units are checked: `25 mm + 3` and `25 mm + 3 s` are faults;
+  so are `50 Hz` where rad/s is wanted (`2*pi rad` times it is not: `"=1 rad*2*pi*f"`). What has no unit in the end
+  is in SI, or a count. At most {longest} letters, exponents up to {power:g}. Parameters may be expressions of each other.
+* **Included files:** `include = ["materials.toml"]`, before all tables, takes over the tables of other scene files, key
+  by key; what the scene states itself stands, of several files the later one, and a table of another `kind` replaces the
+  whole one. File names in an included file are relative to that file. Results store the scene with all that it includes
+  and all expressions worked out.
 * **Points** are two or three coordinates (z = 0 if left out), the name of a point in `[points]`,
   `joints.NAME` for the place of a joint, or one of the constructions below, wherever a point stands:
   `at = {{ between = ["A", "B"], fraction = 0.3 }}`. **Axes** are `"x"`, `"y"`, `"z"`, a vector of any length, or two
@@ -125,6 +137,10 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
 ]
 
 NAMED = {
+    dict[parameters.ParameterName, parameters.Parameter]: (
+        "numbers, texts with units or expressions by name",
+        "",
+    ),
     points.Point: ("point", "m"),
     apart.JointPoint: ("point, or points by link", "m"),
     points.Axis: ("axis", ""),
@@ -154,7 +170,11 @@ NAMED = {
 def scene_reference() -> str:
     """The text of docs/scene.md."""
     built_in = ", ".join(f"`{name}`" for name in materials.BUILT_IN)
-    parts = [INTRODUCTION.format(materials=built_in)]
+    parts = [
+        INTRODUCTION.format(
+            materials=built_in, longest=expressions.LONGEST_EXPRESSION, power=expressions.MOST_POWER
+        )
+    ]
     for heading, note, records in SECTIONS:
         parts.append(f"## {heading}\n" + (f"\n{note}\n" if note else ""))
         parts += [record_table(record, alone=len(records) == 1) for record in records]

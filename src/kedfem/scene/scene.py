@@ -17,7 +17,7 @@ from pydantic import (
 
 from kedfem.errors import SceneError
 from kedfem.scene.analysis import Analysis, Output
-from kedfem.scene.base import Line, Name, Record, plain
+from kedfem.scene.base import FileName, Line, Name, Record, plain
 from kedfem.scene.checks import (
     drive_faults,
     gear_faults,
@@ -39,6 +39,7 @@ from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
+from kedfem.scene.parameters import Parameter, ParameterName, with_expressions
 from kedfem.scene.parts import Parts, scene_parts
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
@@ -63,6 +64,10 @@ class Scene(Record):
 
     title: Line = ""
     """a line about the scene, for pictures and summaries"""
+    include: tuple[FileName, ...] = Field(default=(), max_length=0)
+    """other scene files (one, or a list) whose tables this scene has too, see above; read before anything else"""
+    parameters: dict[ParameterName, Parameter] = Field(default_factory=dict)
+    """numbers by name, with or without a unit, for expressions anywhere in the scene; may be expressions of each other"""
     gravity: AccelerationVector = (0.0, 0.0, 0.0)
     """acceleration of free fall; none if not given"""
     points: dict[Name, Point] = Field(default_factory=dict)
@@ -99,6 +104,7 @@ class Scene(Record):
     _folder: Path = PrivateAttr(Path())
     _stem: str = PrivateAttr("scene")
     _doubts: tuple[str, ...] = PrivateAttr(())
+    _as_given: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
     @property
     def source(self) -> str | None:
@@ -109,6 +115,11 @@ class Scene(Record):
     def folder(self) -> Path:
         """The folder that file names in the scene are relative to."""
         return self._folder
+
+    @property
+    def as_given(self) -> Mapping[str, Any]:
+        """Keys and values as they were given, expressions and all, with the tables of included files."""
+        return self._as_given
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -145,6 +156,7 @@ class Scene(Record):
         raw = plain(raw)
         if not isinstance(raw, Mapping):
             raise SceneError(f"must be a table of keys, got {raw!r}")
+        written, (raw, wrong) = raw, with_expressions(raw, cls)
         given, placement = raw, Placement(raw.get("points"), raw.get("joints"))
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
         if isinstance(links := raw.get("links"), Mapping):
@@ -156,7 +168,7 @@ class Scene(Record):
             raw = {**raw, "links": left_open(raw.get("links"))}
         raw, faults = with_motion_tables(raw, scene_folder.get())
         raw, more = with_factor_tables(raw, scene_folder.get())
-        faults = placement.faults + faults + more
+        faults = wrong + placement.faults + faults + more
         if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
             faults.append("joints: is required with a drive, got nothing")
         with known_points(placement):
@@ -166,10 +178,12 @@ class Scene(Record):
                 scene, faults = None, faults + fault_lines(error, cls, raw)
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
         if scene is None or faults:
-            raise SceneError(list(dict.fromkeys(faults)))
+            places = {each.partition(": ")[0] for each in wrong}
+            rest = [each for each in faults[len(wrong) :] if each.partition(": ")[0] not in places]
+            raise SceneError(list(dict.fromkeys([*wrong, *rest])))
         if (steps := time_grid(scene).steps) > MOST_STEPS:
             raise SceneError(f"analysis: must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")
-        scene._doubts = tuple(bare_numbers(given, cls))
+        scene._doubts, scene._as_given = tuple(bare_numbers(given, cls)), written
         if scene.analysis.frames is None:
             scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))
         return scene

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from tokenize import TokenError
@@ -92,12 +93,21 @@ def unit_registry() -> pint.UnitRegistry[float]:
     return pint.UnitRegistry()
 
 
+class Evaluated(str):
+    """The text of an expression whose value has a unit, and that value, a pint quantity."""
+
+    quantity: Any
+
+    def __repr__(self) -> str:
+        return f"{str(self)!r}, {self.quantity:.6g~P}"
+
+
 def si_number(text: str, unit: str) -> float:
     """The number that a string with a unit stands for.
 
     Parameters
     ----------
-    text : a number and a unit, ``"914.4 mm"``.
+    text : a number and a unit, ``"914.4 mm"``, or an expression that was worked out.
     unit : the SI unit of the answer, a key of ``KINDS``.
 
     Returns
@@ -110,29 +120,59 @@ def si_number(text: str, unit: str) -> float:
         Not a number with a unit, an unknown unit or a unit of another dimension. Hertz are not accepted
         for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess.
     """
-    import pint
-
-    match = NUMBER.fullmatch(text)
-    if match is None:
+    if isinstance(text, Evaluated):
+        quantity = text.quantity
+        given = f"{quantity.units:~P}"
+    elif (match := NUMBER.fullmatch(text)) is not None:
+        given = match[2]
+        quantity = unit_registry().Quantity(float(match[1]), unit_of(given, unit))
+    else:
         raise ValueError("not a number with a unit")
-    number, given = float(match[1]), match[2]
-    if given and (len(given) > LONGEST or not UNIT.fullmatch(given)):
-        raise ValueError(f"{shown(given)} is not a unit")
-    try:
-        wanted, got = unit_registry().parse_units(unit), unit_registry().parse_units(given)
-    except pint.errors.UndefinedUnitError:
-        raise ValueError(f"unknown unit {given!r}{meant(given, unit)}") from None
-    except UNREADABLE:
-        raise ValueError(f"{given!r} is not a unit") from None
-    names = set(got._units)
-    cross = (unit == "rad/s" and names & CYCLES) or (unit == "Hz" and names & TURNING)
-    if cross:
+    wanted, got = unit_registry().parse_units(unit), quantity.units
+    if crossed(quantity._units, unit):
         raise ValueError(
             f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
         )
     if got.dimensionality != wanted.dimensionality:
         raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")
-    return float(unit_registry().Quantity(number, got).m_as(wanted))
+    return float(quantity.m_as(wanted))
+
+
+def unit_of(given: str, wanted: str = "") -> Any:
+    """The unit that a text stands for.
+
+    Parameters
+    ----------
+    given : names with powers of one digit, multiplied and divided
+    wanted : a unit of the kind that is wanted, for hints
+
+    Raises
+    ------
+    ValueError
+        It is not a unit, or an unknown one.
+    """
+    import pint
+
+    if given and (len(given) > LONGEST or not UNIT.fullmatch(given)):
+        raise ValueError(f"{shown(given)} is not a unit")
+    try:
+        return unit_registry().parse_units(given)
+    except pint.errors.UndefinedUnitError:
+        raise ValueError(f"unknown unit {given!r}{meant(given, wanted) if wanted else ''}") from None
+    except UNREADABLE:
+        raise ValueError(f"{given!r} is not a unit") from None
+
+
+def turns(unit: Mapping[str, float]) -> float:
+    """The power of an angle in a unit, given as powers of names: 1 of rpm or rad/s, 0 of Hz."""
+    return float(sum(power for name, power in unit.items() if name in TURNING))
+
+
+def crossed(given: Mapping[str, float], unit: str) -> bool:
+    """Whether a unit counts cycles where rad/s is wanted, or turns where Hz is: the factor 2π would be a guess."""
+    if unit == "Hz":
+        return turns(given) != 0.0
+    return unit == "rad/s" and not CYCLES.isdisjoint(given) and turns(given) == 0.0
 
 
 def meant(given: str, unit: str) -> str:
