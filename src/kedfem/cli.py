@@ -134,6 +134,31 @@ def kinematics(
 
 
 @app.command()
+def frequencies(
+    scene: ScenePath,
+    modes: Annotated[int, typer.Option(help="Frequencies at each position.")] = 6,
+    positions: Annotated[int, typer.Option(help="Over a turn, or over the whole run.")] = 16,
+    free: Annotated[bool, typer.Option("--free", help="Drives let go of their joints.")] = False,
+    harmonics: Annotated[int, typer.Option(help="Of the drive that are compared.")] = 5,
+    folder: Annotated[
+        Path | None, typer.Option(help="Where all goes; default: SCENE-frequencies beside the scene.")
+    ] = None,
+    within: Within = False,
+) -> None:
+    """Natural frequencies of the linkage frozen at positions over a turn; the drive's harmonics that meet them."""
+    from kedfem.frequencies import Wanted
+    from kedfem.frequencies import frequencies as found_of
+    from kedfem.report import frequencies_tables
+    from kedfem.scene import read_scene
+
+    loaded = read_scene(scene, within=within)
+    with _progress() as watch:
+        done = found_of(loaded, Wanted(modes, positions, free, harmonics), folder, watch)
+    _show(frequencies_tables(loaded, done), done.warnings)
+    out.print(f"{done.folder}  table and plots", markup=False, soft_wrap=True)
+
+
+@app.command()
 def mesh(
     part: Annotated[Path, typer.Argument(metavar="PART", help="A CAD file: STEP, IGES or BREP.")],
     solid: Annotated[str | None, typer.Option(metavar="NAME", help="Which solid of an assembly.")] = None,

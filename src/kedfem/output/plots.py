@@ -69,7 +69,7 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         if picture.channel and _negligible(picture.panels, highest.get(picture.channel.unit, 0.0)):
             continue
         path = Path(folder) / f"{picture.name}.png"
-        with _saved(path, _title(picture.title, picture.channel, results)) as figure:
+        with figure_saved(path, _title(picture.title, picture.channel, results)) as figure:
             _draw_panels(figure, along, picture.panels)
         written.append(path)
     return written
@@ -183,7 +183,7 @@ def _plain(text: str) -> str:
 
 
 @contextmanager
-def _saved(path: Path, title: str) -> Iterator[Any]:
+def figure_saved(path: Path, title: str) -> Iterator[Any]:
     """A figure of its own (no global state), written to a PNG when it is drawn."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -3,6 +3,7 @@
 from kedfem.output.words import moment
 from kedfem.report.assembly import assembly_tables
 from kedfem.report.check import check_tables
+from kedfem.report.frequencies import frequencies_tables
 from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import mesh_tables
 from kedfem.report.run import run_tables
@@ -12,6 +13,7 @@ from kedfem.report.study import study_tables
 __all__ = [
     "assembly_tables",
     "check_tables",
+    "frequencies_tables",
     "kinematics_tables",
     "mesh_tables",
     "moment",

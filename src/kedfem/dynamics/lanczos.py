@@ -1,0 +1,67 @@
+"""Lowest modes by a block Lanczos run on an inverse: all vectors are kept, so that equal frequencies are all found."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+Block = Float[np.ndarray, "N _"]
+Product = Callable[[Block], Block]
+
+CONVERGED = 1e-9  # residual of a vector, of its eigenvalue, which is right to about the square of that
+REPEATED = 1e-12  # of the size of a new vector: what is left of it beside those before is rounding
+MOST = 480  # vectors of a run
+
+
+def lanczos(
+    answer: Product, momentum: Product, size: int, count: int, block: int
+) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
+    """Largest eigenvalues θ of A⁻¹ M in falling order, and their vectors, orthonormal in M.
+
+    Parameters
+    ----------
+    answer : A⁻¹ of columns, with all constraints kept
+    momentum : M of columns, definite
+    size : N
+    count : eigenvalues that are wanted; where there are fewer, all
+    block : vectors to begin with: of so many equal eigenvalues each is found
+
+    Source: block Lanczos with full orthogonalisation, Golub and Van Loan, Matrix Computations, section 10.3.
+    """
+    first = np.random.default_rng(0).standard_normal((size, min(block, size)))
+    V, MV, T = np.zeros((size, 0)), np.zeros((size, 0)), np.zeros((0, 0))
+    theta, Z = np.zeros(0), np.zeros((0, 0))
+    x = answer(momentum(first))
+    while V.shape[1] < MOST:
+        new, R = _beside(V, MV, x, momentum)
+        if not new.shape[1] or _converged(theta, Z, R, count):
+            break
+        V, MV = np.hstack([V, new]), np.hstack([MV, momentum(new)])
+        x = answer(MV[:, -new.shape[1] :])
+        column, known = MV.T @ x, len(T)
+        T = np.block([[T, column[:known]], [column[:known].T, column[known:]]])
+        theta, Z = (each[..., ::-1] for each in np.linalg.eigh((T + T.T) / 2))
+    kept = np.flatnonzero(theta > REPEATED * theta.max(initial=0.0))[:count]
+    return theta[kept], V @ Z[:, kept]
+
+
+def _beside(V: Block, MV: Block, x: Block, momentum: Product) -> tuple[Block, Float[np.ndarray, "_ _"]]:
+    """An orthonormal basis Q of what columns x have beside those of V, and R with x = V (…) + Q R."""
+    size = np.sqrt(np.maximum((x * momentum(x)).sum(axis=0), 0.0)).max(initial=0.0)
+    R = np.eye(x.shape[1])
+    for _ in range(2):
+        x = x - V @ (MV.T @ x)
+        values, vectors = np.linalg.eigh(x.T @ momentum(x))
+        kept = values > (REPEATED * size) ** 2
+        root = np.sqrt(values[kept])
+        R = (vectors[:, kept] * root).T @ R
+        x, size = x @ (vectors[:, kept] / root), 1.0
+    return x, R
+
+
+def _converged(
+    theta: Float[np.ndarray, " m"], Z: Float[np.ndarray, "m m"], R: Float[np.ndarray, "_ _"], count: int
+) -> bool:
+    """Whether the residuals of the first eigenvectors, ‖R z‖ with their part z in the last block, are small."""
+    left = np.linalg.norm(R @ Z[len(Z) - R.shape[1] :, :count], axis=0) if len(Z) else np.zeros(0)
+    return len(theta) >= count and bool((left <= CONVERGED * theta[:count]).all())

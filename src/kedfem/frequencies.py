@@ -1,0 +1,182 @@
+"""Natural frequencies of a scene's linkage frozen at positions over a turn of its drive: table and plots."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.prepared import moving
+from kedfem.dynamics.frozen import Frozen
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.record import Curve, Stop, System
+from kedfem.errors import SceneError
+from kedfem.motion.assembly import assembled, assembly_warning
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.output.frequency_plots import write_campbell, write_over_turn
+from kedfem.results import claimed
+from kedfem.results.frequencies import write_frequencies
+from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
+
+Watch = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is asked for.
+
+    modes : frequencies at each position
+    positions : over the last turn of a drive that goes on turning, else over the whole time; without a drive one
+    free : whether the drives let go of their joints; else they hold them
+    harmonics : of the drive whose crossings are looked for
+    """
+
+    modes: int = 6
+    positions: int = 16
+    free: bool = False
+    harmonics: int = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """Speeds [rad/s] at which a harmonic of the drive meets a natural frequency somewhere in the turn.
+
+    mode, harmonic : numbers from 1
+    """
+
+    mode: int
+    harmonic: int
+    slowest: float
+    fastest: float
+
+
+@dataclass(frozen=True, slots=True)
+class Frequencies:
+    """Of a linkage frozen at P positions.
+
+    time : (P,) [s]; angle : (P,) drive angle [rad] or travel [m] there, of one that goes on turning from its first turn
+    values : (P, f) natural frequencies in rising order [Hz], NaN where there are fewer
+    still : motions without strain, at zero frequency
+    speed : of the drive, where it goes on turning, else 0 [rad/s]
+    crossings : with harmonics of the drive, over all speeds
+    factorisations : of links
+    """
+
+    folder: FilePath
+    time: Float[np.ndarray, " P"]
+    angle: Float[np.ndarray, " P"]
+    values: Float[np.ndarray, "P f"]
+    still: int
+    speed: float
+    crossings: tuple[Crossing, ...]
+    factorisations: int
+    warnings: tuple[str, ...]
+
+
+def frequencies_folder(scene: Scene) -> FilePath:
+    """Where they go: beside the results of a run, which they leave alone."""
+    folder = scene.results_folder
+    return folder.with_name(f"{folder.name.removesuffix('-results')}-frequencies")
+
+
+def frequencies(
+    scene: Scene,
+    wanted: Wanted,
+    folder: FilePath | None = None,
+    watch: Watch = lambda stage, done, total: None,
+) -> Frequencies:
+    """Natural frequencies of a scene's linkage over a turn, or over the whole run; all links in full.
+
+    Parameters
+    ----------
+    folder : `frequencies_folder` if not given
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user.
+    """
+    for name in ("modes", "positions", "harmonics"):
+        if (value := getattr(wanted, name)) < 1:
+            raise SceneError(f"--{name}: must be at least 1, got {value}")
+    if wanted.free and scene.driven is None:
+        raise SceneError(
+            "--free: must stand with a drive that lets go, got a scene without one: leave it out"
+        )
+    if scene.analysis.stiffening:
+        raise SceneError(
+            "analysis.stiffening: must be left out for frequencies (stresses of the motion do not enter them), got true"
+        )
+    scene, assembly = assembled(scene)
+    plan = plan_for(scene, lambda name: watch(name, 0, 0))
+    scene = plan.scene if plan else scene
+    watch("mesh and matrices", 0, 0)
+    linkage, along = moving(scene)
+    loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene
+    system = system_of(loose, linkage, along)
+    released = linkage.mobility + (len(scene.driven_joints) if wanted.free else 0)
+    solver = Frozen(system, wanted.modes, released)
+    t = _positions(scene, wanted.positions)
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    values, still = _over(solver, motion, watch)
+    turn = turn_steps(scene)
+    speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
+    angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
+    crossings = tuple(crossed(values, wanted.harmonics)) if speed else ()
+    warnings = (*assembly_warning(assembly), *_tangents(system))
+    with claimed(folder or frequencies_folder(scene)) as target:
+        done = Frequencies(target, t, angle, values, still, speed, crossings, solver.factorisations, warnings)
+        write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
+        if len(t) > 1:
+            write_over_turn(target / "frequencies.png", t, angle, values, bool(speed))
+        if speed:
+            write_campbell(target / "campbell.png", values, speed, wanted.harmonics)
+    return done
+
+
+def _over(solver: Frozen, motion: RigidMotion, watch: Watch) -> tuple[Float[np.ndarray, "P f"], int]:
+    """Frequencies of vibrations at each position [Hz], and the most motions without strain."""
+    values, still = np.full((len(motion.t), solver.count), np.nan), 0
+    for k in range(len(motion.t)):
+        watch("positions", k, len(motion.t))
+        found = solver.at(motion.part(k, k + 1))
+        values[k, : len(found.frequencies)], still = found.frequencies, max(still, found.still)
+    return values, still
+
+
+def _positions(scene: Scene, count: int) -> Float[np.ndarray, " P"]:
+    """Times at which the linkage is frozen."""
+    if scene.driven is None:
+        return np.zeros(1)
+    grid, turn = time_grid(scene), turn_steps(scene)
+    span = min(turn * grid.step, grid.end) if turn else grid.end
+    return np.asarray(grid.end - span + span * np.arange(count) / count)
+
+
+def _slides(scene: Scene) -> bool:
+    return any(scene.joints[name].kind == "prismatic" for name in list(scene.driven_joints)[:1])
+
+
+def _tangents(system: System) -> tuple[str, ...]:
+    """Which force laws are not linear."""
+    names = dict.fromkeys(x.name for x in system.constraints if isinstance(x.law, Curve | Stop))
+    if not names:
+        return ()
+    return (
+        f"frequencies: force laws that are not linear enter with their tangent at rest: {', '.join(names)}",
+    )
+
+
+def crossed(values: Float[np.ndarray, "P f"], harmonics: int) -> list[Crossing]:
+    """Speeds at which harmonic k of the drive has a natural frequency of some position: from its least to its most."""
+    out = []
+    for mode, f in enumerate(values.T, 1):
+        if np.isnan(f).any():
+            continue
+        out += [
+            Crossing(mode, k, *(2 * np.pi * float(x) / k for x in (f.min(), f.max())))
+            for k in range(1, harmonics + 1)
+        ]
+    return out

@@ -1,0 +1,61 @@
+"""Natural frequencies over a turn of the drive, and the Campbell plot, as PNG."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.output.plots import figure_saved
+
+FASTEST = 2.0  # of the drive's speed: how far a Campbell plot goes
+
+
+def write_over_turn(
+    path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
+    turns: bool,
+) -> None:  # fmt: skip
+    """Natural frequencies [Hz] over the drive angle, of a drive that does not go on turning over time.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    x = np.degrees(angle) if turns else t
+    with figure_saved(path, "Natural frequencies of the linkage frozen at positions") as figure:
+        ax = figure.subplots()
+        for k, f in enumerate(values.T, 1):
+            ax.plot(x, f, marker=".", label=f"{k}")
+        ax.set_xlabel("drive angle (°)" if turns else "time (s)")
+        ax.set_ylabel("frequency (Hz)")
+        ax.set_ylim(bottom=0.0)
+        ax.grid(alpha=0.3)
+        ax.legend(title="mode", loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
+
+
+def write_campbell(path: Path, values: Float[np.ndarray, "P f"], speed: float, harmonics: int) -> None:
+    """Bands of the natural frequencies over a turn [Hz], and the drive's harmonics, over its speed [rad/s].
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    rpm = np.array([0.0, FASTEST * speed * 60 / (2 * np.pi)])
+    with figure_saved(
+        path, "Campbell plot: natural frequencies over a turn, harmonics of the drive"
+    ) as figure:
+        ax = figure.subplots()
+        highest = harmonics * rpm[1] / 60
+        for k, f in enumerate(values.T, 1):
+            if np.isfinite(f).all() and (f.min() <= highest or k == 1):
+                ax.fill_between(rpm, f.min(), f.max(), color=f"C{(k - 1) % 10}", alpha=0.4, label=f"mode {k}")
+                ax.plot(rpm, [f.min()] * 2, color=f"C{(k - 1) % 10}", linewidth=0.8)
+        for k in range(1, harmonics + 1):
+            ax.plot(rpm, k * rpm / 60, color="0.25", linewidth=0.9, linestyle="--")
+            ax.annotate(f"{k}×", (rpm[1], k * rpm[1] / 60), xytext=(3, -3), textcoords="offset points")
+        ax.axvline(speed * 60 / (2 * np.pi), color="0.5", linewidth=0.9, linestyle=":")
+        ax.set_xlabel("drive speed (rpm); dotted: the scene's")
+        ax.set_ylabel("frequency (Hz)")
+        ax.grid(alpha=0.3)
+        ax.legend(loc="upper left", bbox_to_anchor=(1.04, 1.02), frameon=False)

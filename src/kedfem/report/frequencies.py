@@ -1,0 +1,41 @@
+"""Natural frequencies over positions, and where harmonics of the drive meet them."""
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from kedfem.frequencies import Crossing, Frequencies
+from kedfem.output.words import moment
+from kedfem.scene import Scene
+
+RPM = 60 / (2 * np.pi)
+
+
+def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
+    """Frequencies at each position; of a drive that goes on turning critical speeds of each harmonic."""
+    still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
+    table = Table(title=Text(f"Natural frequencies of the frozen linkage [Hz]{still}"))
+    table.add_column("position")
+    for k in range(found.values.shape[1]):
+        table.add_column(str(k + 1), justify="right")
+    for t, angle, row in zip(found.time, found.angle, found.values, strict=True):
+        place = "as drawn" if scene.driven is None else moment(scene, float(t), float(angle))
+        table.add_row(place, *("–" if np.isnan(f) else f"{f:.4g}" for f in row))
+    return [table, _speeds(found)] if found.crossings else [table]
+
+
+def _speeds(found: Frequencies) -> Table:
+    said = f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
+    table = Table(title=Text(said), caption="* at the drive's speed")
+    table.add_column("harmonic")
+    for mode in sorted({x.mode for x in found.crossings}):
+        table.add_column(f"mode {mode}", justify="right")
+    for k in sorted({x.harmonic for x in found.crossings}):
+        table.add_row(f"{k}×", *(_range(x, found.speed) for x in found.crossings if x.harmonic == k))
+    return table
+
+
+def _range(x: Crossing, speed: float) -> str:
+    """From the slowest speed to the fastest [rpm], with a mark where the drive's is among them."""
+    here = " *" * (x.slowest <= speed <= x.fastest)
+    return f"{x.slowest * RPM:.0f}–{x.fastest * RPM:.0f}{here}"

@@ -1,0 +1,27 @@
+"""Natural frequencies over positions as a table for spreadsheets."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.results.files import replacing
+
+
+def write_frequencies(
+    path: Path, t: Float[np.ndarray, " P"], place: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
+    slides: bool,
+) -> None:  # fmt: skip
+    """One row a position: time [s], drive angle [rad] or travel [m], natural frequencies [Hz].
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    header = ["time [s]", "drive travel [m]" if slides else "drive angle [rad]"]
+    header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow(header)
+        np.savetxt(file, np.column_stack([t, place, values]), fmt="%.17g", delimiter=",")

@@ -1,0 +1,155 @@
+"""Natural frequencies of frozen linkages: closed forms, and eigenvalues of the literal system."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from kedfem.accuracy.prepared import moving
+from kedfem.dynamics.dense import SMALL
+from kedfem.dynamics.frozen import Frozen, Modes
+from kedfem.dynamics.lanczos import lanczos
+from kedfem.dynamics.literal import rotated_stiffness
+from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.literal import Literal
+from kedfem.dynamics.system.record import Driven, Held, Spring, System
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import path_parameter, scene_from
+from tests.cells import Cell, scene_of
+from tests.moving import turned
+from tests.rooms.test_resolution import FIRST, arm
+
+TIME = np.array([1e-3])
+CELLS = [
+    Cell(joint, frames, driven, links, law)
+    for joint, frames, driven, links, law in (
+        ("revolute", "nominal", True, "planar beams", "loads"),
+        ("prismatic", "following", False, "planar beams", "loads"),
+        ("slot", "nominal", True, "planar beams", "loads"),
+        ("revolute", "following", False, "beams in space", "loads"),
+        ("screw", "following", False, "beams in space", "loads"),
+        ("universal", "following", True, "rigid", "loads"),
+        ("spherical", "nominal", True, "reduced", "loads"),
+        ("weld", "nominal", True, "on the ground", "loads"),
+        ("revolute", "nominal", True, "plane and beam", "loads"),
+        ("revolute", "nominal", True, "beams in space", "bushing against turns"),
+        ("revolute", "following", False, "beams in space", "spring between points"),
+        ("cylindrical", "following", False, "rigid", "spring on the joint"),
+        ("revolute", "nominal", True, "beams in space", "shaft"),
+        ("revolute", "nominal", True, "beams in space", "gear"),
+        ("revolute", "nominal", True, "beams in space", "point mass"),
+    )
+]
+#: turns of the whole scene: none, x onto y, x onto z, oblique
+TURNS = [np.zeros(3), np.array([0, 0, np.pi / 2]), np.array([0, -np.pi / 2, 0]), np.array([0.7, -0.4, 1.1])]
+
+
+def frozen(
+    raw: dict[str, Any], count: int = 4, driven: bool = True
+) -> tuple[System, RigidMotion, Modes, int]:
+    """A scene's system, its motion at one time, its modes there, and how many motions the linkage has."""
+    scene = scene_from(raw)
+    linkage, path = moving(scene)
+    loose = scene if driven else scene.model_copy(update={"drive": None, "drives": {}})
+    system, mobility = system_of(loose, linkage, path), linkage.mobility + (not driven)
+    motion = rigid_motion(linkage, path, TIME, path_parameter(scene, TIME))
+    return system, motion, Frozen(system, count, mobility).at(motion), mobility
+
+
+def literal_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.ndarray:
+    """ω² [1/s²] of K and M on the null space of all constraints, assembled by the oracle.
+
+    s : of the size of the first, so that rounding of zero ones, 1e-16/s of θ = 1/(ω² + s), is small beside others
+    """
+    oracle = Literal(system, generalised_alpha(1e-3, 1.0))
+    every = zip(system.model.links, system.model.bodies, strict=True)
+    K = [
+        rotated_stiffness(sp.csr_array(link.K0), motion.R[0, n][: link.d, : link.d]).toarray()
+        for link, n in every
+    ]
+    C = oracle.coordinates(
+        np.zeros(oracle.k), np.zeros(sum(len(x.terms) for x in system.constraints)), motion
+    )[1]
+    laws = [x.law for x in system.constraints]
+    kappa = np.array([x.stiffness if isinstance(x, Spring) else 0.0 for x in laws])
+    hard = C[[isinstance(x, Held | Driven) for x in laws]]
+    A = scipy.linalg.block_diag(*K, C.T @ (kappa[:, None] * C))
+    M = scipy.linalg.block_diag(oracle.M, np.zeros((oracle.k, oracle.k)))
+    G = np.block([[oracle.W, -oracle.B], [np.zeros((len(hard), oracle.N)), hard]])
+    G /= np.maximum(np.linalg.norm(G, axis=1), 1e-300)[:, None]
+    Z = scipy.linalg.null_space(G, rcond=1e-10)
+    A, M = Z.T @ A @ Z, Z.T @ M @ Z
+    theta = scipy.linalg.eigh(M, A + s * M, eigvals_only=True)[::-1]
+    return 1 / theta[theta > 1e-13 * theta[0]] - s
+
+
+def difference(system: System, motion: RigidMotion, found: Modes) -> float:
+    wanted = literal_eigenvalues(system, motion, found.omega[found.still] ** 2)[
+        found.still : len(found.omega)
+    ]
+    return float(np.abs(found.omega[found.still :] ** 2 / wanted - 1).max())
+
+
+@pytest.mark.parametrize("cell", CELLS, ids=str)
+def test_frequencies_are_eigenvalues_of_the_literal_system(cell: Cell) -> None:
+    system, motion, found, mobility = frozen(scene_of(cell))
+    springs = any(isinstance(x.law, Spring) for x in system.constraints)
+    assert found.still <= mobility if springs else found.still == mobility
+    # beams in space have hubs 1e6 times as stiff as they are heavy: of either route rounding leaves 1e-7
+    assert difference(system, motion, found) < (1e-8 if cell.plane else 2e-6)
+
+
+@pytest.mark.parametrize("turn", TURNS, ids=["as drawn", "y", "z", "oblique"])
+def test_frequencies_do_not_depend_on_the_axes_of_the_world(turn: np.ndarray) -> None:
+    raw = scene_of(Cell("revolute", "nominal", True, "beams in space"))
+    del raw["loads"]
+    wanted = frozen(raw)[2].omega
+    found = frozen(turned(raw, Rotation.from_rotvec(turn).as_matrix(), (0.3, -0.2, 0.5)))[2].omega
+    assert_allclose(found, wanted, rtol=1e-6)  # ω²: as above
+
+
+def test_an_arm_is_a_cantilever_with_its_drive_held_and_pinned_at_one_end_with_it_free() -> None:
+    """(λ L)² of Euler-Bernoulli: clamped-free 1.8751, 4.6941; pinned-free 0, 3.9266."""
+    held, free = frozen(arm("beam"))[2], frozen(arm("beam"), driven=False)[2]
+    ratio = (np.array([4.69409113, 3.92660231]) / 1.8751040687) ** 2
+    assert (held.still, free.still) == (0, 1)
+    assert_allclose(held.frequencies[:2], [FIRST, ratio[0] * FIRST], rtol=2e-3)  # shear and rotary inertia
+    assert_allclose(free.frequencies[0], ratio[1] * FIRST, rtol=3e-3)
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_a_large_solid_with_its_sparse_factor_is_the_literal_one(driven: bool) -> None:
+    system, motion, found, _ = frozen(arm("solid"), driven=driven)
+    assert system.model.links[0].unknowns > SMALL
+    assert found.still == (not driven)
+    assert difference(system, motion, found) < 1e-7  # rounding of the dense route, λmax/ω² = 1e9 times 1e-16
+
+
+@pytest.mark.parametrize("crank", ["rigid", "beam"])
+def test_a_crank_that_a_free_drive_lets_go_swings_with_its_own_inertia(crank: str) -> None:
+    """A rigid crank is carried by its drive, without unknowns; let go it has some."""
+    raw = scene_of(Cell("revolute", "nominal", True, "planar beams"))
+    if crank == "rigid":
+        raw["links"]["crank"] |= {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
+    system, motion, found, _ = frozen(raw, driven=False)
+    assert found.still == 1
+    assert difference(system, motion, found) < 1e-8
+
+
+def test_modes_are_orthonormal_in_the_mass() -> None:
+    system, _, found, _ = frozen(arm("beam"))
+    (link,), (x,) = system.model.links, found.shapes
+    product = sum(x[:, :, c] @ (m @ x[:, :, c].T) for c, m in enumerate(link.mass))
+    assert_allclose(product, np.eye(len(x)), atol=1e-8)
+
+
+def test_equal_frequencies_are_all_found() -> None:
+    values = np.repeat([1.0, 4.0, 9.0, 400.0], [3, 5, 2, 40])
+    found, vectors = lanczos(lambda r: r / values[:, None], lambda x: x, 50, 10, 6)
+    assert_allclose(1 / found, values[:10], rtol=1e-12)
+    assert_allclose(vectors.T @ vectors, np.eye(10), atol=1e-12)

@@ -1,0 +1,69 @@
+"""`kedfem frequencies`: positions, speeds of crossings, files, refusals."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.errors import SceneError
+from kedfem.frequencies import Wanted, crossed, frequencies
+from kedfem.report import frequencies_tables
+from kedfem.scene import scene_from
+from tests.rooms.test_resolution import FIRST, arm
+
+
+def test_an_arm_has_the_same_frequencies_all_around_and_its_critical_speeds(tmp_path: Path) -> None:
+    scene = scene_from(arm("beam"), tmp_path)
+    found = frequencies(scene, Wanted(modes=2, positions=4, harmonics=3), tmp_path / "out")
+    assert found.values.shape == (4, 2)
+    assert_allclose(found.values[:, 0], FIRST, rtol=2e-3)  # a cantilever, drive held
+    assert_allclose(np.ptp(found.values, axis=0) / found.values[0], 0.0, atol=1e-8)
+    assert_allclose(found.angle, np.pi / 2 * np.arange(4), atol=1e-9)
+    third = next(x for x in found.crossings if (x.mode, x.harmonic) == (1, 3))
+    assert_allclose([third.slowest, third.fastest], 2 * np.pi * found.values[0, 0] / 3, rtol=1e-8)
+    table = np.loadtxt(tmp_path / "out" / "frequencies.csv", delimiter=",", skiprows=1)
+    assert_allclose(table, np.column_stack([found.time, found.angle, found.values]), rtol=0)
+    assert {x.name for x in (tmp_path / "out").iterdir()} == {
+        "frequencies.csv", "frequencies.png", "campbell.png"
+    }  # fmt: skip
+    assert [table.row_count for table in frequencies_tables(scene, found)] == [4, 3]
+    one = frequencies(scene, Wanted(2, 1), tmp_path / "one")
+    assert found.factorisations == one.factorisations  # links are factored once for all positions
+
+
+def test_a_free_drive_leaves_one_motion_without_strain(tmp_path: Path) -> None:
+    found = frequencies(scene_from(arm("beam"), tmp_path), Wanted(2, 2, free=True), tmp_path / "out")
+    assert found.still == 1
+
+
+def test_crossings_are_from_the_least_frequency_of_a_mode_to_its_most() -> None:
+    (first, second) = crossed(np.array([[10.0], [16.0]]), 2)
+    assert_allclose([first.slowest, first.fastest], [20 * np.pi, 32 * np.pi])
+    assert_allclose([second.slowest, second.fastest], [10 * np.pi, 16 * np.pi])
+
+
+@pytest.mark.parametrize(
+    ("change", "wanted", "said"),
+    [
+        ({}, Wanted(modes=0), "--modes: must be at least 1, got 0"),
+        ({}, Wanted(positions=0), "--positions: must be at least 1"),
+        ({"stiffening": True}, Wanted(), "analysis.stiffening: must be left out for frequencies"),
+    ],
+)
+def test_what_cannot_be_is_refused(change: dict[str, Any], wanted: Wanted, said: str, tmp_path: Path) -> None:
+    scene = scene_from(arm("beam", **change), tmp_path)
+    with pytest.raises(SceneError, match=said):
+        frequencies(scene, wanted, tmp_path / "out")
+
+
+def test_a_free_drive_is_refused_where_there_is_none(tmp_path: Path) -> None:
+    raw = arm("beam")
+    del raw["drive"]
+    raw["analysis"] = {"end_time": 0.1, "step": 1e-3}
+    scene = scene_from(raw, tmp_path)
+    with pytest.raises(SceneError, match="--free: must stand with a drive"):
+        frequencies(scene, Wanted(free=True), tmp_path / "out")
+    found = frequencies(scene, Wanted(2), tmp_path / "out")
+    assert (len(found.time), found.still, found.crossings) == (1, 1, ())
