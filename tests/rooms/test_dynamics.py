@@ -11,14 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics import substructure
-from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.ports import port_values, port_vectors
 from kedfem.dynamics.substructure import mass_substructure
+from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.dynamics.transient import Steps, snapshots, steps_of
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
@@ -71,7 +70,7 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps))
     _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps, solver="literal"))
-    assert isinstance(solver, CondensedSteps if kind in {"plate", "plane"} else DenseSteps)
+    assert isinstance(solver, SystemSteps)
     assert isinstance(literal, LiteralSteps)
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
     assert literal.factorisations == steps

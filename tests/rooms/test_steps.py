@@ -1,6 +1,5 @@
 """Dense, condensed and literal steps of one model; the compiled loop without its compiler; runs that end early."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,13 +8,21 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics import kernel
 from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.dense import DenseSteps
-from kedfem.dynamics.history import Forcing, LinkHistory
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.nominal import motions
 from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.system import (
+    algebra_kernel,
+    bodies_kernel,
+    constraints_kernel,
+    ends_kernel,
+    interface_kernel,
+    linear_kernel,
+    nominal_kernel,
+)
+from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.dynamics.transient import Steps, snapshots, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
@@ -23,6 +30,10 @@ from kedfem.results import Channel
 from kedfem.scene import drive_angle, scene_from, time_grid
 
 from .test_dynamics import four_bar, slider_crank
+
+KERNELS = (
+    algebra_kernel, bodies_kernel, constraints_kernel, ends_kernel, interface_kernel, linear_kernel, nominal_kernel,
+)  # fmt: skip
 
 
 def mixed() -> dict[str, Any]:
@@ -61,8 +72,9 @@ def test_dense_condensed_and_literal_steps_are_one(made: Any, rho_inf: float) ->
         displacements(ready, kind(model.links, model.joints, scheme, model.damping))
         for kind in (DenseSteps, CondensedSteps, LiteralSteps)
     )
+    system = displacements(ready, SystemSteps(ready.scene, nominal_system(ready.scene, model), model, scheme))
     assert model.damping.present
-    for other in (condensed, literal):
+    for other in (condensed, literal, system):
         for got, wanted in zip(dense, other, strict=True):
             # rounding, amplified by the stiffness of the links along their line
             assert_allclose(got, wanted, rtol=0, atol=2e-8 * np.abs(wanted).max())
@@ -76,14 +88,17 @@ def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPat
     fast = displacements(ready, steps_of(ready.scene, ready.model))
     counted = []
 
-    def plain(*arguments: Any) -> None:
+    def plain(*arguments: Any) -> Any:
         counted.append(1)
-        kernel_plain(*arguments)
+        return march_plain(*arguments)
 
-    kernel_plain = kernel.advance_block.py_func
-    for name in ("right_hand_side", "end_of_step"):
-        monkeypatch.setattr(kernel, name, getattr(kernel, name).py_func)
-    monkeypatch.setattr(kernel, "advance_block", plain)
+    march_plain = linear_kernel.marched_linear.py_func
+    for module in KERNELS:
+        for name, each in list(vars(module).items()):
+            if hasattr(each, "py_func"):
+                monkeypatch.setattr(module, name, each.py_func)
+    monkeypatch.setattr(linear_kernel, "reference", lambda record: record)
+    monkeypatch.setattr(linear_kernel, "marched_linear", plain)
     slow = displacements(ready, steps_of(ready.scene, ready.model))
     assert counted
     for got, wanted in zip(slow, fast, strict=True):
@@ -104,32 +119,20 @@ def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
     assert points == 600
 
 
-class Breaking:
-    """A solver whose displacements are not finite from one step on."""
-
-    stiffening = None
-
-    def __init__(self, solver: Steps, step: int) -> None:
-        self.solver, self.left = solver, step
-
-    def begin(self, states: Any) -> Any:
-        return self.solver.begin(states)
-
-    def advance(
-        self, state: Any, forcing: Sequence[Forcing], rows: Any = None
-    ) -> tuple[list[LinkHistory], Any]:
-        links, state = self.solver.advance(state, forcing)
-        if self.left <= len(forcing[0].R):
-            links[1].g[self.left - 1 :] = np.nan
-        self.left -= len(forcing[0].R)
-        return links, state
-
-
 def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
     ready = meshed(scene_from(four_bar("beam", turns=1, steps_per_turn=300)))
-    solver: Any = Breaking(steps_of(ready.scene, ready.model), 270)  # in the second block
-    seen = []
+    solver = steps_of(ready.scene, ready.model)
+    advance, left, seen = solver.advance, [270], []  # not finite from a step in the second block on
+
+    def breaking(*given: Any) -> Any:
+        links, state = advance(*given)
+        if left[0] <= len(links[1].g):
+            links[1].g[left[0] - 1 :] = np.nan
+        left[0] -= len(links[1].g)
+        return links, state
+
+    monkeypatch.setattr(solver, "advance", breaking)
 
     def all_of_it() -> None:
         for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):

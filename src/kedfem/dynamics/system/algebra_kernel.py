@@ -22,24 +22,30 @@ def frame_copied(R, out):  # type: ignore[no-untyped-def]
 def turned(R, d, x, out):  # type: ignore[no-untyped-def]
     """out becomes R x for d components of coordinates."""
     n = len(x) // d
+    first, second, third = x[:n], x[n : 2 * n], x[(d - 1) * n : d * n]
     for b in range(d):
-        for j in range(n):
-            out[b * n + j] = R[b, 0] * x[j] + R[b, 1] * x[n + j]
+        to, p, q, r = out[b * n : (b + 1) * n], R[b, 0], R[b, 1], R[b, 2]
         if d == 3:
             for j in range(n):
-                out[b * n + j] += R[b, 2] * x[2 * n + j]
+                to[j] = p * first[j] + q * second[j] + r * third[j]
+        else:
+            for j in range(n):
+                to[j] = p * first[j] + q * second[j]
 
 
 @inner
 def turned_back(R, d, x, out):  # type: ignore[no-untyped-def]
     """out becomes Rᵀ x for d components of coordinates."""
     n = len(x) // d
+    first, second, third = x[:n], x[n : 2 * n], x[(d - 1) * n : d * n]
     for b in range(d):
-        for j in range(n):
-            out[b * n + j] = R[0, b] * x[j] + R[1, b] * x[n + j]
+        to, p, q, r = out[b * n : (b + 1) * n], R[0, b], R[1, b], R[2, b]
         if d == 3:
             for j in range(n):
-                out[b * n + j] += R[2, b] * x[2 * n + j]
+                to[j] = p * first[j] + q * second[j] + r * third[j]
+        else:
+            for j in range(n):
+                to[j] = p * first[j] + q * second[j]
 
 
 @inner
@@ -74,12 +80,14 @@ def interface_columns(bodies, i, R, RB):  # type: ignore[no-untyped-def]
 
 @inner
 def product(A, at, rows, columns, x, out):  # type: ignore[no-untyped-def]
-    """out becomes A x, A (rows × columns) flat from `at` on."""
+    """out becomes A x, A (rows × columns) flat from `at` on.
+
+    A row is a view: of indices that are sums numba would ask whether each is negative, which takes 2.6 times as long.
+    """
     for r in range(rows):
-        total = 0.0
-        first = at + r * columns
+        total, row = 0.0, A[at + r * columns : at + (r + 1) * columns]
         for m in range(columns):
-            total += A[first + m] * x[m]
+            total += row[m] * x[m]
         out[r] = total
 
 
@@ -88,6 +96,6 @@ def add_transposed(A, at, rows, columns, x, out):  # type: ignore[no-untyped-def
     """out + Aᵀ x."""
     for r in range(rows):
         if x[r] != 0.0:
-            first = at + r * columns
+            row = A[at + r * columns : at + (r + 1) * columns]
             for m in range(columns):
-                out[m] += x[r] * A[first + m]
+                out[m] += x[r] * row[m]

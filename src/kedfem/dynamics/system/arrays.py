@@ -241,6 +241,8 @@ class History(NamedTuple):
     """What a march records at each of T times; as in `State`, and R (T, bodies, 3, 3) the frames, link to world.
 
     g : (T, N) deformation; strain : (T, beams, 3, points) of planar beams; energy : (T, bodies) ½ gᵀ K0 g [J]
+    Kg : (T, N) K0 g of bodies with nominal frames; Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones among
+        them, (0, N) without any
     """
 
     u: Any
@@ -256,6 +258,9 @@ class History(NamedTuple):
     e: Any
     multiplier: Any
     rate: Any
+    Kg: Any
+    Mv: Any
+    Cg: Any
 
 
 class Driving(NamedTuple):

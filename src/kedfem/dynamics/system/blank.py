@@ -60,8 +60,9 @@ def empty_history(T: int, bodies: Bodies, of: Constraints) -> History:
     """Room for T time points."""
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
     b, _, E = bodies.beams.tangent.shape
-    u, v, a, F, g = np.zeros((5, T, N))
+    u, v, a, F, g, Kg = np.zeros((6, T, N))
+    Mv, Cg = np.zeros((2, 0 if bodies.dense.all() else T, N))
     return History(
         u, v, a, F, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),
-        np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)), np.zeros((T, r)),
+        np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)), np.zeros((T, r)), Kg, Mv, Cg,
     )  # fmt: skip

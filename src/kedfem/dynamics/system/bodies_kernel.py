@@ -21,17 +21,14 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
     c_m, c_f = 1 - c.alpha_m, 1 - c.alpha_f
     n0, n1, n2 = c_m * c.acceleration[0], c_m * c.acceleration[1], c_m * c.acceleration[2] - c.alpha_m
     N = last - first
-    if bodies.dense[i]:
-        for x in range(first, last):
-            room[x - first] = n0 * state.u[x] + n1 * state.v[x] + n2 * state.a[x]
-    else:
+    u, v, a = state.u[first:last], state.v[first:last], state.a[first:last]
+    if not bodies.dense[i]:
         momentum = state.momentum[3 * first : 3 * last]
-        for x in range(N):
-            room[x] = n0 * momentum[x] + n1 * momentum[x + N] + n2 * momentum[x + 2 * N]
-    F0, f0 = state.F, state.f
-    for x in range(first, last):
-        room[x - first] += c_f * F[x] + c.alpha_f * (F0[x] - f0[x])
-    turned_back(R, d, room[: last - first], out[first:last])
+        u, v, a = momentum[:N], momentum[N : 2 * N], momentum[2 * N :]
+    F0, F1, f0 = state.F[first:last], F[first:last], state.f[first:last]
+    for x in range(N):
+        room[x] = n0 * u[x] + n1 * v[x] + n2 * a[x] + c_f * F1[x] + c.alpha_f * (F0[x] - f0[x])
+    turned_back(R, d, room[:N], out[first:last])
     if c.alpha != 0.0 or c.beta != 0.0:
         for m in range(3):
             of = 3 * first + m * N
@@ -51,13 +48,15 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type
     else:
         turned(R, d, g[:N], room[:N])
         mass_times(bodies, i, room, Mg)
-        carried_on(c, Mg, state.momentum[3 * first : 3 * last])
+        momentum = state.momentum[3 * first : 3 * last]
+        carried_on(c, Mg, momentum)
+        copied(momentum[N : 2 * N], history.Mv[t, first:last])
         turned_back(R, d, Mg[:N], room[:N])
         copied(room[:N], Mg[:N])
     for x in range(N):
         Kg[x] = (Kg[x] - c.c_M * Mg[x]) / c.c_K
         energy += g[x] * Kg[x]
-        room[x] = Kg[x]
+        room[x] = history.Kg[t, first + x] = Kg[x]
         if damped:
             of = 3 * first + x
             y, y0, y1, y2 = (
@@ -73,6 +72,8 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type
                 second,
             )
             room[x] += state.damped[of + N]
+            if not bodies.dense[i]:
+                history.Cg[t, first + x] = y
     turned(R, d, room[:N], state.f[first:last])
     turned(R, d, g[:N], room[:N])
     moved_to(c, first, last, room, F, state, history, t)
@@ -121,13 +122,14 @@ def carried_on(c, x, state):  # type: ignore[no-untyped-def]
 def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untyped-def]
     """Newmark's formulas from the displacement u at the end of the step; state and history."""
     n0, n1, n2 = c.acceleration
-    u0, v0, a0, F0, late, early = state.u, state.v, state.a, state.F, c.late, c.early
-    us, vs, as_, Fs = history.u[t], history.v[t], history.a[t], history.F[t]
-    for x in range(first, last):
-        a = n0 * (u[x - first] - u0[x]) - n1 * v0[x] - n2 * a0[x]
+    u0, v0, a0, F0 = state.u[first:last], state.v[first:last], state.a[first:last], state.F[first:last]
+    us, vs, as_ = history.u[t, first:last], history.v[t, first:last], history.a[t, first:last]
+    F1, Fs, late, early = F[first:last], history.F[t, first:last], c.late, c.early
+    for x in range(last - first):
+        a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
         v0[x] += late * a + early * a0[x]
-        u0[x], a0[x], F0[x] = u[x - first], a, F[x]
-        us[x], vs[x], as_[x], Fs[x] = u0[x], v0[x], a, F[x]
+        u0[x], a0[x], F0[x] = u[x], a, F1[x]
+        us[x], vs[x], as_[x], Fs[x] = u0[x], v0[x], a, F1[x]
 
 
 @inner

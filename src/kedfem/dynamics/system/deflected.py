@@ -13,10 +13,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.dense import work_on
 from kedfem.dynamics.mixing import Mixing
-from kedfem.dynamics.substructure import factored
 from kedfem.dynamics.system.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body, sparse_body
+from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body
 from kedfem.dynamics.system.instant import Flat, Instant, Motion
 from kedfem.dynamics.system.internal import own, rows, turned_rate
 from kedfem.dynamics.system.march import Ready
@@ -30,7 +29,7 @@ SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 KRYLOV = 60
 CONVERGED = 1e-10  # change of a sweep, of the deflection
-SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a body that nothing else holds; taken out again by sweeps
+ROUNDING = 1e-8  # of the deflection: changes below it that do not fall are rounding
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
@@ -57,7 +56,7 @@ def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: 
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
-    u, v = _moving(of, motion_at, time)
+    u, v = _moving(now, motion_at)
     return begun(now, u, v)
 
 
@@ -88,7 +87,7 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return static(of, motion_at, time, forces)
-    u, v = _moving(of, motion_at, time)
+    u, v = _moving(now, motion_at)
     pull = as_work(of, forces)
     return begun(now, _balanced(now, u, lambda u, f: pull, _spins(now), now.interface(v)), v)
 
@@ -98,11 +97,10 @@ def as_work(of: Ready, forces: Rows) -> Flat:
     return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
-def _moving(of: Ready, motion_at: Motion, time: float) -> tuple[Flat, Flat]:
+def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
     """Deflection and rate with the nominal motion, from five instants within a step."""
-    h = of.c.h / 4
-    instants = [Instant(of, motion_at, time)]
-    instants += [Instant(of, motion_at, time + k * h, instants[0]) for k in range(1, 5)]
+    of, h = first.of, first.of.c.h / 4
+    instants = [first, *(Instant(of, motion_at, first.time + k * h, first) for k in range(1, 5))]
     u, v, change = np.zeros((5, int(of.bodies.at[-1]))), np.zeros((5, 0)), np.inf
     for again in range(DAMPED if _feels_rates(of) else 1):
         before, felt = u.copy(), v
@@ -165,7 +163,7 @@ def _balanced(
     spins : of the inertia that it has as it turns, if any
     z1 : rates of the interface unknowns
     """
-    of, mixing, bodies, settled = now.of, Mixing(), _Held(now, spins), False
+    of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
     for _ in range(SWEEPS):
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
@@ -179,7 +177,8 @@ def _balanced(
             return np.asarray(u + change)
         u = u + mixing.step(change)
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        settled = size <= CONVERGED * reached + of.c.floor
+        stalls = size > last / 2 and size <= ROUNDING * reached
+        settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise SolveError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
         'their weight, or a drive at a natural frequency; take initial = "rest", a slower drive or stiffer links'
@@ -204,18 +203,16 @@ class _Held:
     def __init__(self, now: Instant, spins: Spins | None) -> None:
         self.now, self.spins, self._made = now, spins, list[HeldBody]()
         self.still = now.always.still
-        self.least = SOFTER * now.always.lowest()
+        self.sparse = [isinstance(part, SparsePart) for part in now.of.parts]
 
     def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
         """All bodies, the inertia of those that turn as their frames first were: sweeps take out the rest."""
         for k in range(len(self._made), len(R)):
-            link, joint = self.now.of.system.model.links[k], self.now.of.system.model.joints[k]
-            if isinstance(
-                self.now.of.parts[k], SparsePart
-            ):  # Krylov iterations put the inertia of turning in
-                self._made.append(sparse_body(link, joint, factored(link, joint, self.least, 1.0)))
+            link = self.now.of.system.model.links[k]
+            if self.sparse[k]:
+                self._made.append(self.now.always.held(k))
                 continue
-            A = self.still.K[k] + self.least * np.eye(len(self.still.K[k]))
+            A = self.still.K[k] + self.now.always.least(k) * np.eye(len(self.still.K[k]))
             if self.spins is not None:
                 S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
                 A = A + np.kron(S, np.eye(link.n))
@@ -223,24 +220,27 @@ class _Held:
         return self._made
 
     def change(self, balance: Balance, r: Flat) -> Flat:
-        """What a residual asks for: of sparse bodies the inertia of turning is put in by GMRES."""
-        direct, sparse = balance.solved(r).x, [isinstance(part, SparsePart) for part in self.now.of.parts]
-        if self.spins is None or not any(sparse):
+        """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass."""
+        direct = balance.solved(r).x
+        if not any(self.sparse):
             return direct
         none = balance.solved(0 * r).x
 
         def applied(x: Flat) -> Flat:
-            return np.asarray(x + balance.solved(self.inertia(x, sparse)).x - none)
+            return np.asarray(x + balance.solved(self.inertia(x, left_out=True)).x - none)
 
         whole = LinearOperator((len(r),) * 2, applied, dtype=float)
         return np.asarray(gmres(whole, direct, rtol=CONVERGED, restart=KRYLOV, maxiter=4)[0])
 
-    def inertia(self, u: Flat, of_bodies: Sequence[bool] | None = None) -> Flat:
-        """M ([α]× + [ω]×²) u, of all bodies or of some."""
+    def inertia(self, u: Flat, left_out: bool = False) -> Flat:
+        """M ([α]× + [ω]×²) u of all bodies; or what matrices of sparse ones leave out, less what they have of mass."""
         of, out = self.now.of, np.zeros_like(u)
-        for k, S in enumerate(self.spins if self.spins is not None else ()):
-            if of_bodies is None or of_bodies[k]:
-                link, here = of.system.model.links[k], own(of, k)
-                turned = (S[: link.d, : link.d] @ u[here].reshape(link.d, -1)).ravel()
-                out[here] = momentum(link, turned) if isinstance(of.parts[k], SparsePart) else turned
+        spins = np.zeros((len(of.parts), 3, 3)) if self.spins is None else self.spins
+        for k, S in enumerate(spins):
+            link, here = of.system.model.links[k], own(of, k)
+            if left_out and not self.sparse[k]:
+                continue
+            more = S - self.now.always.least(k) * np.eye(3) if left_out else S
+            turned = (more[: link.d, : link.d] @ u[here].reshape(link.d, -1)).ravel()
+            out[here] = momentum(link, turned) if self.sparse[k] else turned
         return out

@@ -10,6 +10,8 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse.linalg import splu
 
 from kedfem.dynamics.dense import work_on
+from kedfem.dynamics.substructure import factored
+from kedfem.dynamics.system.balance import HeldBody, sparse_body
 from kedfem.dynamics.system.internal import Inside, Still, inside, own, rows
 from kedfem.dynamics.system.march import Ready, driving
 from kedfem.dynamics.system.rates import coordinates, gradients, places, term_values, travels
@@ -25,13 +27,14 @@ from kedfem.dynamics.system.record import (
     Spring,
     Stop,
 )
-from kedfem.dynamics.system.sparse import SparsePart, sparse_frequency
+from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.turning_loads import turned as turned_load
 from kedfem.dynamics.system.turning_loads import turning
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
 TURN = 2 * np.pi
+SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a dense body that nothing else holds
 NOTHING = 1e-10  # gradient of a constraint that the interface satisfies by itself
 
 Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
@@ -45,13 +48,15 @@ class Always:
     number : (k,) where each interface unknown of the system stands in a state
     closed : z from displacements at all interface points, w = B z as nearly as can be
     still : internal forces of bodies
-    lowest : eigenvalue of a free body that strains [1/s²]
+    least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
+    held : a sparse body with that stiffness, factored once
     """
 
     number: Int[np.ndarray, " k"]
     closed: Callable[[Flat], Flat]
     still: Still
-    lowest: Callable[[], float]
+    least: Callable[[int], float]
+    held: Callable[[int], HeldBody]
 
 
 class Instant:
@@ -140,20 +145,23 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
 
 def always(of: Ready) -> Always:
     """What starts of a system ask at every time."""
-    still = Still(of)
-    return Always(renumbered(of), closure(of), still, cache(lambda: _lowest(of, still)))
+    still, links, joints = Still(of), of.system.model.links, of.system.model.joints
+    lowest = cache(lambda: SOFTER * _lowest(of, still))
+
+    def least(k: int) -> float:
+        return softening(links[k]) if isinstance(of.parts[k], SparsePart) else lowest()
+
+    def held(k: int) -> HeldBody:
+        return sparse_body(links[k], joints[k], factored(links[k], joints[k], least(k), 1.0))
+
+    return Always(renumbered(of), closure(of), still, cache(least), cache(held))
 
 
 def _lowest(of: Ready, still: Still) -> float:
-    """Least eigenvalue of free bodies that strain."""
-    out = []
-    for k, (K, link) in enumerate(zip(still.K, of.system.model.links, strict=True)):
-        rigid = 3 if link.planar else 6
-        if isinstance(of.parts[k], SparsePart):
-            out.append(sparse_frequency(link, rigid))
-        elif K.any():
-            out.append(float(np.linalg.eigvalsh(K)[rigid]))
-    return min(out, default=1.0)
+    """Least eigenvalue of free dense bodies that strain."""
+    every = zip(still.K, of.system.model.links, of.parts, strict=True)
+    dense = [(K, link) for K, link, part in every if not isinstance(part, SparsePart) and K.any()]
+    return min((float(np.linalg.eigvalsh(K)[3 if link.planar else 6]) for K, link in dense), default=1.0)
 
 
 def closure(of: Ready) -> Callable[[Flat], Flat]:

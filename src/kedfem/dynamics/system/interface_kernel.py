@@ -57,9 +57,9 @@ def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
         for m in range(c):
             x += RB[at + r * c + m] * z[columns[m]]
         if base:
-            of = bodies.Y_at[i] + r * N
+            row = W[bodies.Y_at[i] + r * N : bodies.Y_at[i] + (r + 1) * N]
             for y in range(N):
-                x -= W[of + y] * u[y]
+                x -= row[y] * u[y]
         w[first + r] = x
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
@@ -136,13 +137,11 @@ def march(
     ConvergenceError
         If the iterations of a step do not: with its time, the body that moves most, and all that came before.
     """
-    from kedfem.dynamics.system.step_kernel import marched
-
     arrays = of.bodies, of.ends, of.constraints
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
-    solved = solver(of.parts, of.bodies.at, of.bodies.port_at, trial)
+    solved, marched = solver(of.parts, of.bodies.at, of.bodies.port_at, trial), compiled_steps(of)
     while done < T:
         left = Driving(*(x[done:] for x in along)), History(*(x[done:] for x in history))
         taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
@@ -160,6 +159,17 @@ def march(
                 row[done] = found[-1]
             done += 1
     return state, history
+
+
+def compiled_steps(of: Ready) -> Callable[..., tuple[int, int]]:
+    """The compiled steps that a system needs: imported, and compiled, when they are."""
+    if of.c.single:
+        from kedfem.dynamics.system.linear_kernel import marched_linear
+
+        return cast("Callable[..., tuple[int, int]]", marched_linear)
+    from kedfem.dynamics.system.step_kernel import marched
+
+    return cast("Callable[..., tuple[int, int]]", marched)
 
 
 def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:

@@ -2,8 +2,8 @@
 
     r = history + c_f (F − f),   g = G Rᵀ r + Y w,   λ = S w − Yᵀ Rᵀ r,   w = Rᵀ B z − W Rᵀ b
 
-A linear system is done after one pass. Otherwise frames, constraints and laws are evaluated where the pass has led,
-Anderson acceleration chooses the step to take, and again.
+Frames, constraints and laws are evaluated where a pass has led, Anderson acceleration chooses the step to take, and
+again. A linear system is done after one: `linear_kernel`.
 """
 
 import numpy as np
@@ -15,7 +15,6 @@ from kedfem.dynamics.system.algebra_kernel import (
     add_transposed,
     copied,
     frame_copied,
-    ports_turned,
     product,
     turned,
     turned_back,
@@ -23,21 +22,25 @@ from kedfem.dynamics.system.algebra_kernel import (
 from kedfem.dynamics.system.bodies_kernel import (
     internal_forces,
     newmark,
-    nominal_end,
     orientation,
     own_end,
     residual,
-    right_hand_side,
 )
-from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,
     gathered,
     interface_solved,
-    newmark_rate,
     offset,
     pushed,
+)
+from kedfem.dynamics.system.nominal_kernel import (
+    constraints_end,
+    interface_end,
+    nominal_begin,
+    nominal_finish,
+    ported,
+    ports_end,
 )
 from kedfem.dynamics.system.record import NOMINAL
 from kedfem.dynamics.system.reference import reference
@@ -77,30 +80,20 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
     R, h = driving.R[t], c.h
     copied(state.turned, trial.turned)
     for m in range(len(trial.z)):
-        later = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
-        trial.z[m] = 0.0 if c.single else later
+        trial.z[m] = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
     for i in range(len(bodies.motion)):
-        first, last = bodies.at[i], bodies.at[i + 1]
-        q, N = bodies.port_at[i + 1] - bodies.port_at[i], last - first
         if bodies.frame[i] == NOMINAL:
-            frame_copied(R[bodies.motion[i]], trial.Rp[i])
-            right_hand_side(c, bodies, i, trial.Rp[i], driving.F[t], state, trial.r, work.room)
-            if not bodies.dense[i]:
-                solved(i)
-            else:
-                reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
-                product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
+            nominal_begin(c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work, solved)
             continue
-        for x in range(first, last):
+        for x in range(bodies.at[i], bodies.at[i + 1]):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
         frame_copied(state.Q[i], trial.Q[i])
         trial.angle[i] = state.angle[i]
-    if not c.single:
-        begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-        internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
-        for i in range(len(bodies.motion)):
-            if bodies.frame[i] != NOMINAL:
-                orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
+    begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
+    internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
+    for i in range(len(bodies.motion)):
+        if bodies.frame[i] != NOMINAL:
+            orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
     gathered(bodies, trial)
     if of.linear.any():
         on_lines(ends, driving.stations[t])
@@ -118,14 +111,13 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
         asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved)
         size, reached, worst = sizes(c, bodies, state, trial)
         allowed = c.tolerance if sweep < PATIENCE else EASIER * c.tolerance
-        settled = c.single or size <= allowed * allowed * reached + c.floor * c.floor
+        settled = size <= allowed * allowed * reached + c.floor * c.floor
         if not settled:
             mixed(memory, state.counts, sweep, trial.change)
         taken(c, bodies, trial)
         if not np.isfinite(size) or size > 1e30:
             break
-        if not c.single:
-            internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
+        internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
         if settled:
             state.passes[0] += count
             state.passes[1] += 1 if sweep >= PATIENCE else 0
@@ -178,25 +170,6 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  
 
 
 @inner
-def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
-    """trial.w and trial.force become displacements and forces at a body's interface points, in its frame."""
-    first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
-    q, at = last - first, bodies.B_at[i]
-    RB, w, dz, columns = (
-        trial.RB,
-        trial.w,
-        trial.dz,
-        bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]],
-    )
-    for r in range(q):
-        for m in range(c):
-            w[first + r] += RB[at + r * c + m] * dz[columns[m]]
-    product(bodies.S, bodies.S_at[i], q, q, trial.w[first:last], trial.force[first:last])
-    for r in range(first, last):
-        trial.force[r] -= trial.reaction[r]
-
-
-@inner
 def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     """Squares of the change asked for, and of what a step has moved; the body that changes most."""
     size, reached, most, worst, k = 0.0, 0.0, -1.0, -1, len(trial.z)
@@ -236,70 +209,12 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
     """What the passes found becomes the state, and row t of the history."""
     R, F = driving.R[t], driving.F[t]
     for i in range(len(bodies.motion)):
-        first, last = bodies.at[i], bodies.at[i + 1]
-        q, N, of_ports = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.port_at[i]
         if bodies.frame[i] != NOMINAL:
             own_end(c, bodies, i, R, F, trial.u, state, trial, history, t, work)
         else:
-            if bodies.dense[i]:
-                product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
-            else:
-                copied(trial.held[first:last], work.y[:N])
-            add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
-            copied(trial.r[first:last], work.turned[:N])
-            add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
-            nominal_end(
-                c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room, work.strained
-            )
-        ports_turned(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], work.room)
-        for r in range(q):
-            x = (work.room[r] - c.alpha_f * state.port_force[of_ports + r]) / (1 - c.alpha_f)
-            state.port_force[of_ports + r] = history.port_force[t, of_ports + r] = x
-    if not c.single:
-        ended(t, newmark(c), bodies.beams, R, trial.strained, state.strain, state.direction, state.turn, history.strain,
-              history.energy)  # fmt: skip
+            nominal_finish(c, bodies, i, F, trial, state, history, t, work)
+        ports_end(c, bodies, i, trial, state, history, t, work.room)
+    ended(t, newmark(c), bodies.beams, R, trial.strained, state.strain, state.direction, state.turn, history.strain,
+          history.energy)  # fmt: skip
     constraints_end(c, ends, of, driving, t, state, trial, work, history)
-    n0, n1, n2 = c.acceleration
-    for m in range(len(trial.z)):
-        second = n0 * (trial.z[m] - state.z[0, m]) - n1 * state.z[1, m] - n2 * state.z[2, m]
-        state.z[1, m] += c.late * second + c.early * state.z[2, m]
-        state.z[0, m], state.z[2, m] = trial.z[m], second
-        history.z[t, m] = trial.z[m]
-    state.time[0] = driving.t[t]
-
-
-@inner
-def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # type: ignore[no-untyped-def]
-    """Coordinates with their rates, forces along them, and their sum on z, at the end of the step."""
-    share = 1 - c.alpha_f
-    n0, n1, n2 = c.acceleration
-    if not of.linear.all():
-        placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
-    state.bearing[:] = 0.0
-    for a in range(len(of.law)):
-        e, rate = 0.0, 0.0
-        if of.linear[a]:
-            for m in range(len(trial.z)):
-                e += trial.C[a, m] * trial.z[m]
-        else:
-            trial.part[:] = 0.0
-            nominal = (driving.R[t], driving.v[t], driving.omega[t])
-            e, rate = coordinate(
-                ends, of, a, nominal, trial.moving, trial.turned, trial.part, work.end, work.vectors
-            )
-            if of.drive[a] >= 0:
-                e -= driving.drives[t, of.drive[a]]
-        second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]
-        state.e[1, a] += c.late * second + c.early * state.e[2, a]
-        state.e[0, a], state.e[2, a] = e, second
-        history.rate[t, a] = state.e[1, a]
-        if not of.linear[a] and of.drive[a] < 0:
-            history.rate[t, a] = rate
-            for m in range(len(trial.z)):
-                z0, z1, z2 = state.z[0, m], state.z[1, m], state.z[2, m]
-                history.rate[t, a] += trial.part[m] * newmark_rate(c, trial.z[m], z0, z1, z2)
-        state.multiplier[a] = trial.m[a] / share
-        for m in range(len(trial.z)):
-            state.bearing[m] += state.multiplier[a] * trial.C[a, m]
-        history.e[t, a], history.multiplier[t, a] = e, state.multiplier[a]
-    copied(trial.turned, state.turned)
+    interface_end(c, driving, t, trial, state, history)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.coupling import Attachment, joined
-from kedfem.dynamics.history import Forcing, LinkHistory
+from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import port_columns, turned_ports
@@ -105,17 +105,7 @@ class SystemSteps:
         self.ready = ready(system, scheme)
         self.oracle = oracle(self.ready) if literal else None
         self.factorisations = len(self.ready.parts)
-        every = list(zip(model.links, model.joints, system.model.joints, strict=True))
-        bodies = linkage(scene).bodies
-        inverse = [np.linalg.pinv(port_columns(joint, link.n)) for link, joint, _ in every]
-        self._to_ports = [
-            x @ port_columns(own, link.n) for x, (link, _, own) in zip(inverse, every, strict=True)
-        ]
-        self._bearings = [
-            _bearing(row, side, bodies, system.model, inverse)
-            for row in system.model.rows if row.name.startswith(("springs.", "motors."))
-            for side in (0, 1) if row.sides[side] is not None
-        ]  # fmt: skip
+        self._bearings, self._to_ports = _bearings(model, system.model, linkage(scene).bodies)
 
     def start(self, at_rest: bool, motion_at: Motion, rates: Sequence[Float[np.ndarray, "_ _"]]) -> State:
         """The state at t = 0.
@@ -143,6 +133,7 @@ class SystemSteps:
             u=state.u[None], v=state.v[None], a=state.a[None], F=state.F[None], g=g[None], strain=state.strain[:1],
             R=motion.R[:, bodies.motion], port_force=state.port_force[None], energy=np.zeros((1, len(self.links))),
             z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None], rate=state.e[1:2],
+            Kg=g[None, :0], Mv=g[None, :0], Cg=g[None, :0],
         )  # fmt: skip
         out = self._histories(found, forcing, motion)
         for k, (x, link) in enumerate(zip(out, self.links, strict=True)):
@@ -165,7 +156,7 @@ class SystemSteps:
             return self._histories(found, forcing, motion), later
         if not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
-        state, found = march(self.ready, state, motion)
+        state, found = march(self.ready, state, motion, loads=[each.F for each in forcing])
         return self._histories(found, forcing, motion), state
 
     def _histories(
@@ -176,10 +167,11 @@ class SystemSteps:
         bodies, out = self.ready.bodies, []
         at_ports = [
             _turned_back(joint, found.port_force[:, bodies.port_at[k] : bodies.port_at[k + 1]], each.R)
-            @ self._to_ports[k].T
             for k, (joint, each) in enumerate(zip(self.ready.system.model.joints, forcing, strict=True))
         ]
-        seen = supports(self.ready, self.scene, found, motion)
+        if self._bearings:
+            seen = supports(self.ready, self.scene, found, motion)
+            at_ports = [force @ to.T for force, to in zip(at_ports, self._to_ports, strict=True)]
         for one in self._bearings:
             R, c = forcing[one.k].R, one.bears
             y = np.zeros((len(R), len(one.weights), R.shape[1]))
@@ -188,8 +180,45 @@ class SystemSteps:
             at_ports[one.k] -= (y @ R).reshape(len(y), -1) @ one.to_ports.T
         for k, (each, F) in enumerate(zip(forcing, acting, strict=True)):
             u, v, a, g = (displacements(self.ready, k, x) for x in (found.u, found.v, found.a, found.g))
-            out.append(LinkHistory(u, v, a, g, each.R, each.F + F, at_ports[k], found.energy[:, k].copy()))
+            out.append(
+                LinkHistory(u, v, a, g, each.R, each.F + F, at_ports[k], found.energy[:, k].copy(),
+                            self._products(found, k, v))
+            )  # fmt: skip
         return out
+
+    def _products(self, found: History, k: int, v: Rows) -> Products | None:
+        """Products with the state of link k that its steps have at hand."""
+        part, link = self.ready.parts[k], self.links[k]
+        if not part.unit or not found.Kg.size or self.oracle is not None:
+            return None
+        Kg = displacements(self.ready, k, found.Kg)
+        if link.unknowns == part.G.shape[0]:
+            return Products(v, Kg, None)
+        Cg = displacements(self.ready, k, found.Cg) if self.model.damping.present else None
+        return Products(displacements(self.ready, k, found.Mv), Kg, Cg)
+
+
+def _bearings(
+    model: Model, seen: Model, bodies: Sequence[str]
+) -> tuple[list[Bearing], list[Float[np.ndarray, "_ _"]]]:
+    """Ends of all force elements, and per link what turns forces at interface points into those at ports of joints.
+
+    Parameters
+    ----------
+    seen : the model with interface points for force elements
+    bodies : of the linkage
+    """
+    elements = [row for row in seen.rows if row.name.startswith(("springs.", "motors."))]
+    if not elements:
+        return [], []
+    every = list(zip(model.links, model.joints, seen.joints, strict=True))
+    inverse = [np.linalg.pinv(port_columns(joint, link.n)) for link, joint, _ in every]
+    to_ports = [x @ port_columns(own, link.n) for x, (link, _, own) in zip(inverse, every, strict=True)]
+    found = [
+        _bearing(row, side, bodies, seen, inverse)
+        for row in elements for side in (0, 1) if row.sides[side] is not None
+    ]  # fmt: skip
+    return found, to_ports
 
 
 def _bearing(

@@ -1,0 +1,68 @@
+"""Steps of a linear system, compiled by numba: all bodies have nominal frames, one solution of the interface a step.
+
+Apart from `step_kernel`, whose passes a linear scene has no use for and need not wait to be compiled.
+"""
+
+from kedfem.compiled import compiled, inner
+from kedfem.dynamics.system.algebra_kernel import copied
+from kedfem.dynamics.system.ends_kernel import on_lines, placed
+from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
+from kedfem.dynamics.system.nominal_kernel import (
+    constraints_end,
+    interface_end,
+    nominal_begin,
+    nominal_finish,
+    ported,
+    ports_end,
+)
+from kedfem.dynamics.system.reference import reference
+
+
+@compiled
+def marched_linear(c, bodies, ends, of, driving, state, trial, work, history, solved):  # type: ignore[no-untyped-def]
+    """Take T steps in place; as `step_kernel.marched`, all of them."""
+    c, bodies, ends, of, driving = (
+        reference(c),
+        reference(bodies),
+        reference(ends),
+        reference(of),
+        reference(driving),
+    )
+    state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
+    trial.z[:] = 0.0
+    for t in range(len(driving.t)):
+        copied(state.turned, trial.turned)
+        for i in range(len(bodies.motion)):
+            R, F = driving.R[t, bodies.motion[i]], driving.F[t]
+            nominal_begin(c, bodies, i, R, F, state, trial, work, solved)
+        solved_at_once(c, bodies, ends, of, driving, t, state, trial, work)
+        for i in range(len(bodies.motion)):
+            nominal_finish(c, bodies, i, driving.F[t], trial, state, history, t, work)
+            ports_end(c, bodies, i, trial, state, history, t, work.room)
+        constraints_end(c, ends, of, driving, t, state, trial, work, history)
+        interface_end(c, driving, t, trial, state, history)
+        trial.z[:] = 0.0
+    state.passes[0] += len(driving.t)
+    state.passes[2] = max(state.passes[2], 1)
+    return len(driving.t), -1
+
+
+@inner
+def solved_at_once(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
+    """Interface unknowns, and displacements and forces of all bodies at their interface points."""
+    trial.right[:] = 0.0
+    for m in range(len(trial.z)):
+        trial.right[m] = c.alpha_f * state.bearing[m]
+    gathered(bodies, trial)
+    for i in range(len(bodies.motion)):
+        offset(bodies, i, work.y, trial, False)
+        pushed(bodies, i, trial)
+    if of.linear.any():
+        on_lines(ends, driving.stations[t])
+        trial.part[:] = 0.0
+        placed(ends, driving.R[t], driving.p[t], trial.part, trial.fixed, work.end, work.vectors)
+    evaluated(c, ends, of, driving, t, state, trial, work)
+    interface_solved(bodies, trial, True)
+    for i in range(len(bodies.motion)):
+        ported(bodies, i, trial)
+    copied(trial.dz, trial.z)

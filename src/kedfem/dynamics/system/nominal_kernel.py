@@ -1,0 +1,123 @@
+"""What a step does with a body whose frame is the nominal one, beginning and end, and the interface's end of a step."""
+
+from kedfem.compiled import inner
+from kedfem.dynamics.system.algebra_kernel import (
+    add_transposed,
+    copied,
+    frame_copied,
+    ports_turned,
+    product,
+)
+from kedfem.dynamics.system.bodies_kernel import nominal_end, right_hand_side
+from kedfem.dynamics.system.constraints_kernel import coordinate
+from kedfem.dynamics.system.ends_kernel import placed
+from kedfem.dynamics.system.interface_kernel import newmark_rate
+
+
+@inner
+def nominal_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: ignore[no-untyped-def]
+    """The right-hand side of a body, and what it exerts at its interface points while these are held."""
+    first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
+    frame_copied(R, trial.Rp[i])
+    right_hand_side(c, bodies, i, trial.Rp[i], F, state, trial.r, work.room)
+    if not bodies.dense[i]:
+        solved(i)
+        return
+    q = bodies.port_at[i + 1] - of_ports
+    reaction = trial.reaction[of_ports : of_ports + q]
+    product(bodies.Y, bodies.Y_at[i], q, last - first, trial.r[first:last], reaction)
+
+
+@inner
+def nominal_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
+    """The displacement of a body, g = G r + Y w, and its end of the step."""
+    first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
+    q, N = bodies.port_at[i + 1] - of_ports, last - first
+    if bodies.dense[i]:
+        product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
+    else:
+        copied(trial.held[first:last], work.y[:N])
+    add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
+    copied(trial.r[first:last], work.turned[:N])
+    add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
+    nominal_end(
+        c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room, work.strained
+    )
+
+
+@inner
+def ports_end(c, bodies, i, trial, state, history, t, room):  # type: ignore[no-untyped-def]
+    """Forces on a body at its interface points at the end of the step, world components."""
+    of_ports, q = bodies.port_at[i], bodies.port_at[i + 1] - bodies.port_at[i]
+    ports_turned(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], room)
+    for r in range(q):
+        x = (room[r] - c.alpha_f * state.port_force[of_ports + r]) / (1 - c.alpha_f)
+        state.port_force[of_ports + r] = history.port_force[t, of_ports + r] = x
+
+
+@inner
+def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
+    """trial.w and trial.force become displacements and forces at a body's interface points, in its frame."""
+    first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
+    q, at = last - first, bodies.B_at[i]
+    RB, w, dz, columns = (
+        trial.RB,
+        trial.w,
+        trial.dz,
+        bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]],
+    )
+    for r in range(q):
+        for m in range(c):
+            w[first + r] += RB[at + r * c + m] * dz[columns[m]]
+    product(bodies.S, bodies.S_at[i], q, q, trial.w[first:last], trial.force[first:last])
+    for r in range(first, last):
+        trial.force[r] -= trial.reaction[r]
+
+
+@inner
+def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # type: ignore[no-untyped-def]
+    """Coordinates with their rates, forces along them, and their sum on z, at the end of the step."""
+    share = 1 - c.alpha_f
+    n0, n1, n2 = c.acceleration
+    if not of.linear.all():
+        placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
+    state.bearing[:] = 0.0
+    for a in range(len(of.law)):
+        e, rate = 0.0, 0.0
+        if of.linear[a]:
+            for m in range(len(trial.z)):
+                e += trial.C[a, m] * trial.z[m]
+        else:
+            trial.part[:] = 0.0
+            nominal = (driving.R[t], driving.v[t], driving.omega[t])
+            e, rate = coordinate(
+                ends, of, a, nominal, trial.moving, trial.turned, trial.part, work.end, work.vectors
+            )
+            if of.drive[a] >= 0:
+                e -= driving.drives[t, of.drive[a]]
+        second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]
+        state.e[1, a] += c.late * second + c.early * state.e[2, a]
+        state.e[0, a], state.e[2, a] = e, second
+        history.rate[t, a] = state.e[1, a]
+        if not of.linear[a] and of.drive[a] < 0:
+            history.rate[t, a] = rate
+            for m in range(len(trial.z)):
+                z0, z1, z2 = state.z[0, m], state.z[1, m], state.z[2, m]
+                history.rate[t, a] += trial.part[m] * newmark_rate(c, trial.z[m], z0, z1, z2)
+        state.multiplier[a] = trial.m[a] / share
+        for m in range(len(trial.z)):
+            state.bearing[m] += state.multiplier[a] * trial.C[a, m]
+        history.e[t, a], history.multiplier[t, a] = e, state.multiplier[a]
+    copied(trial.turned, state.turned)
+
+
+@inner
+def interface_end(c, driving, t, trial, state, history):  # type: ignore[no-untyped-def]
+    """Interface unknowns with their rates, and the time, at the end of the step."""
+    n0, n1, n2 = c.acceleration
+    for m in range(len(trial.z)):
+        second = n0 * (trial.z[m] - state.z[0, m]) - n1 * state.z[1, m] - n2 * state.z[2, m]
+        state.z[1, m] += c.late * second + c.early * state.z[2, m]
+        state.z[0, m], state.z[2, m] = trial.z[m], second
+        history.z[t, m] = trial.z[m]
+    state.time[0] = driving.t[t]
