@@ -59,11 +59,9 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
     literal = scene.analysis.solver == "literal"
     stresses = stiffening(model) if scene.analysis.stiffening else None
-    # stiff hubs of beams in space cost the rates of the system's starts too many digits
-    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
-    damped = not hubs and any(row.damping.any() for row in model.rows)
+    damped = any(row.damping.any() for row in model.rows)
     acted = scene.springs or scene.motors or scene.analysis.initial_deflection or damped
-    if stresses is None and (acted or not (hubs or literal)):
+    if stresses is None and (acted or not literal):
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps

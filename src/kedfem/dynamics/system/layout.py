@@ -266,8 +266,15 @@ def factored(
 
 
 def is_large(link: Link) -> bool:
-    """Whether a body has a sparse factor: elements of beams with frames of their own never do."""
-    return link.unknowns > SMALL and (frame_of(link) != TANGENTIAL and link.element is None)
+    """Whether a body keeps a sparse factor and nodal coordinates: elements with frames of their own never do.
+
+    Beams in space with nominal frames do, however small: in coordinates in which mass is one their stiff hubs, which
+    have next to none, would be 1e11 times as stiff as they bend.
+    """
+    if frame_of(link) == TANGENTIAL or link.element is not None:
+        return False
+    hubs = link.kind == "spatial_beam" and link.full is None and link.fit is None
+    return link.unknowns > SMALL or hubs
 
 
 def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
