@@ -23,7 +23,9 @@ from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
+from kedfem.dynamics.system.start import from_links
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
@@ -59,9 +61,11 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
     literal = scene.analysis.solver == "literal"
     stresses = stiffening(model) if scene.analysis.stiffening else None
-    damped = any(row.damping.any() for row in model.rows)
+    # the system's starts know dampers of bushings, but lose digits where constraint equations are beside stiff links
+    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
+    damped = not hubs and any(row.damping.any() for row in model.rows)
     acted = scene.springs or scene.motors or scene.analysis.initial_deflection or damped
-    if stresses is None and (acted or not literal):
+    if stresses is None and (acted or not (literal or model.rows)):
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
@@ -166,9 +170,14 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
         return solver.begin(lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)))
     if not isinstance(solver, SystemSteps):
         return first_states(scene, linkage, along, model, stresses_of(solver))
+
+    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
+        return rigid_motion(linkage, along, t, path_parameter(scene, t))
+
+    if solver.ready.c.single and not scene.analysis.initial_deflection and not model.rows:
+        return from_links(Instant(solver.ready, motion_at, 0.0), first_states(scene, linkage, along, model))
     at_rest = scene.analysis.initial == "rest"
-    rates = initial_rates(scene, linkage, model) if at_rest else []
-    return solver.start(at_rest, lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)), rates)
+    return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])
 
 
 def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByLink, states: Start) -> Any:

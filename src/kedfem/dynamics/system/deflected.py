@@ -29,7 +29,7 @@ SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 KRYLOV = 60
 CONVERGED = 1e-10  # change of a sweep, of the deflection
-ROUNDING = 1e-8  # of the deflection: changes below it that do not fall are rounding
+ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
@@ -175,9 +175,9 @@ def _balanced(
             break
         if settled:  # once more: what is left of stiff hubs would be large accelerations
             return np.asarray(u + change)
-        u = u + mixing.step(change)
+        u = u + (change if of.c.single else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        stalls = size > last / 2 and size <= ROUNDING * reached
+        stalls = size > last / 2 and size <= (LINEAR if of.c.single else ROUNDING) * reached
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise SolveError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "

@@ -156,7 +156,7 @@ def march(
             except ConvergenceError as failed:
                 raise ConvergenceError(last, state, before, done, failed.moves) from None
             for row, found in zip(history, parts, strict=True):
-                row[done] = found[-1]
+                row[done : done + 1] = found[-1:]  # none of what only sparse bodies have
             done += 1
     return state, history
 

@@ -8,7 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import coordinates
+from kedfem.dynamics.dense import coordinates, work_on
+from kedfem.dynamics.ports import turned_ports
+from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.balance import Asked, Balance, Solved, mass_body
@@ -37,6 +39,29 @@ def rest(
     now = Instant(of, motion_at, time)
     v = as_coordinates(of, rates or [])
     return begun(now, np.zeros_like(v), v, accelerated)
+
+
+def from_links(now: Instant, links: Sequence[LinkState]) -> State:
+    """The state whose displacements, rates, accelerations and forces are those of links in nodal rows.
+
+    Nodal rows know internal forces of links a million times as stiff as others to more digits than coordinates do.
+    """
+    of, joints = now.of, now.of.system.model.joints
+    u, v = (as_coordinates(of, [getattr(x, name) for x in links]) for name in "uv")
+    state = begun(now, u, v)
+    state.a[:] = as_coordinates(of, [x.a for x in links])
+    state.z[2, now.always.number] = now.interface(state.a)
+    for k, (part, joint, x) in enumerate(zip(of.parts, joints, links, strict=True)):
+        here, ports = own(of, k), slice(int(of.bodies.port_at[k]), int(of.bodies.port_at[k + 1]))
+        N = here.stop - here.start
+        state.f[here] = work_on(part, x.f @ x.R.T).ravel()
+        state.port_force[ports] = turned_ports(joint, x.R[None], x.port_forces[None])[0]
+        for m, each in enumerate(x.C if x.C is not None else ()):
+            state.damped[3 * here.start + m * N : 3 * here.start + (m + 1) * N] = work_on(part, each).ravel()
+        if isinstance(part, SparsePart):
+            moved = [each.T.ravel() for each in (x.Mu, x.Mv, x.Ma)]
+            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moved)
+    return state
 
 
 def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
