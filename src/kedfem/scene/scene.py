@@ -106,6 +106,12 @@ class Scene(Record):
     _doubts: tuple[str, ...] = PrivateAttr(())
     _as_given: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether all keys have the same values, however they were written."""
+        return isinstance(other, Scene) and dict(self) == dict(other)
+
+    __hash__ = None  # type: ignore[assignment]  # its tables have none
+
     @property
     def source(self) -> str | None:
         """Text of the scene file, or None for a scene from Python."""
