@@ -12,6 +12,8 @@ import pytest
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality
 from kedfem.mesh.apart import LONGEST
+from kedfem.mesh.cad import file
+from kedfem.mesh.cad.file import imported
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import Cad, link_from
@@ -116,6 +118,26 @@ def test_a_damaged_file_gives_a_mesh_or_a_sentence(
 ) -> None:
     for number in (1,) if ending in FORMATS else (0, 2):
         check(sound, tmp_path, ending, number, capfd)
+
+
+def test_a_damaged_file_after_a_sound_one_is_not_read_for_ever(
+    sound: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert not check(sound, tmp_path, "step", 22, capfd)
+    assert check(sound, tmp_path, "step", 23, capfd)
+    # OpenCASCADE hung at the tenth reading of this file after a sound one: at most one plain, five that sew
+    reads = 0
+
+    def counted(*given: object, **more: object) -> None:
+        nonlocal reads
+        reads += 1
+        imported(*given, **more)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch, gmsh_model() as gmsh:
+        patch.setattr(file, "imported", counted)
+        with pytest.raises(MeshError, match="faces that do not close"):
+            file.read_solids(gmsh, file.cad_file("links.arm", tmp_path / "part.step", None))
+    assert reads == 6
 
 
 @pytest.mark.long

@@ -99,9 +99,10 @@ def read_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
     scaling = _scaling(file)
     imported(gmsh, file, scaling, sewing=None)
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
-    if solids or not gmsh.model.getEntities(2):
-        _check_any(gmsh, file, solids)
+    if solids:
         return solids, ""
+    if not gmsh.model.getEntities(2):
+        raise _refusal(gmsh, file)
     boxes = np.array([gmsh.model.getBoundingBox(2, tag) for tag in _faces(gmsh)])
     extent = 0.0
     if np.abs(boxes).max() < _ENDLESS:
@@ -113,20 +114,21 @@ def read_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
         if not _free_edges(gmsh, _faces(gmsh)):
             break
     solids = _closed_solids(gmsh)
-    for gap in () if solids else (share * extent for share in _GAPS):
-        _clear(gmsh)
-        imported(gmsh, file, scaling, sewing=None)
+    if solids:
+        return solids, ""
+    refusal = _refusal(gmsh, file)
+    for gap in (share * extent for share in _GAPS):  # not read again: see _healed
         if _healed(gmsh, gap) and not _free_edges(gmsh, _faces(gmsh)):
             return [tag for _, tag in gmsh.model.getEntities(3)], f"faces up to {1e3 * gap:.2g} mm apart sewn"
-    if not solids:
-        _clear(gmsh)
-        imported(gmsh, file, scaling, sewing=_SEWING[-1])
-    _check_any(gmsh, file, solids)
-    return solids, ""
+    raise refusal
 
 
 def _healed(gmsh: ModuleType, tolerance: float) -> bool:
-    """Whether there are solids once OpenCASCADE has mended all shapes of the model: wires, tiny edges, gaps [m]."""
+    """Whether there are solids once OpenCASCADE has mended all shapes of the model: wires, tiny edges, gaps [m].
+
+    Called with growing tolerances on one import: OpenCASCADE may never come back from a damaged file that it reads
+    again and again.
+    """
     try:
         with silent():
             gmsh.model.occ.healShapes([], tolerance=tolerance)
@@ -241,18 +243,16 @@ def _shells(gmsh: ModuleType) -> list[list[int]]:
     return sorted(tags for tags, _ in groups)
 
 
-def _check_any(gmsh: ModuleType, file: CadFile, solids: list[int]) -> None:
-    """Refuse a file without a solid, and say what is in it instead."""
-    if solids:
-        return
+def _refusal(gmsh: ModuleType, file: CadFile) -> MeshError:
+    """Why a file without a solid is refused: what is in it instead."""
     faces = _faces(gmsh)
     if not faces:
         curves = len(gmsh.model.getEntities(1))
         got = f"{curves} curves" if curves else "nothing"
-        raise MeshError(f"{file.where}: must hold a solid, got {got} and no faces in {file.path}")
+        return MeshError(f"{file.where}: must hold a solid, got {got} and no faces in {file.path}")
     free = _free_edges(gmsh, faces)
     X = gmsh.model.occ.getCenterOfMass(1, free[0]) if free else (0.0, 0.0, 0.0)
-    raise MeshError(
+    return MeshError(
         f"{file.where}: must hold a solid, got faces that do not close ({len(faces)} of them, "
         f"{len(free)} free edges, one at {in_mm(X)}) in {file.path}; "
         "close them, or export the part as a solid"
