@@ -1,5 +1,6 @@
 """Dense, condensed and literal steps of one model; the compiled loop without its compiler; runs that end early."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from kedfem.dynamics.system import (
     nominal_kernel,
 )
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.dynamics.transient import Steps, snapshots, steps_of, transient
+from kedfem.dynamics.transient import Steps, snapshots, started, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel
@@ -180,3 +181,18 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
     assert relative_errors(flat, reference)[names[0]] == pytest.approx(4 / 5)
     half = run(t[:6], {names[0]: vectors(t[:6], 0.1)})
     assert relative_errors(half, reference)[names[0]] == pytest.approx(0.1 / 5)
+
+
+def test_an_interruption_while_a_large_link_is_solved_ends_the_march() -> None:
+    """Compiled steps call back for sparse factors: what is raised there must not be printed and forgotten."""
+    ready = meshed(scene_from(four_bar("plate", turns=0.1, steps_per_turn=40)))
+    solver: Any = steps_of(ready.scene, ready.model)
+
+    def stopped(r: np.ndarray) -> Any:
+        raise KeyboardInterrupt
+
+    start = started(ready.scene, ready.linkage, ready.path, ready.model, solver)
+    solver.ready.parts[1] = replace(solver.ready.parts[1], held=stopped)
+    given = ready.scene, ready.linkage, ready.path, ready.model, solver, start
+    with pytest.raises(KeyboardInterrupt):
+        list(transient(*given))

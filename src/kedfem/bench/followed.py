@@ -15,7 +15,8 @@ from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
-from kedfem.dynamics.transient import Steps, first_states, steps_of, transient
+from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.transient import Steps, begun, started, steps_of, transient
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, path_parameter, scene_from
@@ -113,23 +114,25 @@ def _motion_at(ready: Prepared) -> Motion:
 
 def first_state(ready: Prepared, solver: Any) -> Any:
     """A solver's own state at the start."""
-    if isinstance(solver, CorotationalSteps):
-        return solver.begin(_motion_at(ready))
-    return solver.begin(first_states(ready.scene, ready.linkage, ready.path, ready.model))
+    given = ready.scene, ready.linkage, ready.path, ready.model, solver
+    states = started(*given)
+    return states if isinstance(solver, CorotationalSteps) else begun(*given, states)
 
 
 def advanced(
     ready: Prepared, solver: Any, state: Any, forcing: Sequence[Forcing], motion: RigidMotion
 ) -> Any:
-    """A solver's state after some steps."""
+    """What a solver hands on of some steps: links first, its state last."""
     known: tuple[Any, ...] = (forcing,)
     if isinstance(solver, CorotationalSteps):
         known = (forcing, motion, _motion_at(ready))
-    return solver.advance(state, *known)[-1]
+    if isinstance(solver, SystemSteps):
+        known = (forcing, motion)
+    return solver.advance(state, *known)
 
 
 def _timed(ready: Prepared, solver: Any, state: Any, motion: RigidMotion) -> tuple[float, Any]:
     forcing = forcings(ready.model, motion)
     since = process_time()
-    state = advanced(ready, solver, state, forcing, motion)
+    state = advanced(ready, solver, state, forcing, motion)[-1]
     return process_time() - since, state

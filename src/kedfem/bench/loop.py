@@ -15,7 +15,7 @@ from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.transient import first_states, steps_of
+from kedfem.dynamics.transient import steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 
@@ -58,14 +58,13 @@ def recorded_rate(ready: Prepared) -> float:
     """Steps a second with all probes and joint forces at every step; the rigid motion is known."""
     scene, model = ready.scene, ready.model
     known = list(motions(scene, ready.linkage, ready.path))
-    states = first_states(scene, ready.linkage, ready.path, model)
     recorded = recording(scene, model)
     solver: Any = steps_of(scene, model)
 
     def all_steps() -> None:
-        state = solver.begin(states)
+        state = first_state(ready, solver)
         for first, motion in known:
-            links, state = solver.advance(state, forcings(model, motion))
+            links, *_, state = advanced(ready, solver, state, forcings(model, motion), motion)
             rows(recorded, Block(first, motion, links))
 
     all_steps()

@@ -16,10 +16,12 @@ from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.state import LinkState, Nominal
-from kedfem.dynamics.transient import Steps, snapshots, steps_of
+from kedfem.dynamics.transient import Steps, snapshots
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
+from kedfem.scene import time_grid
 
 SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100
@@ -73,7 +75,9 @@ def _stepped(size: tuple[int, int, int], solver: str, steps: int) -> "_Measured"
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
-    taken = steps_of(scene, model)
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    kind = LiteralSteps if solver == "literal" else CondensedSteps
+    taken = kind(model.links, model.joints, scheme, model.damping)
     watch = _Stopwatch(taken)
     run = snapshots(scene, joined, along, model, taken)
     states = [snapshot.states for snapshot in islice(run, 1, None)][:LITERAL_STEPS]

@@ -51,7 +51,7 @@ as *where: what was wanted, what was got*.
   an expression of them: `width = "=2*r + 5 mm"`. `+ - * / ^` and brackets, `pi`, `sqrt`, `abs`, `min`, `max`, `hypot`,
   `sin`, `cos`, `tan` (of angles), `asin`, `acos`, `atan`, `atan2`, `exp`, `log`. A unit follows its number and belongs to
   it, powers and quotients included: `1/5 N/m` is 1/(5 N/m). Units are checked: `25 mm + 3` and `25 mm + 3 s` are faults;
-  so are `50 Hz` where rad/s is wanted (`2*pi rad` times it is not: `"=1 rad*2*pi*f"`). What has no unit in the end
+  so is `50 Hz` where rad/s is wanted (write `"=2*pi*1 rad*f"`). What has no unit in the end
   is in SI, or a count. At most {longest} letters, exponents up to {power:g}. Parameters may be expressions of each other.
 * **Included files:** `include = ["materials.toml"]`, before all tables, takes over the tables of other scene files, key
   by key; what the scene states itself stands, of several files the later one, and a table of another `kind` replaces the

@@ -145,6 +145,7 @@ def march(
     while done < T:
         left = Driving(*(x[done:] for x in along)), History(*(x[done:] for x in history))
         taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
+        solved.check()
         done += int(taken)
         if done < T:
             last, before = float(motion.t[done]), History(*(x[:done] for x in history))

@@ -120,10 +120,16 @@ def solver(
         for k, part in enumerate(parts) if isinstance(part, SparsePart)
     }  # fmt: skip
 
+    failed: list[BaseException] = []
+
     def solved(k: int) -> int:
-        part, here, there = every[k]
-        g, trial.reaction[there] = part.held(trial.r[here].reshape(part.components, -1).T)
-        trial.held[here].reshape(part.components, -1)[:] = g.T
+        if not failed:
+            try:
+                part, here, there = every[k]
+                g, trial.reaction[there] = part.held(trial.r[here].reshape(part.components, -1).T)
+                trial.held[here].reshape(part.components, -1)[:] = g.T
+            except BaseException as error:  # noqa: BLE001  (an interruption too: ctypes would print it and go on)
+                failed.append(error)
         return 0
 
     class Called(types.WrapperAddressProtocol):
@@ -134,5 +140,10 @@ def solver(
 
         def signature(self) -> Any:
             return types.int64(types.int64)
+
+        def check(self) -> None:
+            """Raise what was raised within a call."""
+            if failed:
+                raise failed[0]
 
     return Called()
