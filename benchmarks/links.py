@@ -39,7 +39,7 @@ def hinge(one: str, other: str, at: Any) -> Raw:
 def scene(links: Raw, joints: Raw, **more: Any) -> Raw:
     """With 100 steps of 0.5 ms from rest; neither pictures nor animation."""
     usual = {
-        "analysis": {"end_time": STEPS * 5e-4, "step": 5e-4, "initial": "rest", "frames": "nominal"},
+        "analysis": {"end_time": STEPS * 5e-4, "step": 5e-4, "initial": "rest", "frames": "rigid-body"},
         "output": {"animation": None, "plots": False, "picture": False, "csv": False},
     }
     return {"links": links, "joints": joints, **usual, **more}
@@ -86,12 +86,12 @@ def each_driven(n: int) -> Raw:
 
 
 def pendulum(n: int) -> Raw:
-    """A chain of bars that falls from the horizontal: no drive, frames that follow."""
+    """A chain of bars that falls from the horizontal: no drive, co-rotational frames."""
     at = [np.array([0.1 * k, 0.0, 0.0]) for k in range(n + 1)]
     links = {f"l{k}": beam(at[k], at[k + 1]) for k in range(n)}
     joints = {f"J{k}": hinge("ground" if k == 0 else f"l{k - 1}", f"l{k}", at[k]) for k in range(n)}
     raw = scene(links, joints, gravity=[0.0, -9.81, 0.0])
-    raw["analysis"]["frames"] = "following"
+    raw["analysis"]["frames"] = "co-rotational"
     return raw
 
 

@@ -89,7 +89,7 @@ SOLIDS = {  # elements of crank, coupler and rocker
 
 def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
     """A four-bar of solid links; those of four elements reduced."""
-    raw = hinged("nominal", "solid", steps=360, analysis={"initial": "rest", "turns": 1})
+    raw = hinged("rigid-body", "solid", steps=360, analysis={"initial": "rest", "revolutions": 1})
     for link, count in zip(raw["links"].values(), elements, strict=True):
         link["mesh"] = {"elements": count}
         link["fidelity"] = "reduced" if count[0] == 4 else "solid"
@@ -132,7 +132,7 @@ def main() -> None:
         "four-bar of beams, nominal": (four_bar(), STEPS),
         "the same with one spring, which runs on the system": (with_spring(), STEPS),
         "four-bar of beams, co-rotational": (
-            four_bar(2, analysis={**four_bar()["analysis"], "frames": "following"}),
+            four_bar(2, analysis={**four_bar()["analysis"], "frames": "co-rotational"}),
             STEPS,
         ),
     }

@@ -34,7 +34,7 @@ from kedfem.links.solid import solid_basis
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.bounds import determinant_bounds
 from kedfem.mesh.cad.model import CadKeys
-from kedfem.mesh.ways import made_mesh
+from kedfem.mesh.methods import made_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from
 
@@ -74,7 +74,8 @@ def chamfered(occ: Occ, tag: int, width: float, chosen: Callable[[Point, Point],
 
 
 def swept(occ: Occ, radius: float, bends: list[Point], inner: float = 0.0) -> int:
-    """A round bar, or a tube, along arcs in the plane z = 0: start, middle and end of each, in order, from x = 0 along y."""
+    """A round bar, or a tube, along arcs in the plane z = 0: start, middle and end of each, in order, from x = 0 along
+    y."""
     tags = []
     for r in (radius, inner):
         if r == 0:
@@ -709,8 +710,8 @@ def row(name: str, folder: Path) -> tuple[str, SolidMesh | None]:
 
 HEAD = """# Parts as designers draw them, meshed at default sizes
 
-Written by `python -m geometry.catalogue`: each part is drawn by geometry/catalogue.py, written to STEP (two to BREP, in inches
-and in metres) and meshed as it comes. Seconds are of processor time. det J is the least proven in
+Written by `python -m geometry.catalogue`: each part is drawn by geometry/catalogue.py, written to STEP (two to BREP, in
+inches and in metres) and meshed as it comes. Seconds are of processor time. det J is the least proven in
 any element, over its mean there. {summary}
 
 ![Swept about an axis, or along lines and arcs](pictures/swept.png)

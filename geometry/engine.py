@@ -1,4 +1,4 @@
-"""A slider-crank engine, an assembly of crank, rod and slider in its drawn position.
+"""A slider-crank engine, an assembly of crank, rod and slider in its reference position.
 
 Main axis along z through the origin, slider along x. Crank radius 40 mm, rod 140 mm, the crank drawn at 60 degrees.
 """

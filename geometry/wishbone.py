@@ -1,7 +1,7 @@
 """Wishbone: two bushing eyes along x at (-90, 0, 0) and (90, 0, 0), and a ball seat at (25, 240, 18).
 
 Forged: legs of round, tapering section to the boss of the ball joint, fillets at both ends, a cross brace welded on. The
-seat is a sphere of radius 15, open towards +z.
+coupling surface is a sphere of radius 15, open towards +z.
 """
 
 from math import pi
@@ -51,5 +51,5 @@ def _between(start: Point, end: Point) -> Point:
 
 
 def _rim(at: Point) -> bool:
-    """The circles at the ends of the seat's boss."""
+    """The circles at the ends of the coupling surface's boss."""
     return any(abs(at[2] - SEAT[2] - height) < 0.1 for height in SEAT_HEIGHTS)

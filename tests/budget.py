@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.accuracy.budget import Budget, by_kind
+from kedfem.accuracy.error_budget import Budget, by_kind
 from kedfem.accuracy.estimates import budget, watcher
 from kedfem.accuracy.histories import histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
@@ -66,10 +66,15 @@ class Judged:
         return max(said, COUNTED) / max(true, COUNTED)
 
 
-def four_bar(speed: float, steps: int, links: Raw, turns: float = 1.0, **analysis: Any) -> Raw:
+def four_bar(speed: float, steps: int, links: Raw, revolutions: float = 1.0, **analysis: Any) -> Raw:
     raw = tomllib.loads((EXAMPLES / "four_bar_beams" / "scene.toml").read_text())
     raw["drive"]["motion"]["speed"] = f"{speed} rpm"
-    raw["analysis"] = {"turns": turns, "steps_per_turn": steps, "initial": "quasi-static", **analysis}
+    raw["analysis"] = {
+        "revolutions": revolutions,
+        "steps_per_revolution": steps,
+        "initial": "quasi-static",
+        **analysis,
+    }
     for link in raw["links"].values():
         link.update(links)
     return raw
@@ -104,20 +109,22 @@ FINE = beams("beam5", 4)
 def cases() -> Iterator[Case]:
     """Thirty: beams, quadrilaterals, hexahedra; nominal and following; 60 to 600 rpm; smooth and sudden. Then in full."""
     for speed in (60, 150, 300, 600):
-        fine = four_bar(speed, 4320, FINE, frames="following")
+        fine = four_bar(speed, 4320, FINE, frames="co-rotational")
         for element, count in (("beam3", 1), ("beam5", 1), ("beam5", 3)):
             name = f"{speed} rpm, {count} {element} a link, nominal"
             yield Case(name, four_bar(speed, 720, beams(element, count)), fine)
         for element, count in (("beam3", 2), ("beam5", 2)) if speed > 60 else ():
-            raw = four_bar(speed, 720, beams(element, count), frames="following")
+            raw = four_bar(speed, 720, beams(element, count), frames="co-rotational")
             yield Case(f"{speed} rpm, {count} {element} a link, following", raw, fine)
     for speed in (60, 150):
-        fine = four_bar(speed, 4320, FINE, frames="following")
+        fine = four_bar(speed, 4320, FINE, frames="co-rotational")
         yield Case(f"{speed} rpm, 2 beam5, 120 steps a turn", four_bar(speed, 120, beams("beam5", 2)), fine)
-        rest = {"initial": "rest", "turns": 0.5}
+        rest = {"initial": "rest", "revolutions": 0.5}
         raw = four_bar(speed, 1440, beams("beam5", 1), **rest)
         yield Case(
-            f"{speed} rpm, 1 beam5, from rest", raw, four_bar(speed, 11520, FINE, frames="following", **rest)
+            f"{speed} rpm, 1 beam5, from rest",
+            raw,
+            four_bar(speed, 11520, FINE, frames="co-rotational", **rest),
         )
     for fidelity, tail in (("plane", []), ("solid", [1])):
         fine = four_bar(60, 1440, {"fidelity": fidelity, "mesh": {"elements": [16, 2, *tail]}}, 0.5)
@@ -126,8 +133,8 @@ def cases() -> Iterator[Case]:
             yield Case(f"60 rpm, {fidelity} {along} × 1 a link", four_bar(60, 720, links, 0.5), fine)
     for sudden in (False, True):
         word = "struck" if sudden else "swung"
-        fine = arm(8000, FINE, sudden, "following")
-        for frames, count in (("nominal", 1), ("following", 2)):
+        fine = arm(8000, FINE, sudden, "co-rotational")
+        for frames, count in (("rigid-body", 1), ("co-rotational", 2)):
             yield Case(
                 f"arm {word}, {count} beam3, {frames}", arm(1000, beams("beam3", count), sudden, frames), fine
             )
@@ -138,13 +145,15 @@ def cases() -> Iterator[Case]:
 def in_full() -> Iterator[Case]:
     """Six with hexahedra that are not reduced, meshes small."""
     for speed in (60, 150):
-        fine = four_bar(speed, 1440, solids(16, 2), 0.5, frames="following" if speed > 60 else "nominal")
+        fine = four_bar(
+            speed, 1440, solids(16, 2), 0.5, frames="co-rotational" if speed > 60 else "rigid-body"
+        )
         for along in (4, 8):
             raw = four_bar(speed, 720, solids(along, 1), 0.5)
             yield Case(f"{speed} rpm, solid {along} × 1 a link, in full", raw, fine, full=True)
     for sudden in (False, True):
-        fine = arm(4000, solids(20, 2), sudden, "following")
-        raw = arm(1000, solids(8, 1), sudden, "nominal")
+        fine = arm(4000, solids(20, 2), sudden, "co-rotational")
+        raw = arm(1000, solids(8, 1), sudden, "rigid-body")
         yield Case(f"arm {'struck' if sudden else 'swung'}, solid 8 × 1, in full", raw, fine, full=True)
 
 
@@ -175,7 +184,7 @@ def page(found: list[Judged]) -> str:
     lines = [
         "# What a run says of its errors, against what they are", "",
         "Written by `python -m tests.budget`. Truth: the largest difference in time of the worst channel of a kind,",
-        "of its peak, from a run with frames that follow, finer elements and shorter steps. In percent:",
+        "of its peak, from a run with co-rotational frames, finer elements and shorter steps. In percent:",
         "estimate / truth. Worst: the largest of each. Truths below 0.1 % are not judged.", "",
         f"Of {len(found)} runs {100 * within:.0f} % are within a factor of three at their worst; the least ratio of",
         f"estimate and truth of any kind is {min(each.least for each in found):.2f}.", "",

@@ -26,7 +26,7 @@ from tests.partners import IN_PLANE, chain
 from tests.systems import Begun, begun, by_oracle, marched, rows
 
 Raw = dict[str, Any]
-FRAMES = ("nominal", "stiffening", "following")
+FRAMES = ("rigid-body", "stiffening", "co-rotational")
 #: kinds of links that a joint joins
 LINKS: dict[str, tuple[str, str]] = {
     "beams in space": ("beam", "beam"), "solids": ("solid", "solid"), "reduced": ("reduced", "beam"),
@@ -39,10 +39,10 @@ LINKS: dict[str, tuple[str, str]] = {
 IN_A_PLANE = ("planar beams", "plane links", "plane and beam", "planar rigid", "plane on the ground")
 LAWS = (
     "loads", "loads that turn", "spring between points", "spring on the joint", "motor on the joint",
-    "motor at the crank", "bushing", "damped bushing", "bushing against turns", "shaft", "drive on the joint", "gear",
+    "motor at the crank", "bushing", "damped bushing", "bushing against rotations", "shaft", "drive on the joint", "gear",
     "rack", "point mass", "damping", "damping of mass", "no numerical damping",
 )  # fmt: skip
-WITHIN = {"nominal": 1e-8, "stiffening": 1e-8, "following": 1e-7}
+WITHIN = {"rigid-body": 1e-8, "stiffening": 1e-8, "co-rotational": 1e-7}
 #: nominal, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
 #: changed by 1e-14 of itself changes what it finds by 8.5e-8 of the peak, and what the oracle finds by 4e-11
 ROUNDED = 5e-7
@@ -71,7 +71,7 @@ class Cell:
     @property
     def within(self) -> float:
         """What its displacements may differ by from the oracle's, of their peak."""
-        return ROUNDED if self.frames == "nominal" and not self.plane else WITHIN[self.frames]
+        return ROUNDED if self.frames == "rigid-body" and not self.plane else WITHIN[self.frames]
 
     @property
     def drawn(self) -> bool:
@@ -128,9 +128,9 @@ def scene_of(cell: Cell) -> Raw:
                 "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
             }
         if link.get("reduced"):
-            link["functions"] = 6
+            link["modes"] = 6
     raw["analysis"] |= {"initial": "rest", "end_time": STEPS * 5e-4}
-    raw["analysis"] |= {"frames": "following" if cell.frames == "following" else "nominal"}
+    raw["analysis"] |= {"frames": "co-rotational" if cell.frames == "co-rotational" else "rigid-body"}
     if cell.frames == "stiffening":
         raw["analysis"]["stiffening"] = True
     speed = 0.3 if (on_joint and cell.joint == "prismatic") or (cell.joint, cell.links) in FAST else 3.0
@@ -157,7 +157,7 @@ def scene_of(cell: Cell) -> Raw:
 
 BUSHINGS: dict[str, Raw] = {
     "bushing": {"stiffness": 1e6}, "damped bushing": {"stiffness": 1e6, "damping": 300.0},
-    "bushing against turns": {"stiffness": 1e6, "turning_stiffness": 2e3, "turning_damping": 0.3},
+    "bushing against rotations": {"stiffness": 1e6, "rotational_stiffness": 2e3, "rotational_damping": 0.3},
 }  # fmt: skip
 
 
@@ -231,7 +231,7 @@ def executed(cell: Cell) -> tuple[str, float]:
         run = run_of(of)
         if cell.frames == "stiffening":
             return "ran", apart(run, run_of(of, literal=True))
-        of = as_a_run(of) if cell.frames == "following" else of
+        of = as_a_run(of) if cell.frames == "co-rotational" else of
         wanted = by_oracle(of, STEPS, keeps=True)[0]
         found = [rows(of.ready, marched(of, STEPS)[1].u)]
         if "rigid" not in cell.links:

@@ -106,7 +106,8 @@ def port_wrench(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.
 
 
 def twist(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.ndarray:
-    """Displacement and LENGTH times turn of a link's seat at a joint's point (T, 6), by its ports; none of the ground."""
+    """Displacement and LENGTH times turn of a link's coupling surface at a joint's point (T, 6), by its ports; none of
+    the ground."""
     at = bodies(ready, blocks)
     P = point_of(ready, at, name)
     if on == GROUND:
@@ -125,7 +126,8 @@ def twist(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.ndarra
 def seat_motion(
     ready: Prepared, blocks: list[Block], name: str, on: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle of a joint's or gears' seat, its displacement and turn, world components (T, 3), from its ports."""
+    """Middle of a joint's or gears' coupling surface, its displacement and turn, world components (T, 3), from its
+    ports."""
     X, u = port_motion(ready, blocks, name, on)
     x = bodies(ready, blocks).place(on, X)
     turn = np.stack([_turn(dx, du) for dx, du in zip(x[:, 1:] - x[:, :1], u[:, 1:] - u[:, :1], strict=True)])

@@ -50,7 +50,7 @@ def inverted(fidelity: str = "beam", kind: str = "prismatic", **analysis: Any) -
         joints["C"] = {"kind": "revolute", "links": ["crank", "block"], "at": [0.1, 0]}
         at = [0.15, 0] if fidelity == "beam" else [0.13, 0.015]
         joints["S"] = {"kind": "prismatic", "links": ["block", "arm"], "at": at, "axis": "x"}
-    steps = {"turns": 0.25, "steps_per_turn": 720, "initial": "quasi-static", **analysis}
+    steps = {"revolutions": 0.25, "steps_per_revolution": 720, "initial": "quasi-static", **analysis}
     given = {key: value for key, value in steps.items() if value is not None}
     return {"links": links, "joints": joints, "drive": turning(), "analysis": given}
 
@@ -109,7 +109,13 @@ def cardan(kind: str = "cylindrical", bend: float = 0.4, **analysis: Any) -> dic
         "B": {"kind": kind, "links": ["second", "ground"], "at": end.tolist(), "axis": d.tolist()},
         "W": {"kind": "weld", "links": ["second", "arm"], "at": end.tolist()},
     }
-    steps = {"turns": 0.5, "steps_per_turn": 360, "initial": "quasi-static", "rho_inf": 0.9, **analysis}
+    steps = {
+        "revolutions": 0.5,
+        "steps_per_revolution": 360,
+        "initial": "quasi-static",
+        "rho_inf": 0.9,
+        **analysis,
+    }
     return {"links": links, "joints": joints, "drive": turning("300 rpm"), "analysis": steps}
 
 

@@ -65,7 +65,7 @@ def partner(kind: str, a: Any, b: Any, up: Any) -> Raw:
                 "thickness": 0.02,
                 "up": list(up),
             }
-            more = {"reduced": True, "functions": 12} if kind == "reduced" else {}
+            more = {"reduced": True, "modes": 12} if kind == "reduced" else {}
             fidelity = "rigid" if kind == "rigid" else "solid"
             return {
                 "fidelity": fidelity,

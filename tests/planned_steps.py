@@ -43,7 +43,9 @@ class Planned:
     @property
     def work(self) -> float:
         """Steps of all levels in a turn."""
-        return (2 ** (self.scene.analysis.levels or 1) - 1) * time_grid(self.scene).steps / TURNS
+        return (
+            (2 ** (self.scene.analysis.extrapolation_levels or 1) - 1) * time_grid(self.scene).steps / TURNS
+        )
 
     @property
     def needed(self) -> float:
@@ -55,7 +57,7 @@ def four_bar(speed: float, links: Mapping[str, Any], **analysis: Any) -> Scene:
     """The source's four-bar with its step left open."""
     raw = tomllib.loads(EXAMPLE.read_text(encoding="utf-8"))
     raw["drive"]["motion"]["speed"] = f"{speed} rpm"
-    raw["analysis"] = {"turns": TURNS, "initial": "quasi-static", "frames": "nominal", **analysis}
+    raw["analysis"] = {"revolutions": TURNS, "initial": "quasi-static", "frames": "rigid-body", **analysis}
     for link in raw["links"].values():
         link.update(links)
     return scene_from(raw)
@@ -71,8 +73,12 @@ def judged(scene: Scene) -> Planned:
     found = histories(ready)
     running = process_time() - since
     steps = time_grid(chosen).steps
-    fine = histories(replace(ready, scene=with_analysis(with_steps(chosen, 4 * steps), levels=3)))
-    plain = histories(replace(ready, scene=with_analysis(with_steps(chosen, 2000 * TURNS), levels=1)))
+    fine = histories(
+        replace(ready, scene=with_analysis(with_steps(chosen, 4 * steps), extrapolation_levels=3))
+    )
+    plain = histories(
+        replace(ready, scene=with_analysis(with_steps(chosen, 2000 * TURNS), extrapolation_levels=1))
+    )
     return Planned(
         chosen, expected, *(worst(relative_errors(x, fine)) for x in (found, plain)), (planning, running)
     )
@@ -82,9 +88,12 @@ def cases() -> Iterator[tuple[str, Scene]]:
     """Slow and fast; nominal and co-rotational; beams and solids; smooth and from rest."""
     for speed in (60, 600):
         yield f"{speed} rpm, beams, nominal", four_bar(speed, BEAMS)
-        yield f"{speed} rpm, beams, co-rotational", four_bar(speed, BEAMS, frames="following")
+        yield f"{speed} rpm, beams, co-rotational", four_bar(speed, BEAMS, frames="co-rotational")
         yield f"{speed} rpm, solids, nominal", four_bar(speed, SOLIDS)
-    yield "600 rpm, beams, co-rotational, from rest", four_bar(600, BEAMS, frames="following", initial="rest")
+    yield (
+        "600 rpm, beams, co-rotational, from rest",
+        four_bar(600, BEAMS, frames="co-rotational", initial="rest"),
+    )
 
 
 def main(say: Callable[[str], None] = print) -> None:
@@ -98,7 +107,10 @@ def main(say: Callable[[str], None] = print) -> None:
     ]  # fmt: skip
     for name, scene in cases():
         one = judged(scene)
-        steps, levels = round(time_grid(one.scene).steps / TURNS), one.scene.analysis.levels or 1
+        steps, levels = (
+            round(time_grid(one.scene).steps / TURNS),
+            one.scene.analysis.extrapolation_levels or 1,
+        )
         marches = " + ".join(f"{steps * 2**k:,}" for k in range(levels))
         seconds = ", ".join(f"{x:.1f} s" for x in one.seconds)
         lines.append(

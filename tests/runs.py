@@ -41,7 +41,7 @@ class Ran:
         return self.nominal(link, at) + self.displaced(link, at, name)
 
     def displaced(self, link: str, at: Any, name: str = "u") -> np.ndarray:
-        """Displacement from the nominal motion (T, 3), or its rates."""
+        """Displacement from the rigid-body motion (T, 3), or its rates."""
         k, weights = on_segment(
             self.ready.model, link, point(at), lambda part: point_rows(part, link, point(at)).value
         )
@@ -62,7 +62,7 @@ class Ran:
 
     @property
     def kinetic_energy(self) -> np.ndarray:
-        """Of scenes without a drive, whose nominal motion rests."""
+        """Of scenes without a drive, whose rigid-body motion rests."""
         out = np.zeros(len(self.t))
         for k, link in enumerate(self.ready.model.links):
             out += [0.5 * float(np.vdot(v, mass_times(link.mass, v))) for v in self.state(k, "v")]

@@ -167,7 +167,7 @@ def pushed(driven: bool, rod: str = "beam") -> Raw:
 
 def bushed() -> Raw:
     """Slide, cross and hinge in bushings that are the same in all directions."""
-    bushing = {"stiffness": 1e6, "damping": 300.0, "turning_stiffness": 2e3, "turning_damping": 0.3}
+    bushing = {"stiffness": 1e6, "damping": 300.0, "rotational_stiffness": 2e3, "rotational_damping": 0.3}
     raw = sliding("prismatic", bushing=bushing)
     raw["joints"]["G"]["bushing"] = bushing
     raw["joints"]["P"]["bushing"] = {"stiffness": 2e6}

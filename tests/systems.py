@@ -25,7 +25,7 @@ from kedfem.scene import path_parameter, scene_from, time_grid
 
 @dataclass(frozen=True)
 class Begun:
-    """A system at rest at t = 0, and its nominal motion."""
+    """A system at rest at t = 0, and its rigid-body motion."""
 
     prepared: Prepared
     ready: Ready
@@ -33,7 +33,7 @@ class Begun:
     motion: Callable[[np.ndarray], RigidMotion]
 
     def steps(self, count: int, first: int = 1) -> RigidMotion:
-        """The nominal motion at the ends of successive steps."""
+        """The rigid-body motion at the ends of successive steps."""
         return self.motion(self.ready.c.h * np.arange(first, first + count))
 
 

@@ -29,24 +29,26 @@ def main() -> None:
     assert time < 0.03
 
     # far below resonance only inertia loads the links: the stress grows with the square of the speed
-    slow, twice = (np.abs(stress(720, 2, f"{rpm} rpm", turns=3)).max() for rpm in (15, 30))
+    slow, twice = (np.abs(stress(720, 2, f"{rpm} rpm", revolutions=3)).max() for rpm in (15, 30))
     print(
         f"peak stress at 15 and 30 rpm: {slow / 1e3:.1f} and {twice / 1e3:.1f} kPa, ratio {twice / slow:.3f}"
     )
     assert abs(twice / slow - 4) < 0.1
 
 
-def stress(steps_per_turn: int, elements: int, speed: str = "600 rpm", turns: int = 8) -> np.ndarray:
+def stress(
+    steps_per_revolution: int, elements: int, speed: str = "600 rpm", revolutions: int = 8
+) -> np.ndarray:
     """Stress of the last turn [Pa]."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
     for link in raw["links"].values():
         link["mesh"] = {"elements": elements}
     raw["drive"]["motion"]["speed"] = speed
-    raw["analysis"] |= {"steps_per_turn": steps_per_turn, "turns": turns}
-    if (steps_per_turn, elements) != (1440, 8):  # pictures of the finest run only
+    raw["analysis"] |= {"steps_per_revolution": steps_per_revolution, "revolutions": revolutions}
+    if (steps_per_revolution, elements) != (1440, 8):  # pictures of the finest run only
         raw["output"] |= {"animation": False, "plots": False, "csv": False}
     results = analyse(scene_from(raw, SCENE.parent)).results
-    return results.channels["probes/rocker_outer/stress"][1][-steps_per_turn - 1 :, 0]
+    return results.channels["probes/rocker_outer/stress"][1][-steps_per_revolution - 1 :, 0]
 
 
 if __name__ == "__main__":

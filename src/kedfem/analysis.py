@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 from time import perf_counter
 from typing import TypeVar
 
-from kedfem.accuracy.budget import Budget, attributes, budget_warning, kind_of, meaningless
+from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of, meaningless
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories
 from kedfem.accuracy.plan import Plan, plan_for
@@ -33,13 +33,13 @@ from kedfem.output.derived import (
 )
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.results import Peak, Results, add_notes, claimed, read_results
-from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.doubtful import doubtful
 from kedfem.results.envelope import highest, peaks
+from kedfem.results.force_elements import measured_actions
+from kedfem.results.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
-from kedfem.results.undetermined import undetermined, undetermined_warning
+from kedfem.results.singular_stress import doubtful
 from kedfem.results.writer import add_peaks, mark_doubtful
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene

@@ -181,7 +181,7 @@ def mesh(
     ] = None,
 ) -> None:
     """Mesh one part from CAD: what joints can sit on, a mesh file, a picture, its quality."""
-    from kedfem.links.offers import offers
+    from kedfem.links.part_candidates import offers
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
     from kedfem.output.vtu import write_mesh
@@ -284,7 +284,7 @@ def new(
         from kedfem.scene.faults import one_of
 
         if scale is not None:
-            raise SceneError("--scale: must stand with --from, got it alone")
+            raise SceneError("--scale: must be combined with --from, got it alone")
         raise SceneError(f"KIND: {one_of(list(KINDS), kind)}")
     text = (files("kedfem") / "templates" / f"{kind.replace('-', '_')}.toml").read_text(encoding="utf-8")
     _write_new(path or Path(f"{kind}.toml"), text)

@@ -103,7 +103,7 @@ def frequencies(
             raise SceneError(f"--{name}: must be at least 1, got {value}")
     if wanted.free and scene.driven is None:
         raise SceneError(
-            "--free: must stand with a drive that lets go, got a scene without one: leave it out"
+            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
         )
     if scene.analysis.stiffening:
         raise SceneError(

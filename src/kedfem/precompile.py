@@ -46,7 +46,7 @@ accuracy = "quick"
 KINDS = {
     "rigid-body frames": DRIVEN + ANALYSIS,
     "stiffening": DRIVEN + ANALYSIS + "stiffening = true\n",
-    "co-rotational frames": DRIVEN + ANALYSIS + 'frames = "following"\n',
+    "co-rotational frames": DRIVEN + ANALYSIS + 'frames = "co-rotational"\n',
     "force elements": FREE + ANALYSIS,
 }
 """Each kind of step, on the smallest scene that takes it."""

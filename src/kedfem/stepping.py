@@ -42,9 +42,13 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     if animation is None:
         return np.zeros(0, int)
     turn = turn_steps(scene) or float(grid.steps)
-    first = 0.0 if animation.last_turns is None else max(0.0, grid.steps - animation.last_turns * turn)
-    count = int((grid.steps - first) * animation.frames_per_turn / turn + 1e-9)
-    steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_turn
+    first = (
+        0.0
+        if animation.last_revolutions is None
+        else max(0.0, grid.steps - animation.last_revolutions * turn)
+    )
+    count = int((grid.steps - first) * animation.frames_per_revolution / turn + 1e-9)
+    steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_revolution
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))
 
 
@@ -76,8 +80,8 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
     notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
-    following = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
-    notes |= {f"segments of {name}": len(parts) for name, parts in following.items()}
+    corotational = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
+    notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
     notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
     notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
     marks = Marks.of(len(solvers), keeper is not None)

@@ -45,10 +45,10 @@ def change_points() -> list[Outcome]:
     between = motion_at(scene, t)
     coupler = np.abs(between.R[:, body(scene, "coupler")] - np.eye(3)).max()
     wheels = coupled_wheels()
-    turns = np.linspace(0, 4 * np.pi, 721)
+    revolutions = np.linspace(0, 4 * np.pi, 721)
     doubled = linkage_scene(wheels)
-    found = motion_at(doubled, turns)
-    off = turned(found, body(doubled, "rocker"), UP) - turns
+    found = motion_at(doubled, revolutions)
+    off = turned(found, body(doubled, "rocker"), UP) - revolutions
     return [
         refused(
             "one coupler, through them", lambda: motion_at(scene, np.linspace(0, 2.2, 90)), "in two ways"
@@ -135,14 +135,14 @@ def mass_ratio() -> list[Outcome]:
     """
     outcomes: list[Outcome] = []
     for factor in (1e-6, 1e6):
-        raw = elastic_four_bar("beam", turns=1, steps_per_turn=180, rho_inf=0.9)
+        raw = elastic_four_bar("beam", revolutions=1, steps_per_revolution=180, rho_inf=0.9)
         raw["drive"]["motion"]["speed"] = "60 rpm"
         raw["materials"]["other"] = {**raw["materials"]["alloy"], "density": 2796 * factor}
         raw["links"]["coupler"]["material"] = "other"
         fast, literal = (
-            run({**raw, "analysis": {**raw["analysis"], "solver": x}}) for x in ("condensed", "literal")
+            run({**raw, "analysis": {**raw["analysis"], "solver": x}}) for x in ("condensed", "monolithic")
         )
-        what = f"coupler's density × {factor:g}: torque, fast against literal steps"
+        what = f"coupler's density × {factor:g}: torque, fast against monolithic steps"
         outcomes.append(Right(what, apart(fast, literal, "drive/torque"), 1e-6))
     return outcomes
 
@@ -150,18 +150,20 @@ def mass_ratio() -> list[Outcome]:
 @case("Stiffness ratio of a million between neighbours")
 def stiffness_ratio() -> list[Outcome]:
     """[KED]'s four-bar with a coupler a million times as stiff as its neighbours: it moves as a rigid link does."""
-    raw = elastic_four_bar("beam", turns=1, steps_per_turn=720, rho_inf=0.9, initial="quasi-static")
+    raw = elastic_four_bar(
+        "beam", revolutions=1, steps_per_revolution=720, rho_inf=0.9, initial="quasi-static"
+    )
     raw["damping"] = {"alpha": 0.5}
     raw["drive"]["motion"]["speed"] = "60 rpm"
     raw["materials"]["stiff"] = {"density": 2796, "youngs_modulus": 7.031e16, "shear_modulus": 2.712e16}
     raw["links"]["coupler"]["material"] = "stiff"
     fast = run(raw)
-    literal = run({**raw, "analysis": {**raw["analysis"], "solver": "literal"}})
+    literal = run({**raw, "analysis": {**raw["analysis"], "solver": "monolithic"}})
     shape = raw["links"]["coupler"]["shape"]
     raw["links"]["coupler"] = {"fidelity": "rigid", "material": "stiff", "shape": shape}
     rigid = run(raw)
     return [
-        Right("torque, fast against literal steps", apart(fast, literal, "drive/torque"), 1e-5),
+        Right("torque, fast against monolithic steps", apart(fast, literal, "drive/torque"), 1e-5),
         Right("torque against that with a rigid coupler", apart(fast, rigid, "drive/torque"), 1e-4),
     ]
 
@@ -173,7 +175,7 @@ def turning_rows() -> list[Outcome]:
     """
     outcomes: list[Outcome] = []
     for rho_inf in (0.5, 0.95):
-        raw = inverted("beam", "slot", turns=278, steps_per_turn=360, rho_inf=rho_inf)
+        raw = inverted("beam", "slot", revolutions=278, steps_per_revolution=360, rho_inf=rho_inf)
         force = run(raw).channels["joints/S/force"][1][1:].reshape(278, 360, -1)
         size = float(np.abs(force[9]).max())
         grown = float(np.abs(force[-1]).max()) / size - 1
@@ -198,7 +200,7 @@ def many_turns() -> list[Outcome]:
     s = np.hypot(x, y)
     wanted = np.arctan2(y, x) - np.arccos((0.762**2 + s**2 - 0.9144**2) / (2 * 0.762 * s))
     drift = np.angle(np.exp(1j * ((got - got[0]) - (wanted - wanted[0]))))
-    raw = elastic_four_bar("beam", turns=10_000, steps_per_turn=60, rho_inf=0.8)
+    raw = elastic_four_bar("beam", revolutions=10_000, steps_per_revolution=60, rho_inf=0.8)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     raw["damping"] = {"alpha": 0.0, "beta": 1e-4}
     torque = run(raw).channels["drive/torque"][1][1:, 0].reshape(10_000, 60)

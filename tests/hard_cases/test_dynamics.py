@@ -72,7 +72,7 @@ def test_a_link_500_times_as_long_as_high(fidelity: str, elements: list[int]) ->
     assert_allclose(tip(full), sag(L / 500), rtol=2e-3)
     assert_allclose(tip(small), tip(full), rtol=1e-3)  # as asked for
     few = prepared(
-        scene_from(reduced(raw, functions=12))
+        scene_from(reduced(raw, modes=12))
     )  # too few for a solid: shear locks, and the estimate tells
     error = worst(relative_errors(histories(few[0]), full))
     assert few[1] is not None
@@ -113,7 +113,7 @@ def test_far_more_functions_than_a_link_needs() -> None:
     raw = arm("solid", [12, 1, 1])
     full = run(raw)
     for functions in (40, 80, 400):
-        assert_allclose(tip(run(reduced(raw, functions=functions))), tip(full), rtol=1e-6)
+        assert_allclose(tip(run(reduced(raw, modes=functions))), tip(full), rtol=1e-6)
 
 
 def test_a_load_put_on_at_once_swings_to_twice_its_static_deflection() -> None:
@@ -143,7 +143,7 @@ def resonant(reduced_link: bool) -> tuple[Histories, float]:
     first = float(found.first[0])
     raw["drive"]["motion"]["speed"] = 2 * np.pi * first / np.sqrt(2)
     raw["damping"] = {"ratio": 0.05, "frequencies": [first, 10 * first]}
-    raw["analysis"] = {"turns": 40, "steps_per_turn": 360, "initial": "rest"}
+    raw["analysis"] = {"revolutions": 40, "steps_per_revolution": 360, "initial": "rest"}
     raw["output"]["probes"]["tip"]["frame"] = "link"
     return run(raw), 2 * np.pi * first
 
@@ -161,7 +161,7 @@ def test_resonance_has_the_amplitude_of_theory() -> None:
 
 def growth(rho_inf: float, steps: int, per_turn: int, said: str = "") -> tuple[float, float]:
     """Largest displacement out of the plane among early and late steps [m], and what a warning says of it."""
-    raw = four_bar("bar", turns=steps / per_turn, steps_per_turn=per_turn, rho_inf=rho_inf)
+    raw = four_bar("bar", revolutions=steps / per_turn, steps_per_revolution=per_turn, rho_inf=rho_inf)
     for link in raw["links"].values():
         link["mesh"] = {"elements": [3, 1, 1]}
     raw["damping"] = {"beta": 1e-4}

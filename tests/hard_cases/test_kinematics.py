@@ -125,11 +125,11 @@ def test_a_chain_of_many_loops_is_followed() -> None:
     for k in range(7):
         rocker, arm, pivot = f"rocker{k or ''}", *(np.asarray(joints[f"{x}{k or ''}"][3]) for x in "CD")
         radius = float(np.linalg.norm(arm - pivot))
-        following = four_bar(radius, 0.95, 0.35, 1.0, float(np.arctan2(*(arm - pivot)[1::-1])))
+        corotational = four_bar(radius, 0.95, 0.35, 1.0, float(np.arctan2(*(arm - pivot)[1::-1])))
         pairs = {"B": (rocker, f"coupler{k + 1}"), "C": (f"coupler{k + 1}", f"rocker{k + 1}")}
         pairs["D"] = (f"rocker{k + 1}", "ground")
         for x, links in pairs.items():
-            joints[f"{x}{k + 1}"] = ("revolute", *links, following[x][3] + pivot, Z)
+            joints[f"{x}{k + 1}"] = ("revolute", *links, corotational[x][3] + pivot, Z)
     scene = linkage_scene(joints)
     m = motion_at(scene, np.linspace(-0.1, 0.1, 11))
     for joint in scene.joints.values():

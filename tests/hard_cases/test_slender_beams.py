@@ -54,6 +54,6 @@ def test_condensed_is_literal_on_a_slender_arm_in_space() -> None:
             "analysis": {"end_time": 100 * step, "step": step},
         }
         _, _, fast = run(raw)
-        raw["analysis"]["solver"] = "literal"
+        raw["analysis"]["solver"] = "monolithic"
         _, _, slow = run(raw)
         assert worst_difference(fast, slow) < 1e-6

@@ -13,10 +13,10 @@ from tests.systems import against_oracle, begun, marched
 Raw = dict[str, Any]
 EVERY = all_cells()
 #: every third of the cheap ones, and each kind of joint among them
-DEFAULT = [x for x in EVERY if x.links in QUICK and (x.plane or x.frames != "following")][::3]
+DEFAULT = [x for x in EVERY if x.links in QUICK and (x.plane or x.frames != "co-rotational")][::3]
 #: dear ones, of which `python -m tests.cells` sees to all
 MESHED = ("solids", "reduced", "solid on the ground", "solid and beam", "rigid")
-LONG = [x for x in EVERY if x not in DEFAULT and (x.frames != "following" or x.links not in MESHED)]
+LONG = [x for x in EVERY if x not in DEFAULT and (x.frames != "co-rotational" or x.links not in MESHED)]
 
 
 def assert_as_the_table_says(cell: Cell) -> None:

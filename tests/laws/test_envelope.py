@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.reduction import prepared
 from kedfem.analysis import Run, analyse
 from kedfem.dynamics.transient import steps_of, transient
-from kedfem.links.doubtful import re_entrant, reach
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
+from kedfem.links.singular_stress import re_entrant, reach
 from kedfem.results import read_results
 from kedfem.results.envelope import EXACT, Envelope, leading
 from kedfem.scene import scene_from
@@ -24,19 +24,19 @@ KINDS: dict[str, dict[str, Any]] = {
     "spatial": {"fidelity": "beam", "beam": "spatial", "mesh": {"elements": 3}},
     "plane": {"fidelity": "plane", "mesh": {"elements": [6, 1]}},
     "solid": {"mesh": {"elements": [6, 1, 1]}},
-    "reduced": {"mesh": {"elements": [6, 1, 1]}, "reduced": True, "functions": 12},
+    "reduced": {"mesh": {"elements": [6, 1, 1]}, "reduced": True, "modes": 12},
 }
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.02}
 
 
-def scene(kind: str, frames: str = "nominal", **output: Any) -> dict[str, Any]:
+def scene(kind: str, frames: str = "rigid-body", **output: Any) -> dict[str, Any]:
     """A four-bar from rest, so that every link vibrates; its crank rigid, carried by the drive."""
     raw = four_bar(
         (0.1, 0.3, 0.25, 0.3), {"material": "steel", "shape": SHAPE, **KINDS[kind]}, constant_speed("300 rpm"),
         damping={"ratio": 0.02, "frequencies": [50, 500]}, output={"plots": False, "picture": False, **output},
-        analysis={"turns": 0.25, "steps_per_turn": 400, "initial": "rest", "frames": frames},
+        analysis={"revolutions": 0.25, "steps_per_revolution": 400, "initial": "rest", "frames": frames},
     )  # fmt: skip
-    if kind in {"solid", "beam"} and frames == "nominal":
+    if kind in {"solid", "beam"} and frames == "rigid-body":
         shape = raw["links"]["crank"]["shape"]
         raw["links"]["crank"] = {
             "material": "steel",
@@ -49,7 +49,8 @@ def scene(kind: str, frames: str = "nominal", **output: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("kind", "frames"),
-    [*((kind, "nominal") for kind in KINDS), ("beam", "following"), ("spatial", "following"), ("solid", "following")],
+    [*((kind, "rigid-body") for kind in KINDS), ("beam", "co-rotational"), ("spatial", "co-rotational"), ("solid",
+    "co-rotational")],
 )  # fmt: skip
 def test_the_envelope_is_the_maximum_over_all_steps(kind: str, frames: str) -> None:
     """Against stresses of every step by the recovery that frames are drawn with, and eigenvalues by LAPACK."""
@@ -115,7 +116,7 @@ def test_no_animation_changes_the_highest_stress(tmp_path: Path) -> None:
     """Frames at every step, at a few and none: one peak, the maximum over the frames of all steps."""
     every, few, none = (
         ran(tmp_path / str(k), "solid", x)
-        for k, x in enumerate(({"frames_per_turn": 400}, {"frames_per_turn": 6}, False))
+        for k, x in enumerate(({"frames_per_revolution": 400}, {"frames_per_revolution": 6}, False))
     )
     assert every.peaks == few.peaks == none.peaks
     assert every.peak == few.peak == none.peak

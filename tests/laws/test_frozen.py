@@ -28,21 +28,21 @@ TIME = np.array([1e-3])
 CELLS = [
     Cell(joint, frames, driven, links, law)
     for joint, frames, driven, links, law in (
-        ("revolute", "nominal", True, "planar beams", "loads"),
-        ("prismatic", "following", False, "planar beams", "loads"),
-        ("slot", "nominal", True, "planar beams", "loads"),
-        ("revolute", "following", False, "beams in space", "loads"),
-        ("screw", "following", False, "beams in space", "loads"),
-        ("universal", "following", True, "rigid", "loads"),
-        ("spherical", "nominal", True, "reduced", "loads"),
-        ("weld", "nominal", True, "on the ground", "loads"),
-        ("revolute", "nominal", True, "plane and beam", "loads"),
-        ("revolute", "nominal", True, "beams in space", "bushing against turns"),
-        ("revolute", "following", False, "beams in space", "spring between points"),
-        ("cylindrical", "following", False, "rigid", "spring on the joint"),
-        ("revolute", "nominal", True, "beams in space", "shaft"),
-        ("revolute", "nominal", True, "beams in space", "gear"),
-        ("revolute", "nominal", True, "beams in space", "point mass"),
+        ("revolute", "rigid-body", True, "planar beams", "loads"),
+        ("prismatic", "co-rotational", False, "planar beams", "loads"),
+        ("slot", "rigid-body", True, "planar beams", "loads"),
+        ("revolute", "co-rotational", False, "beams in space", "loads"),
+        ("screw", "co-rotational", False, "beams in space", "loads"),
+        ("universal", "co-rotational", True, "rigid", "loads"),
+        ("spherical", "rigid-body", True, "reduced", "loads"),
+        ("weld", "rigid-body", True, "on the ground", "loads"),
+        ("revolute", "rigid-body", True, "plane and beam", "loads"),
+        ("revolute", "rigid-body", True, "beams in space", "bushing against rotations"),
+        ("revolute", "co-rotational", False, "beams in space", "spring between points"),
+        ("cylindrical", "co-rotational", False, "rigid", "spring on the joint"),
+        ("revolute", "rigid-body", True, "beams in space", "shaft"),
+        ("revolute", "rigid-body", True, "beams in space", "gear"),
+        ("revolute", "rigid-body", True, "beams in space", "point mass"),
     )
 ]
 #: turns of the whole scene: none, x onto y, x onto z, oblique
@@ -106,7 +106,7 @@ def test_frequencies_are_eigenvalues_of_the_literal_system(cell: Cell) -> None:
 
 @pytest.mark.parametrize("turn", TURNS, ids=["as drawn", "y", "z", "oblique"])
 def test_frequencies_do_not_depend_on_the_axes_of_the_world(turn: np.ndarray) -> None:
-    raw = scene_of(Cell("revolute", "nominal", True, "beams in space"))
+    raw = scene_of(Cell("revolute", "rigid-body", True, "beams in space"))
     del raw["loads"]
     wanted = frozen(raw)[2].omega
     found = frozen(turned(raw, Rotation.from_rotvec(turn).as_matrix(), (0.3, -0.2, 0.5)))[2].omega
@@ -133,7 +133,7 @@ def test_a_large_solid_with_its_sparse_factor_is_the_literal_one(driven: bool) -
 @pytest.mark.parametrize("crank", ["rigid", "beam"])
 def test_a_crank_that_a_free_drive_lets_go_swings_with_its_own_inertia(crank: str) -> None:
     """A rigid crank is carried by its drive, without unknowns; let go it has some."""
-    raw = scene_of(Cell("revolute", "nominal", True, "planar beams"))
+    raw = scene_of(Cell("revolute", "rigid-body", True, "planar beams"))
     if crank == "rigid":
         raw["links"]["crank"] |= {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
     system, motion, found, _ = frozen(raw, driven=False)

@@ -259,7 +259,7 @@ def test_a_linear_displacement_is_held_by_the_surface_alone(nodes: int, seed: in
 
 
 def test_20_functions_on_27_node_geometry_would_strain_in_a_rigid_turn() -> None:
-    """Why hex20 brings its own geometry: a node moved off the face's middle is no field of the 20 functions."""
+    """Why hex20 brings its own geometry: a node moved off the face's middle is no field of the 20 modes."""
     mesh = patch(27, np.random.default_rng(0))
     alien = skfem.Basis(solid_basis(mesh).mesh, skfem.ElementHexS2(), intorder=5)
     K0 = elastic_stiffness(gradient_products(alien, pattern(alien)), MATERIAL.lame())

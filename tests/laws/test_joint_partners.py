@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.errors import KedfemError
 from kedfem.scene import scene_from, spatial_beams
-from kedfem.scene.moving import SHARED
+from kedfem.scene.moving_joints import SHARED
 from tests.laws.test_joint_rows import ROUNDING, assert_the_same, moved
 from tests.moving import ran
 from tests.partners import IN_PLANE, IN_SPACE, PLANAR, SPATIAL, Z, chain
 
 Cell = tuple[str, tuple[str, str], bool]
-#: a seat at the very end of a bar; a slider with two slides
+#: a coupling surface at the very end of a bar; a slider with two slides
 FOUND: list[Cell] = [("prismatic", ("solid", "ground"), True), ("prismatic", ("bare", "planar beam"), False)]
 DRIVEN = ("revolute", "prismatic")
 #: A rigid link is a stiff one, by the square of a ratio of 1000, and rounding grows with that: points moved by 1e-15 of

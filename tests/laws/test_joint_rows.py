@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import Prepared
+from kedfem.dynamics.constraint_joints import needs_rows
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.literal import LiteralSteps
-from kedfem.dynamics.row_joints import needs_rows
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import GROUND
 from tests.joint_checks import (
@@ -37,7 +37,7 @@ EVERY: dict[str, Callable[[], dict[str, Any]]] = {**BEAMS, **SOLIDS}
 #: stiffer still, two more
 # of beams in space 5e-8 in statics; the start's rates are differences of fourth order, with 2.7 times the noise of second
 ROUNDING = {"beams": 3e-7, "solids": 1e-9, "rigid": 1e-5}
-UNDAMPED: dict[str, Any] = {"stiffness": 1e6, "turning_stiffness": 2e3}
+UNDAMPED: dict[str, Any] = {"stiffness": 1e6, "rotational_stiffness": 2e3}
 
 
 @cache
@@ -167,7 +167,8 @@ def deflection(ready: Prepared, blocks: list[Block]) -> float:
 
 @pytest.mark.parametrize("kind", [kind for kind in EVERY if kind != "bushings"])
 def test_what_joints_hold_is_held(kind: str) -> None:
-    """Relative displacement and turn of seats, from their ports, along all that a joint's kind does not leave free."""
+    """Relative displacement and turn of coupling surfaces, from their ports, along all that a joint's kind does not leave
+    free."""
     ready, blocks = run_of(kind)
     at, size = bodies(ready, blocks), deflection(ready, blocks)
     for name, joint in ready.scene.joints.items():
@@ -200,7 +201,7 @@ def test_gears_tie_the_turns_of_their_wheels_and_a_rack() -> None:
 
 
 def test_bushings_give_in_proportion_along_what_the_joint_holds_and_nowhere_else() -> None:
-    """Force −k times displacement, moment −k times turn, of the seats against each other."""
+    """Force −k times displacement, moment −k times turn, of the coupling surfaces against each other."""
     raw = bushed()
     for joint in raw["joints"].values():
         if "bushing" in joint:
@@ -211,7 +212,7 @@ def test_bushings_give_in_proportion_along_what_the_joint_holds_and_nowhere_else
         i, j = sides(ready.scene.joints[name])
         held = held_twists(free_twists(ready, at, name))
         apart = twist(ready, blocks, name, i) - twist(ready, blocks, name, j)
-        k = np.repeat([UNDAMPED["stiffness"], UNDAMPED["turning_stiffness"] / LENGTH**2], 3)
+        k = np.repeat([UNDAMPED["stiffness"], UNDAMPED["rotational_stiffness"] / LENGTH**2], 3)
         e = np.einsum("thk,tk->th", held, apart)
         wanted = -k * np.einsum("thk,th->tk", held, e)
         got = port_wrench(ready, blocks, name, i)

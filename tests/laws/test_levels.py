@@ -30,7 +30,7 @@ SOFT = {"density": 7850, "youngs_modulus": 4e8, "poisson_ratio": 0.3}  # bends b
 
 def linkage(kind: str) -> dict[str, Any]:
     """Soft links that rise smoothly, a 4-5-6-7 polynomial: what they do has no jump up to its third derivative."""
-    frames = "following" if kind == "following" else "nominal"
+    frames = "co-rotational" if kind == "co-rotational" else "rigid-body"
     raw = inverted() if kind == "rows" else hinged(frames)
     if kind == "springs":
         raw["springs"] = {"s": {**LINE, "stiffness": 50.0, "damping": 0.5}}
@@ -56,7 +56,7 @@ def ready_linkage(kind: str) -> Prepared:
 def marched(kind: str, steps: int, levels: int) -> tuple[Channels, StepWatch]:
     """All channels of a linkage in so many steps of so many levels, and what is known of their error."""
     ready = ready_linkage(kind)
-    analysis = ready.scene.analysis.model_copy(update={"step": END / steps, "levels": levels})
+    analysis = ready.scene.analysis.model_copy(update={"step": END / steps, "extrapolation_levels": levels})
     scene = ready.scene.model_copy(update={"analysis": analysis})
     ready = replace(ready, scene=scene)
     recorded = recording(scene, ready.model)
@@ -71,7 +71,7 @@ def marched(kind: str, steps: int, levels: int) -> tuple[Channels, StepWatch]:
 def blocks(kind: str, steps: int, levels: int, fine: bool = False, solver: str = "condensed") -> list[Block]:
     """All blocks of a linkage."""
     ready = ready_linkage(kind)
-    keys = {"step": END / steps, "levels": levels, "solver": solver}
+    keys = {"step": END / steps, "extrapolation_levels": levels, "solver": solver}
     scene = ready.scene.model_copy(update={"analysis": ready.scene.analysis.model_copy(update=keys)})
     solvers = level_steps(scene, ready.model)
     return list(leveled(scene, ready.linkage, ready.path, ready.model, solvers, fine))
@@ -91,8 +91,8 @@ def error(found: Channels, true: Channels, name: str) -> float:
 
 # caps on the errors of two and three levels; to 1e-6 the solvers' iterations leave the latter free
 CASES = [
-    pytest.param("nominal", 5e-4, 5e-5, id="nominal"),
-    pytest.param("following", 5e-4, 5e-5, id="co-rotational"),
+    pytest.param("rigid-body", 5e-4, 5e-5, id="rigid-body"),
+    pytest.param("co-rotational", 5e-4, 5e-5, id="co-rotational"),
     pytest.param("stiffened", 5e-4, 5e-5, id="stiffened", marks=pytest.mark.long),
     pytest.param("rows", 5e-4, 5e-5, id="time-varying constraints", marks=pytest.mark.long),
     pytest.param("springs", 5e-4, 5e-5, id="springs", marks=pytest.mark.long),
@@ -120,7 +120,7 @@ def test_levels_raise_the_order_of_every_solver(kind: str, fourth: float, sixth:
 
 def test_estimates_tell_the_truth() -> None:
     """Where the order shows and where the steps are too long: within a factor 3 below and 8 above, in every channel."""
-    for kind in ("nominal", "following"):
+    for kind in ("rigid-body", "co-rotational"):
         true = marched(kind, 240, 3)[0]
         for steps, levels in ((30, 2), (60, 2), (120, 2), (30, 3), (60, 3)):
             found, watch = marched(kind, steps, levels)
@@ -139,10 +139,10 @@ def test_weights_remove_powers_of_the_step() -> None:
     assert_allclose(level_weights(3, 0.3) @ np.stack([h**0, h**2, h**3], axis=1), [1, 0, 0], atol=1e-15)
 
 
-@pytest.mark.parametrize("kind", ["nominal", "rows"])
+@pytest.mark.parametrize("kind", ["rigid-body", "rows"])
 def test_literal_steps_combine_to_the_same(kind: str) -> None:
     """The oracle through the layer, in all that a block holds; rounding grows over 40 steps."""
-    fast, literal = blocks(kind, 20, 2), blocks(kind, 20, 2, solver="literal")
+    fast, literal = blocks(kind, 20, 2), blocks(kind, 20, 2, solver="monolithic")
     for name in LINEAR:
         for x, y in zip(over_time(fast, name), over_time(literal, name), strict=True):
             assert_allclose(x, y, rtol=0, atol=2e-8 * np.abs(y).max(initial=1e-300))
@@ -150,10 +150,10 @@ def test_literal_steps_combine_to_the_same(kind: str) -> None:
 
 def test_time_points_are_those_of_one_level_whatever_is_kept_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Portions of 7 steps: the same states; no block is longer than that."""
-    whole = blocks("following", 60, 3)
+    whole = blocks("co-rotational", 60, 3)
     assert_allclose(np.concatenate([x.motion.t for x in whole]), np.linspace(0, END, 61), rtol=0, atol=1e-15)
     monkeypatch.setattr(in_time, "block_length", lambda model: 28)
-    parts = blocks("following", 60, 3)
+    parts = blocks("co-rotational", 60, 3)
     assert max(len(x) for x in parts) == 7
     assert [x.step for x in parts][:3] == [0, 1, 8]
     for name in LINEAR:
@@ -161,7 +161,7 @@ def test_time_points_are_those_of_one_level_whatever_is_kept_at_once(monkeypatch
             assert_allclose(x, y, rtol=0, atol=1e-12 * np.abs(y).max(initial=1e-300))
 
 
-@pytest.mark.parametrize(("kind", "left"), [("nominal", 0.08), ("following", 0.2)])
+@pytest.mark.parametrize(("kind", "left"), [("rigid-body", 0.08), ("co-rotational", 0.2)])
 def test_between_time_points_the_finest_level_is_corrected(kind: str, left: float) -> None:
     """Between common times of 60 steps in two levels: far nearer to the truth than the finest level's own states."""
     found = [x for x in blocks(kind, 120, 2, fine=True) if x.fine]
@@ -183,7 +183,7 @@ def test_between_time_points_the_finest_level_is_corrected(kind: str, left: floa
 
 
 def test_a_level_that_fails_ends_the_run_with_what_all_have(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, transient = blocks("nominal", 60, 2), in_time.transient
+    whole, transient = blocks("rigid-body", 60, 2), in_time.transient
 
     def failing(scene: Scene, *others: Any) -> Iterator[Block]:
         for block in transient(scene, *others):
@@ -193,8 +193,8 @@ def test_a_level_that_fails_ends_the_run_with_what_all_have(monkeypatch: pytest.
             yield block
 
     monkeypatch.setattr(in_time, "transient", failing)
-    ready = ready_linkage("nominal")
-    keys = {"step": END / 60, "levels": 2}
+    ready = ready_linkage("rigid-body")
+    keys = {"step": END / 60, "extrapolation_levels": 2}
     scene = ready.scene.model_copy(update={"analysis": ready.scene.analysis.model_copy(update=keys)})
     found: list[Block] = []
     marching = leveled(scene, ready.linkage, ready.path, ready.model, level_steps(scene, ready.model))
@@ -205,17 +205,17 @@ def test_a_level_that_fails_ends_the_run_with_what_all_have(monkeypatch: pytest.
 
 
 def test_factors_that_do_not_fit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = ready_linkage("nominal").model
+    model = ready_linkage("rigid-body").model
     need = factor_bytes(model)
     monkeypatch.setattr(in_time, "memory", lambda: 2.5 * need)
     assert most_levels(model) == 2
     with pytest.raises(SolveError, match=r"analysis\.levels: must be at most 2 .* got 3"):
-        blocks("nominal", 20, 3)
+        blocks("rigid-body", 20, 3)
 
 
 def test_the_cheapest_step_reaches_what_is_asked_for() -> None:
     """From one trial: 1e-3 by fewer steps than a single level would take, and not ten times better than asked for."""
-    for kind in ("nominal", "following"):
+    for kind in ("rigid-body", "co-rotational"):
         true, (_, watch) = marched(kind, 240, 3)[0], marched(kind, 30, 3)
         choice = cheapest(watch.estimate, 1e-3)
         steps = next(n for n in (15, 16, 20, 24, 30, 40, 48, 60, 80, 120, 240) if n >= END / choice.h - 1e-9)

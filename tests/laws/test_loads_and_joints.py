@@ -6,8 +6,14 @@ from hypothesis import given
 
 from kedfem.dynamics.loads import applied
 from kedfem.links.bodies import euler_tensor, inertia_of, with_body, with_point_mass
+from kedfem.links.coupling_surfaces import (
+    CouplingSurface,
+    face_seat,
+    joint_seat,
+    port_weights,
+    surface_weights,
+)
 from kedfem.links.record import Link, mass_times
-from kedfem.links.seats import Seat, face_seat, joint_seat, port_weights, surface_weights
 from kedfem.mesh import SolidMesh
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
@@ -93,8 +99,8 @@ def test_inertia_load_of_a_beam_is_literally_minus_M_R0(
 # -- port points --------------------------------------------------------------------------------------------
 
 
-def bore(link: Link, motion: Motion) -> Seat:
-    """The seat on the bore of a ring that has moved rigidly."""
+def bore(link: Link, motion: Motion) -> CouplingSurface:
+    """The coupling surface on the bore of a ring that has moved rigidly."""
     return joint_seat(link, "joints.A", motion.p, motion.R @ Z)
 
 

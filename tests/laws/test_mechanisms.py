@@ -32,7 +32,7 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
     """What a screw leaves open tells nothing of how both move together: rounding of it must not fling them away."""
     R = Rotation.from_rotvec(turn).as_matrix()
     a, b, c = (R @ x for x in ([0.0, 0.0, 0.0], [0.1, 0.02, 0.05], [0.15, 0.1, -0.05]))
-    spin = {"at": [0.0, 0.0, 0.0], "spin": (R @ [0.3, -2.0, 1.0]).tolist()}
+    spin = {"at": [0.0, 0.0, 0.0], "angular_velocity": (R @ [0.3, -2.0, 1.0]).tolist()}
     scene = scene_from({
         "links": {"one": beam_in_space(a.tolist(), b.tolist(), 1), "two": beam_in_space(b.tolist(), c.tolist(), 1)},
         "joints": {"S": as_lists(joint("screw", ("two", "one"), b, R @ [0.04, -2.3, -0.2]))},
@@ -40,7 +40,7 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
     })  # fmt: skip
     linked = linkage(scene)
     v, omega = initial_twists(scene, linked)
-    assert_allclose(omega[1:], np.tile(spin["spin"], (2, 1)), atol=1e-12)
+    assert_allclose(omega[1:], np.tile(spin["angular_velocity"], (2, 1)), atol=1e-12)
     at_centre = v[1:] + np.cross(omega[1:], linked.centre)
     assert np.abs(at_centre).max() < 1e-12  # m/s: nothing is asked of it
 

@@ -10,10 +10,10 @@ from skfem.models.elasticity import linear_elasticity
 from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.dynamics.loads import applied
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
+from kedfem.links.coupling_surfaces import face_seat, is_flat, joint_seat, port_weights, surface_weights
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
-from kedfem.links.seats import face_seat, is_flat, joint_seat, port_weights, surface_weights
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
 from kedfem.mesh import QuadMesh
 from kedfem.mesh.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
@@ -181,7 +181,7 @@ def test_without_contraction_a_plane_link_is_the_solid_moving_in_its_plane() -> 
     assert np.vdot(g, flat.mass[0] @ g) == pytest.approx(np.vdot(h, solid.mass[0] @ h), rel=1e-12)
 
 
-# -- seats --------------------------------------------------------------------------------------------------
+# -- coupling surfaces --------------------------------------------------------------------------------------------------
 
 
 def disc(z: float = 0.9) -> Link:

@@ -1,4 +1,4 @@
-"""Averaged and stiff ports: what holds of both in every direction, and what a stiff one adds."""
+"""Averaged and rigid couplings: what holds of both in every direction, and what a stiff one adds."""
 
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.ports import port_values, port_vectors
+from kedfem.links.coupling_surfaces import CouplingSurface, face_seat, joint_seat
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import reduced, rigid, rigid_functions, rigid_modes
-from kedfem.links.seats import Seat, face_seat, joint_seat
+from kedfem.links.rigid_coupling import STIFF, surface_gram, with_stiff_seat
 from kedfem.links.solid import solid_link
-from kedfem.links.stiff import STIFF, surface_gram, with_stiff_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
@@ -34,7 +34,7 @@ def solid(mesh: SolidMesh) -> Link:
     return solid_link("any", mesh, MATERIAL, np.eye(3))
 
 
-def bore(link: Link, motion: Motion = REST) -> Seat:
+def bore(link: Link, motion: Motion = REST) -> CouplingSurface:
     return joint_seat(link, "joints.A", motion.p, motion.R @ Z)
 
 
@@ -42,8 +42,9 @@ def dense(K: Any) -> np.ndarray:
     return np.asarray(K.toarray() if sp.issparse(K) else K)
 
 
-def out_of_round(link: Link, seat: Seat, u: np.ndarray) -> float:
-    """Root mean square over a seat of what no rigid motion of it is, by least squares in Gauss points' weights."""
+def out_of_round(link: Link, seat: CouplingSurface, u: np.ndarray) -> float:
+    """Root mean square over a coupling surface of what no rigid motion of it is, by least squares in Gauss points'
+    weights."""
     nodes, G = surface_gram(link, seat.facets)
     B = rigid_modes(link).reshape(link.n, link.d, -1)[nodes].reshape(link.d * len(nodes), -1)
     L = np.linalg.cholesky(np.kron(G.toarray(), np.eye(link.d))).T
@@ -159,7 +160,7 @@ def test_rigid_links_stay_as_they_are() -> None:
 
 def ported(raw: dict[str, Any], port: Any) -> dict[str, Any]:
     for joint in raw["joints"].values():
-        joint["port"] = port
+        joint["coupling"] = port
     return raw
 
 
@@ -179,13 +180,13 @@ def drawn(R: np.ndarray, folder: Path, port: str, **analysis: Any) -> dict[str, 
     return raw
 
 
-@pytest.mark.parametrize("port", ["averaged", "stiff"])
+@pytest.mark.parametrize("port", ["distributing", "rigid"])
 def test_a_scene_in_another_direction_bends_alike(
     port: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     R = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
-    analysis = {"turns": 5 / 240, "steps_per_turn": 240}
+    analysis = {"revolutions": 5 / 240, "steps_per_revolution": 240}
     found = []
     for turn, name in ((np.eye(3), "upright"), (R, "turned")):
         (tmp_path / name).mkdir()
@@ -203,11 +204,11 @@ def test_a_scene_in_another_direction_bends_alike(
             )  # rounding, docs/ports.md: plates are soft sideways
 
 
-@pytest.mark.parametrize("port", ["averaged", "stiff"])
+@pytest.mark.parametrize("port", ["distributing", "rigid"])
 @pytest.mark.parametrize("kind", ["plate", "plane"])
 def test_joints_are_closed_and_hand_on_force_and_moment_in_full(kind: str, port: str) -> None:
     """Newton's and Euler's laws of each link about its nominal shape: Σ λ, Σ X × λ balance P − M R0'' − M δ''."""
-    raw = ported(four_bar(kind, turns=1 / 12, steps_per_turn=240), port)
+    raw = ported(four_bar(kind, revolutions=1 / 12, steps_per_revolution=240), port)
     raw["damping"], raw["gravity"] = {"beta": 1e-5}, [0, -9.81, 0]  # inner damping carries no resultant
     model, _, snapshots = run(raw)
     for snapshot in snapshots[1::4]:
@@ -235,8 +236,10 @@ def moment(x: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["plate", "plane"])
 def test_condensed_is_literal_with_stiff_ports(kind: str) -> None:
-    fast = run(ported(four_bar(kind, turns=1 / 24, steps_per_turn=240), "stiff"))
-    slow = run(ported(four_bar(kind, turns=1 / 24, steps_per_turn=240, solver="literal"), "stiff"))
+    fast = run(ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240), "rigid"))
+    slow = run(
+        ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240, solver="monolithic"), "rigid")
+    )
     peak = max(np.abs(s.u).max() for snapshot in slow[2] for s in snapshot.states)
     for a, b in zip(fast[2], slow[2], strict=True):
         for s, r in zip(a.states, b.states, strict=True):
@@ -258,13 +261,13 @@ def test_a_port_is_stiff_where_it_is_said_to_be() -> None:
     """By joint or by link; the bore of a joint on the ground too; beams and rigid links take it and stay the same."""
     raw = four_bar("plane")
     plain = np.array(energies(model_of(raw)))
-    raw["joints"]["B"]["port"] = {"coupler": "stiff"}
+    raw["joints"]["B"]["coupling"] = {"coupler": "rigid"}
     assert ((np.array(energies(model_of(raw))) > 1.01 * plain) == [False, True, False]).all()
-    raw["joints"]["B"]["port"] = "stiff"
+    raw["joints"]["B"]["coupling"] = "rigid"
     assert ((np.array(energies(model_of(raw))) > 1.01 * plain) == [True, True, False]).all()
-    raw["joints"]["B"]["port"], raw["joints"]["D"]["port"] = "averaged", "stiff"
+    raw["joints"]["B"]["coupling"], raw["joints"]["D"]["coupling"] = "distributing", "rigid"
     assert ((np.array(energies(model_of(raw))) > 1.01 * plain) == [False, False, True]).all()
-    beams = [energies_of_beams(port) for port in ("averaged", "stiff")]
+    beams = [energies_of_beams(port) for port in ("distributing", "rigid")]
     assert beams[0] == beams[1]
 
 
@@ -275,9 +278,9 @@ def energies_of_beams(port: str) -> list[float]:
 @pytest.mark.parametrize("reduce", [False, True])
 def test_segments_and_reduced_links_take_stiff_ports(reduce: bool) -> None:
     """A link in segments has the added stiffness of the same link in one piece, bores being cut by none."""
-    raw = ported(four_bar("plane", frames="following", rho_inf=0.9), "averaged")
+    raw = ported(four_bar("plane", frames="co-rotational", rho_inf=0.9), "distributing")
     models = []
-    for port in ("averaged", "stiff"):
+    for port in ("distributing", "rigid"):
         for link in raw["links"].values():
             link["segments"] = 3
         models.append(model_of(ported(raw, port)))
@@ -292,10 +295,12 @@ def test_segments_and_reduced_links_take_stiff_ports(reduce: bool) -> None:
 
 
 def test_frames_that_follow_converge_with_stiff_ports_too() -> None:
-    """Stiff seats stretch the rounding of positions; sweeps may be some more, and the joints stay closed."""
+    """Stiff coupling surfaces stretch the rounding of positions; sweeps may be some more, and the joints stay closed."""
     runs = []
-    for port in ("averaged", "stiff"):
-        raw = four_bar("plane", turns=1 / 60, steps_per_turn=600, frames="following", rho_inf=0.95)
+    for port in ("distributing", "rigid"):
+        raw = four_bar(
+            "plane", revolutions=1 / 60, steps_per_revolution=600, frames="co-rotational", rho_inf=0.95
+        )
         for link in raw["links"].values():
             link["segments"] = 2
         runs.append(run(ported(raw, port)))
@@ -310,15 +315,15 @@ def test_frames_that_follow_converge_with_stiff_ports_too() -> None:
 
 
 def test_two_joints_on_one_bore_make_it_stiff_once() -> None:
-    raw = ported(four_bar("plane"), "averaged")
-    raw["joints"]["B"]["port"] = "stiff"
+    raw = ported(four_bar("plane"), "distributing")
+    raw["joints"]["B"]["coupling"] = "rigid"
     once = energies(model_of(raw))
     raw["links"]["fork"] = raw["links"]["coupler"] | {"shape": {**PLATE, "between": ["B", [0.5, 0.9]]}}
     raw["joints"]["fork"] = {
         "kind": "weld",
         "links": ["coupler", "fork"],
         "at": "B",
-        "port": {"coupler": "stiff"},
+        "coupling": {"coupler": "rigid"},
     }
     assert energies(model_of(raw))[:2] == pytest.approx(once[:2], rel=1e-12)
 
@@ -327,7 +332,7 @@ def test_both_ports_are_the_same_from_afar() -> None:
     """Saint-Venant: the difference of a lug's end under a load far away falls as the lug gets longer."""
     apart = []
     for length in (0.16, 0.32, 0.64):
-        raw = ported(four_bar("plane"), "averaged")
+        raw = ported(four_bar("plane"), "distributing")
         shape = {"kind": "plate_link", "between": [[0, 0], [length, 0]], "width": 0.03, "thickness": 0.01,
                  "bore_diameter": 0.015}  # fmt: skip
         raw["links"] = {
@@ -336,7 +341,7 @@ def test_both_ports_are_the_same_from_afar() -> None:
         raw["joints"] = {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}}
         raw["bodies"] = {}
         (link,) = model_of(raw).links
-        (stiff,) = model_of(ported(raw, "stiff")).links
+        (stiff,) = model_of(ported(raw, "rigid")).links
         near, far = (joint_seat(link, "joints", np.array([x, 0.0, 0.0]), Z) for x in (0.0, length))
         tips = [tip_deflection(each, near, far) for each in (link, stiff)]
         assert tips[1] < tips[0]
@@ -346,8 +351,8 @@ def test_both_ports_are_the_same_from_afar() -> None:
     assert apart[2] < apart[1] / 1.7
 
 
-def tip_deflection(link: Link, near: Seat, far: Seat) -> float:
-    """Of the far bore under a force across, the near one's mean displacement and turn held."""
+def tip_deflection(link: Link, near: CouplingSurface, far: CouplingSurface) -> float:
+    """Of the far bore under a force across, the near one's mean displacement and rotation held."""
     force = np.zeros((link.n, link.d))
     force[:, 1] = far.fit[0]
     turn = near.fit[1:2]

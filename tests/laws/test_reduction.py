@@ -1,4 +1,4 @@
-"""Laws of reduced links: the same equation in the span of a few functions, and an estimate that can be trusted."""
+"""Laws of reduced links: the same equation in the span of a few modes, and an estimate that can be trusted."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -59,7 +59,7 @@ def found_bases(full: Prepared) -> list[Basis]:
     return [basis for basis in made if basis is not None]
 
 
-def with_functions(full: Prepared, count: int) -> Model:
+def with_modes(full: Prepared, count: int) -> Model:
     return reduced_model(full.model, [basis.first(count) for basis in found_bases(full)])
 
 
@@ -67,7 +67,7 @@ def with_functions(full: Prepared, count: int) -> Model:
 def test_a_reduced_link_is_a_link(kind: str) -> None:
     """Mass 1, 1 and X held exactly, rigid modes strain nothing, K0 symmetric and positive semidefinite."""
     full = meshed(scene_from(arm(kind)))
-    link = with_functions(full, 12).links[0]
+    link = with_modes(full, 12).links[0]
     whole, Q = link.full, link.Q
     assert whole is not None
     assert Q is not None
@@ -123,7 +123,7 @@ def static_work(model: Model, full: Prepared) -> float:
 
 def test_a_scene_that_is_turned_has_the_same_forces_turned() -> None:
     """Q ⊗ R³ is closed under rotation: the same functions do, whatever the directions that they came from."""
-    raw = four_bar("bar", turns=0.1, steps_per_turn=240, initial="quasi-static")
+    raw = four_bar("bar", revolutions=0.1, steps_per_revolution=240, initial="quasi-static")
     for link in raw["links"].values():
         link["mesh"] = {"elements": [8, 1, 1]}
     turned = deepcopy(raw)
@@ -159,7 +159,7 @@ def test_the_full_models_own_state_leaves_no_residual(kind: str) -> None:
 
 
 def four_bars(speed: str) -> dict[str, Any]:
-    raw = four_bar("bar", turns=0.5, steps_per_turn=240, initial="quasi-static")
+    raw = four_bar("bar", revolutions=0.5, steps_per_revolution=240, initial="quasi-static")
     raw["drive"]["motion"]["speed"] = speed
     for link in raw["links"].values():
         link["mesh"] = {"elements": [10, 2, 1]}
@@ -185,9 +185,7 @@ def test_the_estimate_is_near_the_error(raw: dict[str, Any], count: int) -> None
 def test_statics_do_not_depend_on_how_the_functions_are_mixed(kind: str, seed: int) -> None:
     """A reduced link is held where it moves, not at one function of many: any basis of the span gives one answer."""
     full = meshed(scene_from(arm(kind)))
-    Q = (
-        with_functions(full, 12).links[0].Q
-    )  # mass-orthonormal: none is lost in the others when they are mixed
+    Q = with_modes(full, 12).links[0].Q  # mass-orthonormal: none is lost in the others when they are mixed
     assert Q is not None
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(Q.shape[1], Q.shape[1])))[0]
     work = [static_work(reduced_model(full.model, [each]), full) for each in (Q, Q @ turn)]

@@ -53,11 +53,11 @@ def test_the_motion_does_not_depend_on_where_the_scene_lies(
 
 @settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
 @given(joint_tables, st.integers(1, 1000), st.floats(0.0, 6.28))
-def test_every_turn_is_the_same(joints: JointTable, turns: int, phase: float) -> None:
+def test_every_turn_is_the_same(joints: JointTable, revolutions: int, phase: float) -> None:
     scene = linkage_scene(joints, sliders=sliders(joints))
-    later = 2 * np.pi * turns + phase
+    later = 2 * np.pi * revolutions + phase
     first, last = motion_at(scene, np.array([phase])), motion_at(scene, np.array([later]))
-    off = later - 2 * np.pi * turns - phase  # how far the sum is rounded
+    off = later - 2 * np.pi * revolutions - phase  # how far the sum is rounded
     cap = 1e-12 + 10 * abs(off) + 1e-15 * later
     assert_allclose(last.R, first.R, atol=cap)
     assert_allclose(last.p, first.p, atol=cap)

@@ -33,7 +33,7 @@ def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
 def test_segments_carry_all_loads_of_the_whole_link(fidelity: str) -> None:
     """Resultants and moments of gravity, of a pressure over the whole upper face, of body and tip force."""
     found = []
-    for frames in ({}, {"frames": "following"}):
+    for frames in ({}, {"frames": "co-rotational"}):
         model = meshed(scene_from(arm(fidelity, **frames))).model
         total = np.zeros((3, 3))
         for link, loads in zip(model.links, model.loads, strict=True):

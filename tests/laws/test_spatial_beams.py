@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.bodies import euler_tensor, with_body
+from kedfem.links.coupling_surfaces import joint_seat, port_weights
 from kedfem.links.record import Link
-from kedfem.links.seats import joint_seat, port_weights
 from kedfem.links.section import Section, cowper, rectangle, torsion_stress, tube
 from kedfem.links.spatial_beam import (
     HUB_INERTIA,

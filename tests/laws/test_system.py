@@ -64,7 +64,7 @@ def old_displacements(of: Begun) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_joint_moves_as_by_todays_solver(kind: str) -> None:
-    """In nominal frames, gravity askew; that solver keeps eight digits of beams in space."""
+    """In rigid-body frames, gravity askew; that solver keeps eight digits of beams in space."""
     raw = BEAMS[kind]()
     of = begun({**raw, "analysis": {**raw["analysis"], "end_time": 0.005}})
     wanted = old_displacements(of)
@@ -73,12 +73,12 @@ def test_every_kind_of_joint_moves_as_by_todays_solver(kind: str) -> None:
     assert state.passes[2] == 1  # linear: done after one pass
 
 
-@pytest.mark.parametrize(("frames", "within"), [("nominal", 1e-12), ("following", 1e-9)])
+@pytest.mark.parametrize(("frames", "within"), [("rigid-body", 1e-12), ("co-rotational", 1e-9)])
 def test_planar_beams_move_as_by_todays_solvers(frames: str, within: float) -> None:
     """Linear to rounding; co-rotational to the tolerance of that solver's iterations."""
     raw = four_bar()
     of = begun({**raw, "analysis": {**raw["analysis"], "frames": frames}})
-    assert (TANGENTIAL in of.ready.bodies.frame) == (frames == "following")
+    assert (TANGENTIAL in of.ready.bodies.frame) == (frames == "co-rotational")
     wanted = old_displacements(of)
     _, history = marched(of, len(wanted))
     assert np.abs(rows(of.ready, history.u) - wanted).max() < within * np.abs(wanted).max()
@@ -93,7 +93,7 @@ def test_springs_and_motors_move_as_by_todays_solver() -> None:
     assert state.passes[2] > 1
 
 
-CELLS = [("nominal", True, 1e-8), ("following", True, 1e-7), ("following", False, 1e-7)]
+CELLS = [("rigid-body", True, 1e-8), ("co-rotational", True, 1e-7), ("co-rotational", False, 1e-7)]
 
 
 @pytest.mark.parametrize(("frames", "driven", "within"), CELLS)
@@ -109,16 +109,16 @@ def test_springs_and_motors_move_as_by_the_oracle(frames: str, driven: bool, wit
 def test_every_kind_of_joint_in_all_frames_moves_as_by_the_oracle(
     kind: str, frames: str, driven: bool, within: float
 ) -> None:
-    if kind == "slot" and frames == "following":
-        pytest.skip("the pin of a slot slides as the nominal motion tells")
+    if kind == "slot" and frames == "co-rotational":
+        pytest.skip("the pin of a slot slides as the rigid-body motion tells")
     of = begun(BEAMS[kind](), frames, driven)
-    assert (COROTATIONAL in of.ready.bodies.frame) == (frames == "following")
+    assert (COROTATIONAL in of.ready.bodies.frame) == (frames == "co-rotational")
     assert against_oracle(of, 2) < within
 
 
 def test_a_state_is_all_that_a_march_needs() -> None:
     """Marched in two parts from stored states, bit for bit what one march is; what was given is not used up."""
-    of = begun(four_bar(**elements()), "following")
+    of = begun(four_bar(**elements()), "co-rotational")
     whole, history = marched(of, 8)
     before = [x.copy() for x in of.state]
     half, _ = march(of.ready, of.state, of.steps(4))
@@ -161,7 +161,7 @@ def test_gears_couple_links_that_nothing_drives() -> None:
 
 def test_gears_couple_driven_links_with_frames_of_their_own() -> None:
     """The second arm turns by as much as the drive, the other way."""
-    of = geared_arms("following", driven=True)
+    of = geared_arms("co-rotational", driven=True)
     _, history = marched(of, 100)
     two = displacements(of.ready, 1, history.u)[:, :, 2] + 0.0
     nominal = of.steps(100).drives[:, 0]
@@ -185,7 +185,7 @@ def test_a_motor_pushes_along_a_slide_that_turns() -> None:
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
         "drives": {}, "analysis": {"end_time": end, "step": 2e-4, "rho_inf": 0.8},
     }  # fmt: skip
-    of = begun(raw, "following", motors={"m": Motor(joint="S", force=force)})  # today refused
+    of = begun(raw, "co-rotational", motors={"m": Motor(joint="S", force=force)})  # today refused
     count = round(end / 2e-4)
     _, history = marched(of, count)
     mass = 7850 * 0.03 * 0.02 * 0.04

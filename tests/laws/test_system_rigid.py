@@ -31,7 +31,7 @@ def top(inertia: list[float], spin: list[float], step: float = 1e-3, **more: Any
         "bodies": {"mass": {**body, "inertia": inertia}},
         "analysis": {
             "end_time": 1.0, "step": step, "rho_inf": 0.9,
-            "initial_motions": {"body": {"at": [0, 0, 0], "spin": spin}},
+            "initial_motions": {"body": {"at": [0, 0, 0], "angular_velocity": spin}},
         },
         **more,
     }  # fmt: skip
@@ -97,12 +97,12 @@ def test_a_body_moves_as_by_the_oracle() -> None:
 
 @pytest.mark.parametrize(
     ("frames", "driven", "acting"),
-    [("nominal", True, False), ("following", True, True), ("following", False, True)],
+    [("rigid-body", True, False), ("co-rotational", True, True), ("co-rotational", False, True)],
 )
 def test_a_rigid_link_among_beams_moves_as_by_the_oracle_and_keeps_its_length(
     frames: str, driven: bool, acting: bool
 ) -> None:
-    """In nominal frames its bars are linear: one pass a step; else exact. A spring about a hinge and a motor act."""
+    """In rigid-body frames its bars are linear: one pass a step; else exact. A spring about a hinge and a motor act."""
     more = elements() if acting else {}
     more.get("springs", {}).pop("line", None)  # the oracle's iterations do not converge with it beside bars
     raw = four_bar(**more)
@@ -110,7 +110,7 @@ def test_a_rigid_link_among_beams_moves_as_by_the_oracle_and_keeps_its_length(
     of = begun(raw, frames, driven)
     state, history = march(of.ready, of.state, of.steps(5))
     assert against_oracle(of, 3) < 1e-7
-    assert (state.passes[2] == 1) == (frames == "nominal")
+    assert (state.passes[2] == 1) == (frames == "rigid-body")
     bars = [n for n, x in enumerate(of.ready.system.constraints) if x.name.startswith("rigid.")]
     assert len(bars) == 6
     assert np.abs(history.e[:, bars]).max() < 1e-12

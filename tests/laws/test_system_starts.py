@@ -29,8 +29,12 @@ def at(raw: Raw, frames: str | None = None, **more: Any) -> Begun:
 
 @pytest.mark.parametrize(
     ("kind", "frames"),
-    [("slot", "nominal")]
-    + [(kind, frames) for kind in ("screw", "gears, rack", "springs") for frames in ("nominal", "following")],
+    [("slot", "rigid-body")]
+    + [
+        (kind, frames)
+        for kind in ("screw", "gears, rack", "springs")
+        for frames in ("rigid-body", "co-rotational")
+    ],
 )
 def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) -> None:
     """Differences of fourth order over values; gradients too. Errors of differences: h⁴ and rounding/h², 1e-8."""
@@ -59,9 +63,9 @@ def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) 
     ["screw", *(pytest.param(x, marks=pytest.mark.long) for x in KINDS if x not in {"bushings", "screw"})],
 )
 def test_quasi_static_starts_are_those_of_todays_solvers(kind: str) -> None:
-    """Of nominal frames. Bushings with dampers are not among them: these leave the dampers out."""
+    """Of rigid-body frames. Bushings with dampers are not among them: these leave the dampers out."""
     raw = BEAMS[kind]()
-    of = at({**raw, "analysis": {**raw["analysis"], "frames": "nominal"}})
+    of = at({**raw, "analysis": {**raw["analysis"], "frames": "rigid-body"}})
     found = quasi_static(of.ready, of.motion)
     scene = of.prepared.scene
     scene.analysis.fill(initial="quasi-static")
@@ -70,7 +74,7 @@ def test_quasi_static_starts_are_those_of_todays_solvers(kind: str) -> None:
     assert np.abs(rows(of.ready, found.u[None])[0] - u).max() < 1e-8 * np.abs(u).max()
 
 
-@pytest.mark.parametrize("frames", ["nominal", "following"])
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 def test_quasi_static_starts_do_not_vibrate(frames: str) -> None:
     """Springs, dampers, a motor over speed: after 20 steps as the quasi-static deflection there; from rest 40 % off."""
     raw = four_bar(**elements())
@@ -83,7 +87,7 @@ def test_quasi_static_starts_do_not_vibrate(frames: str) -> None:
     assert np.linalg.norm(shaken.u[-1] - wanted) > 0.1 * size
 
 
-@pytest.mark.parametrize("frames", ["nominal", "following"])
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 def test_rates_of_quasi_static_starts_are_those_of_their_deflections(frames: str) -> None:
     """Of fourth order over half a step, found one by one; joints are closed."""
     raw = four_bar(**elements())
@@ -118,7 +122,7 @@ def test_a_bar_that_spins_faster_than_it_vibrates_is_deflected_exactly(
         "joints": {"A": {**HINGE, "links": ["ground", "arm"], "at": [0, 0]}},
         "materials": {"soft": {"youngs_modulus": E, "density": 7850, "poisson_ratio": 0.3}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
-        "analysis": {"end_time": 1e-3, "step": 1e-4, "rho_inf": 0.8, "frames": "nominal"},
+        "analysis": {"end_time": 1e-3, "step": 1e-4, "rho_inf": 0.8, "frames": "rigid-body"},
     }
     of = at(raw)
     u = displacements(of.ready, 0, quasi_static(of.ready, of.motion).u[None])[0, :, 0]
@@ -141,7 +145,7 @@ def spinning(speed: float, driven: bool) -> Begun:
     """The arm at a speed, by a drive or by itself."""
     if driven:
         drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}}
-        return at(arm(drive=drive, analysis={"frames": "following"}))
+        return at(arm(drive=drive, analysis={"frames": "co-rotational"}))
     return at(arm(analysis={"initial_speeds": {"A": speed}}))
 
 
@@ -225,7 +229,7 @@ def test_a_link_that_hangs_free_has_no_static_balance_and_says_so() -> None:
 def test_a_start_knows_the_turns_of_its_drive() -> None:
     """After more than half a turn coordinates of driven hinges are zero, not 2 π."""
     raw = four_bar(drive={"joint": "A", "motion": {"kind": "constant_speed", "speed": 100.0}})
-    of = at({**raw, "analysis": {**raw["analysis"], "frames": "following", "end_time": 0.1}})
+    of = at({**raw, "analysis": {**raw["analysis"], "frames": "co-rotational", "end_time": 0.1}})
     now = Instant(of.ready, of.motion, 0.05)
     assert now.motion.drives[0, 0] > np.pi
     assert np.abs(now.coordinates(np.zeros((3, of.ready.system.unknowns)))[0]).max(initial=0.0) < 1e-9

@@ -25,11 +25,11 @@ def supported(raw: dict[str, Any], count: int) -> tuple[Begun, Supports]:
 
 
 CELLS = [(acting, crank, frames) for acting in ON_CRANK for crank, frames in
-         (("rigid", "nominal"), ("rigid", "following"), ("beam", "nominal"))]  # fmt: skip
+         (("rigid", "rigid-body"), ("rigid", "co-rotational"), ("beam", "rigid-body"))]  # fmt: skip
 SOON = {
-    ("torsion spring", "rigid", "nominal"),
-    ("motor", "rigid", "following"),
-    ("spring to the ground", "beam", "nominal"),
+    ("torsion spring", "rigid", "rigid-body"),
+    ("motor", "rigid", "co-rotational"),
+    ("spring to the ground", "beam", "rigid-body"),
 }
 
 
@@ -85,7 +85,7 @@ def test_a_spring_from_the_driven_crank_to_the_ground_is_in_its_hub() -> None:
     assert_allclose(np.abs(torque).max(), 76.7, atol=0.1)
 
 
-@pytest.mark.parametrize("frames", ["nominal", "following"])
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 def test_the_effort_of_a_drive_is_what_energy_and_work_say(frames: str) -> None:
     """∫ T dφ = change of kinetic and elastic energy, less gravity's and the motor's work, more what is damped."""
     more = elements()

@@ -31,7 +31,7 @@ def arm(kind: str, R: np.ndarray, elements: int = 2) -> Raw:
     if flat:
         shape["between"] = [[0.0, 0.0], end[:2]]
     if kind == "reduced":
-        link |= {"functions": 6}
+        link |= {"modes": 6}
     if kind != "beam":
         link["segments"] = 2
     return link
@@ -68,7 +68,7 @@ def moving(kind: str, R: np.ndarray, driven: bool) -> Raw:
     raw: Raw = {
         "links": {"arm": arm(kind, R)}, "joints": {"A": hinge}, "loads": loads(kind, R),
         "damping": {"alpha": 3.0, "beta": 1e-5},
-        "analysis": {"end_time": 0.005, "step": 2e-4, "rho_inf": 0.8, "frames": "following", "initial": "rest"},
+        "analysis": {"end_time": 0.005, "step": 2e-4, "rho_inf": 0.8, "frames": "co-rotational", "initial": "rest"},
     }  # fmt: skip
     if driven:
         return raw | {"drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 30.0}}}

@@ -33,7 +33,7 @@ ENDLESS = 20  # seconds after which a reader is ended
 MOST_STEPS = 24  # of a whole short run
 QUICK = (
     "four_bar_beams",
-    "four_bar_following",
+    "four_bar_corotational",
     "motor_four_bar",
     "spinning_bar",
     "rssr",
@@ -126,10 +126,10 @@ def short(raw: Raw) -> Raw:
     """The scene with few steps, plain defaults and nothing drawn."""
     analysis = raw.get("analysis")
     analysis = dict(analysis) if isinstance(analysis, dict) else {}
-    for key in ("turns", "steps_per_turn", "end_time", "step", "accuracy"):
+    for key in ("revolutions", "steps_per_revolution", "end_time", "step", "accuracy"):
         analysis.pop(key, None)
-    analysis |= {"step": 1e-3, "end_time": 1e-3 * MOST_STEPS, "accuracy": "quick", "levels": 1}
-    output = {"animation": {"frames_per_turn": 12}, "plots": False, "picture": False, "csv": False}
+    analysis |= {"step": 1e-3, "end_time": 1e-3 * MOST_STEPS, "accuracy": "quick", "extrapolation_levels": 1}
+    output = {"animation": {"frames_per_revolution": 12}, "plots": False, "picture": False, "csv": False}
     probes = raw.get("output", {}).get("probes") if isinstance(raw.get("output"), dict) else None
     return raw | {"analysis": analysis, "output": output | ({"probes": probes} if probes is not None else {})}
 

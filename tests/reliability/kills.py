@@ -39,14 +39,14 @@ at = [0, 0]
 joint = "A"
 motion = { kind = "constant_speed", speed = "60 rpm" }
 [analysis]
-turns = 1
-steps_per_turn = STEPS
+revolutions = 1
+steps_per_revolution = STEPS
 accuracy = "quick"
-levels = LEVELS
+extrapolation_levels = LEVELS
 [output]
 plots = false
 picture = false
-animation = { frames_per_turn = 60 }
+animation = { frames_per_revolution = 60 }
 """
 LONGEST = 300.0  # seconds that one run may take
 ORPHANS = 5.0  # seconds after which nothing of a killed run may be there

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from kedfem.accuracy.menu import fidelities
 from kedfem.accuracy.study import Seconds, Study, pareto_front, studied
 from kedfem.accuracy.study_files import read_study, study_rows, write_study, write_study_plot
+from kedfem.accuracy.study_variants import fidelities
 from kedfem.cli import INTERRUPTED, USER_ERROR
 from kedfem.report import study_tables
 from kedfem.scene import read_scene

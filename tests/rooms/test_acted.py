@@ -1,4 +1,4 @@
-"""Springs, dampers and motors on links with nominal frames: for small forces the answer of frames that follow."""
+"""Springs, dampers and motors on links with rigid-body frames: for small forces the answer of co-rotational frames."""
 
 from typing import Any
 
@@ -22,7 +22,12 @@ LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "
 
 def four_bar(frames: str, fidelity: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
     """A slow four-bar of steel, a quarter of a turn."""
-    analysis = {"turns": 0.25, "steps_per_turn": steps, "frames": frames, "initial": "quasi-static"}
+    analysis = {
+        "revolutions": 0.25,
+        "steps_per_revolution": steps,
+        "frames": frames,
+        "initial": "quasi-static",
+    }
     mesh = {"elements": 2} if fidelity == "beam" else {}
     shape = {"kind": "bar", "width": 0.02, "thickness": 0.01}
     return scenes.four_bar(
@@ -78,7 +83,7 @@ def test_the_difference_to_frames_that_follow_falls_with_the_square_of_the_load(
     found = []
     for load in (400.0, 200.0):
         followed, nominal = (
-            places(four_bar(frames, springs=line(load))) for frames in ("following", "nominal")
+            places(four_bar(frames, springs=line(load))) for frames in ("co-rotational", "rigid-body")
         )
         assert apart(followed, nominal) < 2e-3 * largest(nominal)
         found.append(apart(followed, nominal))
@@ -90,8 +95,10 @@ def test_the_difference_to_frames_that_follow_falls_with_the_square_of_the_load(
 def test_the_literal_solver_finds_the_same(initial: str, rho_inf: float) -> None:
     """It assembles and factors all of it at every step."""
     analysis = {"initial": initial, "rho_inf": rho_inf}
-    condensed = four_bar("nominal", springs=line(200.0), analysis=analysis, steps=40)
-    literal = four_bar("nominal", springs=line(200.0), analysis={**analysis, "solver": "literal"}, steps=40)
+    condensed = four_bar("rigid-body", springs=line(200.0), analysis=analysis, steps=40)
+    literal = four_bar(
+        "rigid-body", springs=line(200.0), analysis={**analysis, "solver": "monolithic"}, steps=40
+    )
     ready, _ = prepared(scene_from(literal))
     solver = steps_of(ready.scene, ready.model)
     assert isinstance(solver, SystemSteps)
@@ -111,7 +118,7 @@ def tied(k: float, **analysis: Any) -> dict[str, Any]:
     ends = [{"link": "coupler", "at": "C"}, {"link": "coupler", "at": "B"}]
     tie = {"kind": "spring", "between": ends, "stiffness": k}
     pull = {**LINE, "stiffness": 1e3, "preload": 1e3}
-    return four_bar("nominal", springs={"s": pull, "tie": tie}, steps=90, analysis=analysis)
+    return four_bar("rigid-body", springs={"s": pull, "tie": tie}, steps=90, analysis=analysis)
 
 
 @pytest.mark.long
@@ -119,7 +126,7 @@ def test_a_spring_may_be_far_stiffer_than_the_links() -> None:
     """One of 1e12 N/m keeps the ends of the coupler, E A / L = 1.4e8 N/m, apart as drawn."""
     soft, stiff = (np.ptp(channel(*run(tied(k)), "springs/tie/length")) for k in (1.0, 1e12))
     assert 0 < stiff < 1e-3 * soft
-    one, other = places(tied(1e12)), places(tied(1e12, solver="literal"))
+    one, other = places(tied(1e12)), places(tied(1e12, solver="monolithic"))
     assert apart(one, other) < 1e-7 * largest(one)
 
 
@@ -129,7 +136,7 @@ def test_the_same_law_drives_a_motor() -> None:
     for torque in (curve, 2.0, {"over": "angle", "at": [-1, 1], "value": [3, -3]}):
         followed, nominal = (
             places(four_bar(frames, motors={"m": {"joint": "C", "torque": torque}}))
-            for frames in ("following", "nominal")
+            for frames in ("co-rotational", "rigid-body")
         )
         assert apart(followed, nominal) < 1e-3 * largest(nominal)
 
@@ -138,7 +145,7 @@ def test_the_same_law_drives_a_motor() -> None:
 def test_meshed_links_bear_springs_too(fidelity: str) -> None:
     followed, nominal = (
         places(four_bar(frames, fidelity, springs=line(50.0), steps=72))
-        for frames in ("following", "nominal")
+        for frames in ("co-rotational", "rigid-body")
     )
     assert apart(followed, nominal) < 1e-3 * largest(nominal)
 
@@ -146,12 +153,12 @@ def test_meshed_links_bear_springs_too(fidelity: str) -> None:
 def test_without_a_force_a_spring_changes_nothing() -> None:
     slack = {"s": {**LINE, "stiffness": 1e-9, "preload": 0.0}}
     rest = {"initial": "rest"}
-    plain, held = (places(four_bar("nominal", analysis=rest, **each)) for each in ({}, {"springs": slack}))
+    plain, held = (places(four_bar("rigid-body", analysis=rest, **each)) for each in ({}, {"springs": slack}))
     assert apart(plain, held) < 1e-9 * largest(plain)
 
 
 def balance(raw: dict[str, Any]) -> tuple[float, float]:
-    """What is left over of the energy, and the work of the loads."""
+    """The residual of the energy, and the work of the loads."""
     ready, blocks = run(raw)
     account = Account(ready.model)
     work = [account.rows(block)["work"][-1, 0] for block in blocks]
@@ -160,7 +167,7 @@ def balance(raw: dict[str, Any]) -> tuple[float, float]:
 
 def test_the_energy_left_over_falls_with_the_square_of_the_step() -> None:
     (long, work), (short, same) = (
-        balance(four_bar("nominal", springs=line(200.0), steps=n)) for n in (360, 720)
+        balance(four_bar("rigid-body", springs=line(200.0), steps=n)) for n in (360, 720)
     )
     assert long / short == pytest.approx(4.0, rel=0.3)
     assert work == pytest.approx(same, rel=1e-3)
@@ -169,7 +176,7 @@ def test_the_energy_left_over_falls_with_the_square_of_the_step() -> None:
 def test_the_work_is_that_which_springs_store() -> None:
     """Of a spring without damper: the energy ½ k (l − l0)² that it had more at first."""
     spring = {"s": {**LINE, "stiffness": 2000.0, "preload": 50.0}}
-    ready, blocks = run(four_bar("nominal", springs=spring, steps=720))
+    ready, blocks = run(four_bar("rigid-body", springs=spring, steps=720))
     account = Account(ready.model)
     work = np.concatenate([account.rows(block)["work"][:, 0] for block in blocks])
     force, length = (channel(ready, blocks, f"springs/s/{x}") for x in ("force", "length"))
@@ -182,7 +189,7 @@ def test_the_work_is_that_which_springs_store() -> None:
 def torn(**analysis: Any) -> dict[str, Any]:
     """A spring of 1e9 N/m that holds the coupler's end where it was drawn, while the crank goes round."""
     springs = {"s": {**LINE, "stiffness": 1e9}}
-    return four_bar("nominal", springs=springs, analysis={"initial": "rest", **analysis}, steps=20)
+    return four_bar("rigid-body", springs=springs, analysis={"initial": "rest", **analysis}, steps=20)
 
 
 def test_forces_that_tear_the_links_apart_are_solved() -> None:
@@ -202,7 +209,7 @@ def test_forces_that_tear_the_links_apart_are_solved() -> None:
 def test_forces_that_tear_the_links_apart_are_solved_by_the_oracle_too() -> None:
     """But for the last of five steps, in which both find a deflection as large as the links, one of two."""
     one, other = (
-        {key: u[:5] for key, u in places(torn(**solver)).items()} for solver in ({}, {"solver": "literal"})
+        {key: u[:5] for key, u in places(torn(**solver)).items()} for solver in ({}, {"solver": "monolithic"})
     )
     assert apart(one, other) < 1e-8 * largest(one)
 
@@ -210,7 +217,7 @@ def test_forces_that_tear_the_links_apart_are_solved_by_the_oracle_too() -> None
 def slider_crank(steps: int = 180, **spring: float) -> dict[str, Any]:
     """A spring along the slide of a slider-crank."""
     along = {"kind": "spring", "joint": "S", "stiffness": 1000.0, "preload": 20.0, **spring}
-    raw = four_bar("nominal", springs={"p": along}, steps=steps)
+    raw = four_bar("rigid-body", springs={"p": along}, steps=steps)
     bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "fidelity": "beam"}
     raw["links"] = {
         "crank": {**rod, "shape": {**bar, "between": [[0, 0], [0.1, 0]]}},
@@ -227,12 +234,12 @@ def slider_crank(steps: int = 180, **spring: float) -> dict[str, Any]:
 
 
 def test_a_spring_along_a_slide_pulls_its_link_back() -> None:
-    """−k q − F0 on the shoe of a slider-crank, whose travel is that of the nominal motion but for a little."""
+    """−k q − F0 on the shoe of a slider-crank, whose travel is that of the rigid-body motion but for a little."""
     raw = slider_crank()
     force, travel = (channel(*run(raw), f"springs/p/{x}") for x in ("force", "travel"))
     phi = np.pi / 180 * 2 * np.arange(len(travel))
     drawn = 0.1 * np.cos(phi) + np.sqrt(0.3**2 - (0.1 * np.sin(phi)) ** 2) - 0.4
     assert_allclose(travel, drawn, atol=5e-5)  # the crank bends
     assert_allclose(force, -1000.0 * travel - 20.0, rtol=1e-9)
-    raw["analysis"]["frames"] = "following"
+    raw["analysis"]["frames"] = "co-rotational"
     assert_allclose(channel(*run(raw), "springs/p/force"), force, atol=1e-4)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.action import (
+from kedfem.dynamics.force_element import (
     ANGLE,
     DISTANCE,
     PAIR,
@@ -19,18 +19,18 @@ from kedfem.dynamics.action import (
     SLIDE,
     SPEED,
     TURN,
-    Action,
     End,
+    ForceElement,
     kernel_table,
 )
-from kedfem.dynamics.actions import actions, hinges
-from kedfem.dynamics.actions_kernel import evaluate, evaluate_all
+from kedfem.dynamics.force_elements import actions, hinges
+from kedfem.dynamics.force_elements_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import MeshError, SceneError
+from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import resting
-from kedfem.motion.rows import perpendiculars
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from
 from tests.laws.strategies import examples
@@ -44,15 +44,15 @@ def end(form: int, X: Any, k: int = 0) -> End:
     return End(k, 1, form, np.ones((len(X), 1)), X)
 
 
-def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> Action:
+def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> ForceElement:
     """A hinge whose ends show themselves in two ways; the second is drawn turned by 0.4 rad about the axis."""
     e = np.array(perpendiculars(axis))
     aside = Rotation.from_rotvec(0.4 * axis).apply(e)
     X = {PAIR: (e, e), SINGLE: ([e[0], axis], [aside[0], axis]), ANGLE: (np.zeros(3), np.zeros(3))}
-    return Action("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), axis=axis, **law)
+    return ForceElement("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), axis=axis, **law)
 
 
-def drawn(every: Sequence[Action]) -> np.ndarray:
+def drawn(every: Sequence[ForceElement]) -> np.ndarray:
     x = np.zeros((len(every), 2, 2, 3))
     for i, action in enumerate(every):
         for e in (0, 1):
@@ -61,7 +61,7 @@ def drawn(every: Sequence[Action]) -> np.ndarray:
 
 
 def found(
-    action: Action, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
+    action: ForceElement, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forces (2, 2, 3) and values (4,) of one action."""
     forces, values = np.zeros((1, 2, 2, 3)), np.zeros((1, 4))
@@ -70,7 +70,7 @@ def found(
     return forces[0], values[0]
 
 
-def turned(x: np.ndarray, action: Action, turns: Sequence[np.ndarray]) -> np.ndarray:
+def turned(x: np.ndarray, action: ForceElement, turns: Sequence[np.ndarray]) -> np.ndarray:
     """Each end's vectors turned by its own rotation; a planar beam's angle about z added."""
     out = x.copy()
     for e, theta in enumerate(turns):
@@ -183,7 +183,7 @@ def test_a_torsion_spring_turns_back() -> None:
 
 
 def test_a_spring_between_points_pulls_along_its_line() -> None:
-    action = Action("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
+    action = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
     x, v = drawn([action])[0], np.zeros((2, 2, 3))
     v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
     f, values = found(action, x, v)
@@ -192,7 +192,7 @@ def test_a_spring_between_points_pulls_along_its_line() -> None:
 
 
 def test_a_spring_of_no_length_has_no_direction() -> None:
-    action = Action("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
+    action = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
     f, values = found(action, drawn([action])[0])
     assert not f.any()
     assert not values.any()
@@ -200,7 +200,7 @@ def test_a_spring_of_no_length_has_no_direction() -> None:
 
 def test_a_slide_is_pushed_along_its_axis() -> None:
     axis = unit(5)
-    action = Action("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
+    action = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
                     over=POSITION, at=(0.0, 1.0), value=(0.0, 8.0))  # fmt: skip
     x = drawn([action])[0]
     x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
@@ -223,7 +223,8 @@ def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> Non
 
 
 def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
-    every = [hinge(PAIR, PAIR, Z, **LAWS), Action("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])), 2.0),
+    every = [hinge(PAIR, PAIR, Z, **LAWS), ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0,
+    0])), 2.0),
              hinge(ANGLE, PAIR, Z, at=(0.0, 1.0), value=(1.0, 2.0))]  # fmt: skip
     x0, t = drawn(every), np.linspace(0, 2, 9)
     x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
@@ -280,7 +281,9 @@ def built(raw: dict[str, Any]) -> tuple[Scene, Model]:
     return scene, elastic_model(scene, linkage(scene))
 
 
-def state_of(action: Action, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]) -> np.ndarray:
+def state_of(
+    action: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]
+) -> np.ndarray:
     """Vectors (2, 2, 3) of an action's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
     x = drawn([action])[0]
     for e, at in enumerate(action.ends):

@@ -16,7 +16,7 @@ from kedfem.analysis import analyse
 from kedfem.errors import MotionError, SceneError
 from kedfem.links.beam_axis import directions
 from kedfem.mesh import link_mesh
-from kedfem.mesh.ways import file_axes
+from kedfem.mesh.methods import file_axes
 from kedfem.motion.assembly import assembled
 from kedfem.motion.linkage import linkage
 from kedfem.motion.redrawn import Shift, redrawn
@@ -47,7 +47,7 @@ def raw_scene(joints: JointTable, links: dict[str, Any], **sections: Any) -> dic
         "links": links,
         "joints": {name: joint(*fields) for name, fields in joints.items()},
         "drive": drive,
-        "analysis": {"turns": 0.1, "steps_per_turn": 360},
+        "analysis": {"revolutions": 0.1, "steps_per_revolution": 360},
         "output": {"animation": False, "plots": False, "picture": False},
         **sections,
     }
@@ -517,7 +517,7 @@ D = { kind = "revolute", links = ["rocker", "ground"], at = "D" }
 joint = "A"
 motion = { kind = "constant_speed", speed = "60 rpm" }
 [analysis]
-turns = 0.1
+revolutions = 0.1
 [output]
 plots = false
 """

@@ -41,7 +41,12 @@ def audited(raw: dict[str, Any]) -> tuple[Balance, dict[str, np.ndarray]]:
 def example(name: str, steps: int, links: dict[str, Any] | None = None, **analysis: Any) -> dict[str, Any]:
     """A quarter of a turn of an example."""
     raw = scenes.example(name)
-    raw["analysis"] = {"turns": 0.25, "steps_per_turn": steps, "initial": "quasi-static", **analysis}
+    raw["analysis"] = {
+        "revolutions": 0.25,
+        "steps_per_revolution": steps,
+        "initial": "quasi-static",
+        **analysis,
+    }
     for link in raw["links"].values():
         link.update(links or {})
     return raw
@@ -53,15 +58,15 @@ def arm(link: dict[str, Any], motion: dict[str, Any], **rest: Any) -> dict[str, 
 
 KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "beams": ("four_bar_beams", {}, {}),
-    "literal": ("four_bar_beams", {}, {"solver": "literal"}),
+    "monolithic": ("four_bar_beams", {}, {"solver": "monolithic"}),
     "from rest": ("four_bar_beams", {"mesh": {"elements": 2}}, {"initial": "rest"}),
     "spatial beams": ("four_bar_beams", {"beam": "spatial"}, {}),
-    "beams that are followed": ("four_bar_beams", {"mesh": {"elements": 2}}, {"frames": "following"}),
+    "beams that are followed": ("four_bar_beams", {"mesh": {"elements": 2}}, {"frames": "co-rotational"}),
     "planes": ("four_bar_beams", {"fidelity": "plane"}, {}),
     "planes that are followed": (
         "four_bar_beams",
         {"fidelity": "plane", "segments": 2},
-        {"frames": "following"},
+        {"frames": "co-rotational"},
     ),
     "reduced planes": ("four_bar_beams", {"fidelity": "plane", "reduced": True}, {}),
     "solids": ("four_bar_solids", {"mesh": {"size": 0.05}}, {}),
@@ -159,7 +164,7 @@ def test_damping_takes_what_a_vibrating_arm_loses() -> None:
 
 
 def test_without_the_neglected_work_the_linear_equation_does_not_balance() -> None:
-    """The four-bar of [KED] at 600 rpm: K turns with the nominal motion, a tenth of the energy is lost on that."""
+    """The four-bar of [KED] at 600 rpm: K turns with the rigid-body motion, a tenth of the energy is lost on that."""
     found, energies = audited(example("four_bar_beams", 720))
     left, neglected = (np.abs(energies[x]).max() for x in ("residual", "neglected"))
     assert left < 2e-3 * neglected
@@ -167,8 +172,8 @@ def test_without_the_neglected_work_the_linear_equation_does_not_balance() -> No
 
 
 def test_frames_that_follow_neglect_nothing() -> None:
-    """But for α, whose forces the nominal frame holds, as with nominal frames."""
-    raw = example("four_bar_beams", 180, frames="following")
+    """But for α, whose forces the rigid-body frame holds, as with rigid-body frames."""
+    raw = example("four_bar_beams", 180, frames="co-rotational")
     neglected = []
     for damping in ({"beta": 3e-5}, {"alpha": 5}):
         raw["damping"] = damping
@@ -192,7 +197,7 @@ def test_the_account_does_not_know_how_the_time_points_come_in_blocks() -> None:
 
 
 def test_a_run_says_what_is_left_over_and_warns_when_that_is_much(tmp_path: Path) -> None:
-    raw = example("four_bar_beams", 60, initial="rest", turns=2)
+    raw = example("four_bar_beams", 60, initial="rest", revolutions=2)
     raw["output"] = {"folder": str(tmp_path), "animation": False, "plots": False, "picture": False}
     done = analyse(scene_from(quick(raw)))
     assert done.balance is not None

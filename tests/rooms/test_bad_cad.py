@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from kedfem.mesh import mesh_quality
-from kedfem.mesh.ways import made_mesh
+from kedfem.mesh.methods import made_mesh
 from kedfem.scene import Cad, link_from
 from tests import bad_cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, read, refused, written

@@ -1,4 +1,4 @@
-"""Faults that only the meshed links reveal: seats, probes, loads and bodies, each with its message."""
+"""Faults that only the meshed links reveal: coupling surfaces, probes, loads and bodies, each with its message."""
 
 import re
 from typing import Any
@@ -23,7 +23,7 @@ def arm(fidelity: str = "solid") -> dict[str, Any]:
     """One bar, 0.5 m along x, hinged at its left end face."""
     elements = [4, 1, 1] if fidelity == "solid" else 2
     link = bar(fidelity=fidelity, mesh={"elements": elements})
-    return scenes.arm(link, constant_speed(10), analysis={"turns": 0.1})
+    return scenes.arm(link, constant_speed(10), analysis={"revolutions": 0.1})
 
 
 def fault(raw: dict[str, Any]) -> str:

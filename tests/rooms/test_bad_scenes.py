@@ -79,8 +79,8 @@ ratio = 0.02
 frequencies = [10, 1000]
 
 [analysis]
-turns = 2
-steps_per_turn = 360
+revolutions = 2
+steps_per_revolution = 360
 
 [output.probes.middle]
 link = "rocker"
@@ -264,9 +264,9 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "bodies/wheel/inertia": 0,
     }
     assert sorted(faults_of(scene_from, changed(GOOD, change))) == [
-        "analysis.turns: must stand without end_time, got both",
+        "analysis.revolutions: cannot be combined with end_time, got both",
         "bodies.wheel.inertia: must be positive [kg*m^2], got 0",
-        "damping.ratio: must stand without alpha and beta, got both",
+        "damping.ratio: cannot be combined with alpha and beta, got both",
         "drive.joint: must name a joint, got 'Q', known: A, B, C, D",
         "joints.B.links[1]: must name a link, got 'couple', did you mean 'coupler'?",
         "joints.D.kind: must be one of revolute, spherical, weld, prismatic, cylindrical, screw, universal, planar, "
@@ -275,7 +275,7 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
-        "links.rocker.colour: unknown key, known: fidelity, reduced, functions, material, shape, step, mass, mesh, "
+        "links.rocker.colour: unknown key, known: fidelity, reduced, modes, material, shape, step, mass, mesh, "
         "element, min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
         "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
@@ -404,7 +404,7 @@ def test_a_motion_table_is_in_a_file_or_in_the_scene():
     motion = {"kind": "table", "file": "motion.csv", "time": [0, 1], "angle": [0, 1]}
     change = {"drive/motion": motion, "analysis": {"end_time": 1, "step": 0.1}}
     assert faults_of(scene_from, changed(GOOD, change)) == [
-        "drive.motion.file: must stand without time and angle, got both"
+        "drive.motion.file: cannot be combined with time and angle, got both"
     ]
 
 

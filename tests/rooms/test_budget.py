@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kedfem.accuracy.budget import budget_warning
+from kedfem.accuracy.error_budget import budget_warning
 from tests.budget import Judged, cases, judged
 
 FEW = (

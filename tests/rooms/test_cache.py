@@ -32,7 +32,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def scene(**changes: Any) -> Scene:
-    raw = four_bar("bar", turns=0.1, initial="quasi-static", rho_inf=0.9, **changes)
+    raw = four_bar("bar", revolutions=0.1, initial="quasi-static", rho_inf=0.9, **changes)
     for link in raw["links"].values():
         link["fidelity"] = "reduced"
     raw["links"]["crank"]["fidelity"] = "rigid"
@@ -91,7 +91,7 @@ def test_a_damaged_entry_is_made_again(folder: Path, monkeypatch: pytest.MonkeyP
         ({"title": "another"}, True),
         ({"output": {"folder": "elsewhere", "csv": True, "animation": False}}, True),
         ({"gravity": [0, -9.81, 0]}, False),
-        ({"analysis": {"turns": 0.2, "steps_per_turn": 120}}, False),
+        ({"analysis": {"revolutions": 0.2, "steps_per_revolution": 120}}, False),
     ],
 )
 def test_the_key_belongs_to_what_the_result_depends_on(change: dict[str, Any], same: bool) -> None:

@@ -62,7 +62,7 @@ def planar(kind: str, other: str) -> Raw:
 
 def bushed() -> Raw:
     raw = chain("spherical", ("beam", "beam"))
-    raw["joints"]["J"]["bushing"] = {"stiffness": 1e6, "turning_stiffness": 1e3}
+    raw["joints"]["J"]["bushing"] = {"stiffness": 1e6, "rotational_stiffness": 1e3}
     return raw
 
 
@@ -83,10 +83,10 @@ BOTH = {
     "b": {"kind": "spring", "joint": "A", "stiffness": 1.0},
 }
 SCENES: list[Raw] = [
-    slid("slot", analysis={**inverted()["analysis"], "frames": "following"}),
+    slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}),
     slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "rho_inf": 1.0}),
-    slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "frames": "following"}),
-    slid("prismatic", analysis={**inverted()["analysis"], "solver": "literal", "frames": "following"}),
+    slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "frames": "co-rotational"}),
+    slid("prismatic", analysis={**inverted()["analysis"], "solver": "monolithic", "frames": "co-rotational"}),
     slid("prismatic", springs=BOTH, motors={"m": {"joint": "S", "torque": 1.0}, "n": {"joint": "A", "force": 1.0}}),
     slid("prismatic", motors={"n": {"joint": "S", "force": 1.0}},
          springs={"s": {"kind": "spring", "joint": "S", "stiffness": 1.0}},
@@ -99,8 +99,8 @@ SCENES: list[Raw] = [
     bare(kind="torque", at=[1, 0], vector=[0, 0, 1]), bare(kind="body", force_density=[0, 1]),
     bare(kind="surface", at=[1, 0], axis="x", force=[0, 1]), bare(kind="pressure", at=[1, 0], axis="x", pressure=5),
     changed(BASES["free"], {
-        "analysis/frames": "nominal", "links/arm/frames": "nominal", "analysis/initial": "quasi-static",
-        "analysis/turns": 1, "analysis/steps_per_turn": 10, "damping": {"alpha": 1.0, "beta": 1e-5},
+        "analysis/frames": "rigid-body", "links/arm/frames": "rigid-body", "analysis/initial": "quasi-static",
+        "analysis/revolutions": 1, "analysis/steps_per_revolution": 10, "damping": {"alpha": 1.0, "beta": 1e-5},
         "loads/p": {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 1],
                     "factor": {"over": "angle", "at": [0], "value": [1]}},
     }),
@@ -133,18 +133,18 @@ def test_a_joint_stands_with_frames_as_its_page_says(kind: str, column: str) -> 
 
 
 def test_a_line_that_is_taken_out_refuses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To lift a refusal is to change one line: of slots with frames that follow."""
-    raw = slid("slot", analysis={**inverted()["analysis"], "frames": "following"})
+    """To lift a refusal is to change one line: of slots with co-rotational frames."""
+    raw = slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"})
     assert any("must be another than slot" in fault for fault in faults(raw))
     monkeypatch.setattr(capabilities, "REFUSALS", tuple(x for x in REFUSALS if x is not capabilities.SLOTS))
     assert not faults(raw)
 
 
 def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> None:
-    (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "following"}))
+    (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}))
     assert said == (
-        'joints.S.kind: must be another than slot with frames = "following" (the pin of a slot slides as the nominal '
-        'motion tells), got a slot: take frames = "nominal", or a slide with a hinge'
+        'joints.S.kind: must be another than slot with frames = "co-rotational" (the pin of a slot slides as the nominal '
+        'motion tells), got a slot: take frames = "rigid-body", or a slide with a hinge'
     )
 
 

@@ -52,7 +52,7 @@ def scene_with(tmp_path: Path, faces: Any, at: Any = (0, 0, 0.005), axis: str = 
             }
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }
     return scene_from(raw, tmp_path)
 
@@ -138,7 +138,7 @@ def test_a_part_from_cad_has_all_its_faces_to_choose_from(tmp_path: Path) -> Non
             "A": {"kind": "revolute", "links": ["ground", "arm"], "at": "0 mm", "faces": {"arm": {"cylinder": "8 mm"}}}
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }  # fmt: skip
     raw["joints"]["A"]["at"] = [0.05, 0.01, 0.004]
     link = bare_links(scene_from(raw, tmp_path))["arm"]
@@ -205,7 +205,7 @@ def test_what_is_missing_is_refused_with_what_there_is_of_that_form() -> None:
     [
         ({"near": [0, 0]}, r"joints.A.faces.part: must say what the face is by one of plane, cylinder, sphere, got none"),
         ({"plane": "z", "cylinder": 1}, r"joints.A.faces.part: must say .* got plane and cylinder"),
-        ({"plane": "z", "axis": "z"}, r"joints.A.faces.part.axis: must stand with cylinder, got it with plane"),
+        ({"plane": "z", "axis": "z"}, r"joints.A.faces.part.axis: must be combined with cylinder, got it with plane"),
         ({"cylinder": "-8 mm"}, r"joints.A.faces.part.cylinder: must be positive \[m\], got '-8 mm'"),
         ([{"cylinder": 1, "close": "B"}], r"joints.A.faces.part\[0\].close: unknown key, known: plane, cyl"),
         ({"sphere": 1, "near": "C"}, r"joints.A.faces.part.near: must name a point, got 'C'"),

@@ -45,14 +45,14 @@ motion = { kind = "constant_speed", speed = "60 rpm" }
 ratio = 0.02
 frequencies = [5, 200]
 [analysis]
-turns = TURNS
-steps_per_turn = 360
+revolutions = TURNS
+steps_per_revolution = 360
 accuracy = "quick"
 initial = "quasi-static"
 [output]
 plots = false
 picture = false
-animation = { frames_per_turn = 36 }
+animation = { frames_per_revolution = 36 }
 [output.probes.middle_and_tip]
 link = "arm"
 at = "B"
@@ -390,7 +390,9 @@ def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
         return real(writer, *given)
 
     monkeypatch.setattr(AnimationWriter, "add", added)
-    arm.write_text(arm.read_text("utf-8").replace("frames_per_turn = 36", "frames_per_turn = 1"), "utf-8")
+    arm.write_text(
+        arm.read_text("utf-8").replace("frames_per_revolution = 36", "frames_per_revolution = 1"), "utf-8"
+    )
     analyse(read_scene(arm))
     assert set(seen) == {(True, True)}
 
@@ -447,7 +449,7 @@ def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
     assert (folder / "results.csv").exists()
     assert list((folder / "plots").glob("*.png"))
     arm.write_text(
-        text.replace("animation = { frames_per_turn = 36 }", "animation = false"), encoding="utf-8"
+        text.replace("animation = { frames_per_revolution = 36 }", "animation = false"), encoding="utf-8"
     )
     assert run_kedfem("run", arm).code == 0
     assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == [

@@ -14,7 +14,7 @@ from kedfem import compiled
 from kedfem.store import entries
 
 ROOT = Path(__file__).parents[2]
-EXAMPLES = "rssr", "four_bar_following", "motor_four_bar", "spinning_bar"
+EXAMPLES = "rssr", "four_bar_corotational", "motor_four_bar", "spinning_bar"
 BEFOREHAND = """
 import sys
 from kedfem.analysis import analyse

@@ -60,12 +60,12 @@ def first_alone(every: Mapping[str, Any]) -> list[Any]:
 
 
 MESHED = {
-    "plane links": lambda: four_bar("following", "plane", steps=36, analysis=REST),
+    "plane links": lambda: four_bar("co-rotational", "plane", steps=36, analysis=REST),
     "damped, rho_inf 0.8": lambda: four_bar(
-        "following", "plane", steps=36, damping={"beta": 1e-5, "alpha": 1.0}, analysis={**REST, "rho_inf": 0.8}
+        "co-rotational", "plane", steps=36, damping={"beta": 1e-5, "alpha": 1.0}, analysis={**REST, "rho_inf": 0.8}
     ),
-    "quasi-static solids": lambda: four_bar("following", "solid", steps=36),
-    "a sliding block": lambda: with_analysis(inverted("plane"), turns=0.02, frames="following"),
+    "quasi-static solids": lambda: four_bar("co-rotational", "solid", steps=36),
+    "a sliding block": lambda: with_analysis(inverted("plane"), revolutions=0.02, frames="co-rotational"),
 }  # fmt: skip
 
 
@@ -96,7 +96,9 @@ def stiffer(raw: Raw, times: float) -> Raw:
 
 def shorter(raw: Raw) -> Raw:
     """Half of the time."""
-    return with_analysis(raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"turns", "end_time"}})
+    return with_analysis(
+        raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"revolutions", "end_time"}}
+    )
 
 
 def off_its_seat(raw: Raw) -> Raw:
@@ -108,7 +110,7 @@ def off_its_seat(raw: Raw) -> Raw:
 DRIVEN = {
     **{kind: make for kind, make in BEAMS.items() if kind not in {"slot", "bushings"}},
     "sliding block": inverted,
-    "sliding block of plane links": lambda: off_its_seat(with_analysis(inverted("plane"), turns=0.02)),
+    "sliding block of plane links": lambda: off_its_seat(with_analysis(inverted("plane"), revolutions=0.02)),
     "shaft of universal joints": cardan,
     "gears": geared,
     "two drives": two_drives,
@@ -123,7 +125,7 @@ def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_nomi
     """Joint forces, drives, gears, energies: the rest falls with compliance. Efforts do the work."""
     raw = with_analysis(stiffer(shorter(DRIVEN[kind]()), 100.0), rho_inf=0.8)
     _, wanted, _ = channels(raw)
-    solver, got, unworked = channels(with_analysis(raw, frames="following"))
+    solver, got, unworked = channels(with_analysis(raw, frames="co-rotational"))
     assert isinstance(solver, CorotationalSteps)
     alike({k: x for k, x in got.items() if not k.startswith("energy/")},
           {k: x for k, x in wanted.items() if not k.startswith("energy/")}, 0.01)  # fmt: skip
@@ -134,7 +136,9 @@ def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_nomi
 
 def test_the_effort_of_a_drive_is_its_work_where_links_bend() -> None:
     """A crank and an arm on which a block slides, half a turn: ∫ T dφ is the work of supports, bent arm and all."""
-    raw = with_analysis(inverted(), frames="following", turns=0.5, steps_per_turn=480, rho_inf=0.8)
+    raw = with_analysis(
+        inverted(), frames="co-rotational", revolutions=0.5, steps_per_revolution=480, rho_inf=0.8
+    )
     _, got, unworked = channels(raw)
     assert np.abs(got["energy/work"][:, 1]).max() > 5.0  # J
     assert unworked < 1e-5
@@ -192,7 +196,7 @@ ON_SLIDE: dict[str, Raw] = {
 @pytest.mark.parametrize("acting", first_alone(ON_SLIDE))
 def test_motors_and_springs_along_a_slide_that_turns(acting: str) -> None:
     """A block on an arm about 0.4 m from its pivot: the drive's torque is that of rigid links, the work as counted."""
-    raw = with_analysis(stiffer(inverted(), 100.0), frames="following", rho_inf=0.8)
+    raw = with_analysis(stiffer(inverted(), 100.0), frames="co-rotational", rho_inf=0.8)
     _, got, unworked = channels({**raw, **ON_SLIDE[acting]})
     torque, rigid = got["drive/torque"], got["drive/rigid_torque"]
     plain = channels(raw)[1]["drive/rigid_torque"]
@@ -210,7 +214,7 @@ def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
     """Between crank and rod of a loop in space: as much from the drive as inverse dynamics says, in both frames."""
     raw = with_analysis(stiffer(shorter(BEAMS["cylindrical"]()), 100.0), rho_inf=0.8)
     (name,) = (key for key, joint in raw["joints"].items() if joint["kind"] == "cylindrical")
-    for frames in ("nominal", "following"):
+    for frames in ("rigid-body", "co-rotational"):
         acting = {"motors": {"m": {"joint": name, "torque": 40.0}}}
         _, got, unworked = channels({**with_analysis(raw, frames=frames), **acting})
         rigid = got["drive/rigid_torque"]
@@ -221,5 +225,7 @@ def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
 def test_loads_that_turn_stand_beside_joints_by_constraint_equations() -> None:
     """As by the oracle, with a block that slides on the loaded arm."""
     load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 100.0], "frame": "link"}
-    raw = with_analysis(inverted(), frames="following", initial="rest", rho_inf=0.8) | {"loads": {"P": load}}
+    raw = with_analysis(inverted(), frames="co-rotational", initial="rest", rho_inf=0.8) | {
+        "loads": {"P": load}
+    }
     assert against_oracle(as_a_run(begun(raw))) < 1e-7

@@ -17,15 +17,15 @@ from .test_dynamics import four_bar
 
 
 def sprung(**analysis: Any) -> dict[str, Any]:
-    raw = four_bar("bar", turns=1, **analysis)
+    raw = four_bar("bar", revolutions=1, **analysis)
     raw["springs"] = {"s": {"kind": "torsion", "joint": "B", "stiffness": 10.0}}
     return raw
 
 
-@pytest.mark.parametrize("frames", ["nominal", "following"])
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str) -> None:
     """By steps of their own solver, whatever sizes would say."""
-    raw = sprung(frames=frames, steps_per_turn=120)
+    raw = sprung(frames=frames, steps_per_revolution=120)
     for link in raw["links"].values():
         link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
     ready = meshed(scene_from(raw))
@@ -33,11 +33,11 @@ def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str)
     assert 24 <= said.tried <= 120
     assert said.steps > 0.0
     solver = steps_of(ready.scene, ready.model)
-    assert isinstance(solver, SystemSteps) == (frames == "nominal")
+    assert isinstance(solver, SystemSteps) == (frames == "rigid-body")
 
 
 def test_what_is_too_large_to_be_tried_is_forecast_by_its_sizes(monkeypatch: pytest.MonkeyPatch) -> None:
-    ready = meshed(scene_from(four_bar("bar", turns=1)))
+    ready = meshed(scene_from(four_bar("bar", revolutions=1)))
     monkeypatch.setattr(cost, "TRIED", ready.model.unknowns - 1)
     assert forecast(ready).tried == 0
     assert cost.estimated_cost(ready.scene, ready.model).steps > 0
@@ -45,10 +45,10 @@ def test_what_is_too_large_to_be_tried_is_forecast_by_its_sizes(monkeypatch: pyt
 
 def test_a_forecast_holds_all_that_a_run_makes_of_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """It tries the loop of the run itself, and the frames of the animation are counted, not those of the trial."""
-    raw = sprung(steps_per_turn=120)
+    raw = sprung(steps_per_revolution=120)
     for link in raw["links"].values():
         link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
-    raw["output"] = {"animation": {"frames_per_turn": 30}}
+    raw["output"] = {"animation": {"frames_per_revolution": 30}}
     ready, tried = meshed(scene_from(raw)), []
 
     def counted(now: Any, *told: Any) -> Any:

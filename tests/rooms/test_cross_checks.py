@@ -8,14 +8,14 @@ import pytest
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.analysis import analyse
+from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joint_rows import joint_rows
-from kedfem.results.acting import Measured, measured_actions
 from kedfem.results.audit import Account
+from kedfem.results.constraint_forces import ConstraintForces
+from kedfem.results.constraint_work import interface
 from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.force_elements import Measured, measured_actions
 from kedfem.results.recording import recording, rows
-from kedfem.results.row_forces import RowForces
-from kedfem.results.row_work import interface
 from kedfem.scene import scene_from
 from tests.moving import ran
 from tests.rooms.test_driven_efforts import ON_CRANK, four_bar
@@ -83,7 +83,7 @@ def test_what_constraints_that_vary_do_on_the_elastic_motion_is_their_forces_tim
         raw["analysis"]["step"] = step
         ready, blocks = ran(raw)
         checks, account = compared(ready, blocks)
-        model, work, forces, C, z, mu = ready.model, [], RowForces(ready.model), [], [], []
+        model, work, forces, C, z, mu = ready.model, [], ConstraintForces(ready.model), [], [], []
         for block in blocks:
             found = account.rows(block)
             work.append(found["work"][:, 1] - found["driven"][:, 0])

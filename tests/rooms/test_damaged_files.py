@@ -11,10 +11,10 @@ import pytest
 
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality
-from kedfem.mesh.apart import LONGEST
 from kedfem.mesh.cad import file
 from kedfem.mesh.cad.file import imported
 from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.isolated import LONGEST
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import Cad, link_from
 

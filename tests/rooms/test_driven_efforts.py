@@ -55,14 +55,20 @@ def four_bar(crank: str, more: dict[str, Any], **analysis: Any) -> dict[str, Any
             "D": ["rocker", "ground"],
         }.items()
     }
-    steps = {"turns": 1 / 3, "steps_per_turn": 36, "initial": "quasi-static", "rho_inf": 1.0, **analysis}
+    steps = {
+        "revolutions": 1 / 3,
+        "steps_per_revolution": 36,
+        "initial": "quasi-static",
+        "rho_inf": 1.0,
+        **analysis,
+    }
     drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": "1 rpm"}}
     return {"links": links, "joints": joints, "drive": drive, "analysis": steps, **more}
 
 
 @pytest.mark.parametrize(
     ("crank", "frames"),
-    [("beam", "nominal"), ("rigid", "nominal"), ("rigid", "following"), ("beam", "following")],
+    [("beam", "rigid-body"), ("rigid", "rigid-body"), ("rigid", "co-rotational"), ("beam", "co-rotational")],
 )
 @pytest.mark.parametrize("acting", list(ON_CRANK))
 def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(
@@ -80,7 +86,7 @@ def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(
         )
 
 
-@pytest.mark.parametrize("solver", ["condensed", "literal"])
+@pytest.mark.parametrize("solver", ["condensed", "monolithic"])
 @pytest.mark.parametrize("acting", list(ON_CRANK))
 def test_what_the_drive_of_a_rigid_link_gives_is_the_work_of_its_supports(acting: str, solver: str) -> None:
     """∫ T dφ of the channel against the account of energy, which knows forces on ports and P − M R0'' only."""
@@ -119,7 +125,7 @@ def arm(fidelity: str, elements: Any, **more: Any) -> dict[str, Any]:
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": motion},
         "damping": {"beta": 1e-4},
-        "analysis": {"end_time": 0.2, "step": 5e-4, "rho_inf": 0.9, "frames": "following"},
+        "analysis": {"end_time": 0.2, "step": 5e-4, "rho_inf": 0.9, "frames": "co-rotational"},
     }
 
 

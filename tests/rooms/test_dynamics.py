@@ -49,7 +49,7 @@ def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
         materials={"alloy": {"density": 2796, "youngs_modulus": 7.031e10, "shear_modulus": 2.712e10}},
         bodies={"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
         damping={"alpha": 0.5, "beta": 1e-5},
-        analysis={"turns": 1, "steps_per_turn": 120, "rho_inf": 1.0, **analysis},
+        analysis={"revolutions": 1, "steps_per_revolution": 120, "rho_inf": 1.0, **analysis},
     )
 
 
@@ -68,8 +68,8 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 )
 @pytest.mark.parametrize("rho_inf", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
 def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
-    model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps))
-    _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_turn=steps, solver="literal"))
+    model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps))
+    _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic"))
     assert isinstance(solver, SystemSteps)
     assert isinstance(literal, LiteralSteps)
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
@@ -77,7 +77,7 @@ def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: fl
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
         for s, r in zip(a.states, b.states, strict=True):
-            # rounding; of the plates the literal step's alone is 8e-8, by the library that factors it
+            # rounding; of the plates the monolithic step's alone is 8e-8, by the library that factors it
             assert_allclose(s.u, r.u, rtol=0, atol=bound * peak)
     forces = np.concatenate([s.port_forces for s in slow[-1].states])
     got = np.concatenate([s.port_forces for s in fast[-1].states])
@@ -104,12 +104,12 @@ def test_mass_is_solved_exactly_under_a_heavy_flywheel(element: str) -> None:
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
 def test_condensed_is_literal_however_long_the_step(kind: str) -> None:
-    raw = four_bar(kind, steps_per_turn=36)
+    raw = four_bar(kind, steps_per_revolution=36)
     raw["drive"]["motion"]["speed"] = (
         "6 rpm"  # a step of 0.28 s: the free links hang on their inertia by a thread
     )
     _, _, fast = run(raw)
-    raw["analysis"]["solver"] = "literal"
+    raw["analysis"]["solver"] = "monolithic"
     _, _, slow = run(raw)
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
@@ -129,7 +129,7 @@ def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) 
                 [port_values(joint, x) for joint, x in zip(model.joints, values, strict=True)]
             )
             z = np.linalg.lstsq(B, held, rcond=None)[0]
-            # W u = B z: what is left over is rounding, of differences divided by the step for rates
+            # W u = B z: the residual is rounding, of differences divided by the step for rates
             assert_allclose(held, B @ z, rtol=0, atol={"u": 1e-12, "v": 1e-9, "a": 1e-6}[field] * size)
 
 
@@ -167,7 +167,7 @@ def test_damping_takes_nothing_from_a_bent_link_that_turns() -> None:
 
 
 def spinning_beam() -> dict[str, Any]:
-    analysis = {"turns": 1, "steps_per_turn": 720, "initial": "quasi-static"}
+    analysis = {"revolutions": 1, "steps_per_revolution": 720, "initial": "quasi-static"}
     return arm(bar(fidelity="beam", mesh={"elements": 4}), constant_speed(100), analysis=analysis)
 
 
@@ -201,7 +201,7 @@ def slider_crank(piston: str) -> dict[str, Any]:
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 60}},
         "damping": {"beta": 1e-5},
-        "analysis": {"turns": 0.5, "steps_per_turn": 360, "initial": "quasi-static"},
+        "analysis": {"revolutions": 0.5, "steps_per_revolution": 360, "initial": "quasi-static"},
     }
     if piston == "on the rod":
         raw["links"]["piston"]["mass"] = 0
@@ -286,15 +286,15 @@ def worst_difference(a: list[Snapshot], b: list[Snapshot]) -> float:
 def test_condensed_is_literal_over_a_turn_of_the_examples(
     example: str, steps: int, bound: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The solids at 150 rpm are too badly conditioned for 1e-8 between the two: the literal step alone, its matrix
+    """The solids at 150 rpm are too badly conditioned for 1e-8 between the two: the monolithic step alone, its matrix
     factored by another library, differs by 6e-8 of the peak. The condensed step keeps to 1e-8 of itself."""
     file = Path(__file__).parents[2] / "examples" / example / "scene.toml"
     raw = tomllib.loads(file.read_text(encoding="utf-8"))
-    raw["analysis"] |= {"turns": 1, "steps_per_turn": steps}
+    raw["analysis"] |= {"revolutions": 1, "steps_per_revolution": steps}
     _, _, fast = run(raw)
     monkeypatch.setattr(substructure, "ANCHORAGE", 1.0)  # another Ã, so other rounding errors
     _, _, again = run(raw)
     assert worst_difference(again, fast) < 5e-9
-    raw["analysis"]["solver"] = "literal"
+    raw["analysis"]["solver"] = "monolithic"
     _, _, slow = run(raw)
     assert worst_difference(fast, slow) < bound

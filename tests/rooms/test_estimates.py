@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy import estimates
-from kedfem.accuracy.budget import Budget, Share, budget_warning, by_kind
+from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind
 from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
@@ -82,10 +82,12 @@ def test_at_such_an_edge_nothing_is_claimed() -> None:
 
 def test_a_newcomers_four_bar_says_how_wrong_it_is() -> None:
     """One beam3 a link, 720 steps: 36 % of the deflection, 19 % of the stress are wrong at 60 rpm; told within 2."""
-    raw = example("four_bar_beams", 720, turns=1.0)
+    raw = example("four_bar_beams", 720, revolutions=1.0)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     found, ready = estimated(raw)
-    fine: Any = example("four_bar_beams", 2880, {"element": "beam5", "mesh": {"elements": 3}}, turns=1.0)
+    fine: Any = example(
+        "four_bar_beams", 2880, {"element": "beam5", "mesh": {"elements": 3}}, revolutions=1.0
+    )
     fine["drive"]["motion"]["speed"] = "60 rpm"
     true = by_kind(relative_errors(histories(ready), histories(meshed(scene_from(fine)))))
     assert true["displacement"] > 0.1
@@ -100,7 +102,7 @@ def test_a_newcomers_four_bar_says_how_wrong_it_is() -> None:
 
 @pytest.mark.parametrize("steps", [180, 720])
 def test_the_steps_error_is_that_of_the_step(steps: int) -> None:
-    ready = meshed(scene_from(example("four_bar_beams", steps, turns=1.0)))
+    ready = meshed(scene_from(example("four_bar_beams", steps, revolutions=1.0)))
     base = histories(ready)
     fine = histories(replace(ready, scene=with_steps(ready.scene, 16 * time_grid(ready.scene).steps)))
     true, told = relative_errors(base, fine), step_errors(ready, base)
@@ -110,7 +112,7 @@ def test_the_steps_error_is_that_of_the_step(steps: int) -> None:
 def test_stiffer_by_its_mesh_is_softened_by_its_indicator() -> None:
     """Quadrilaterals of a four-bar, four along a link: the softened run shows what elements a quarter as long change."""
     links = {"fidelity": "plane", "mesh": {"elements": [4, 1]}}
-    raw = example("four_bar_beams", 360, links, turns=0.5)
+    raw = example("four_bar_beams", 360, links, revolutions=0.5)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     found, ready = estimated(raw)
     raw["links"] = {name: {**link, "mesh": {"elements": [16, 2]}} for name, link in raw["links"].items()}

@@ -34,7 +34,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "bar": {"shape": BAR, "mesh": {"elements": [8, 1, 1]}},
     "tetrahedra": {"shape": PLATE, "mesh": {"size": 0.01}, "element": "tet10"},
     "bar of tetrahedra": {"shape": BAR, "mesh": {"elements": [8, 1, 1]}, "element": "tet10"},
-    "reduced": {"shape": PLATE, "mesh": {"size": 0.01}, "reduced": True, "functions": 20},
+    "reduced": {"shape": PLATE, "mesh": {"size": 0.01}, "reduced": True, "modes": 20},
     "plane": {"fidelity": "plane", "shape": PLATE, "mesh": {"size": 0.01}},
     "edge": {"fidelity": "plane", "shape": BAR},
     "beam": {"fidelity": "beam", "shape": BAR, "mesh": {"elements": 4}},
@@ -262,7 +262,7 @@ def test_a_force_over_the_angle_is_that_over_time_at_constant_speed() -> None:
             "vector": [0, 50.0],
             "factor": {**table, "value": value},
         }
-        raw = arm("beam", {"f": load}, speed=speed, turns=0.5, steps_per_turn=200, initial="rest")
+        raw = arm("beam", {"f": load}, speed=speed, revolutions=0.5, steps_per_revolution=200, initial="rest")
         del raw["analysis"]["end_time"], raw["analysis"]["step"]
         ready, _ = prepared(scene_from(raw))
         solver = steps_of(ready.scene, ready.model)

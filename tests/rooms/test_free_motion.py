@@ -1,4 +1,4 @@
-"""Linkages that nothing drives, or that a drive leaves free: mobility, nominal motion, velocities at the start."""
+"""Linkages that nothing drives, or that a drive leaves free: mobility, rigid-body motion, velocities at the start."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ PENDULUM: JointTable = {
     "A": ("revolute", "ground", "upper", (0.2, 0.1, 0.0), Z),
     "B": ("revolute", "upper", "lower", (0.7, 0.1, 0.0), Z),
 }
-FOLLOWING = {"frames": "following"}
+FOLLOWING = {"frames": "co-rotational"}
 
 
 def twists(joints: JointTable, **asked: Any) -> tuple[Scene, np.ndarray, np.ndarray]:
@@ -42,7 +42,7 @@ def velocity(v: np.ndarray, omega: np.ndarray, k: int, at: Any) -> np.ndarray:
     return v[k] + np.cross(omega[k], at)
 
 
-# -- mobility and nominal motion ----------------------------------------------------------------------------
+# -- mobility and rigid-body motion ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -107,10 +107,10 @@ def test_nominal_frames_leave_nothing_free() -> None:
     with pytest.raises(MotionError, match=r"link 'lower' can turn about z.*\"following\""):
         linkage(scene)
     raw = scene.model_dump(by_alias=True, exclude_none=True)
-    raw["links"]["upper"]["frames"] = "following"
+    raw["links"]["upper"]["frames"] = "co-rotational"
     with pytest.raises(MotionError, match="link 'lower' can turn"):
         linkage(Scene.model_validate(raw))
-    raw["links"]["lower"]["frames"] = "following"
+    raw["links"]["lower"]["frames"] = "co-rotational"
     assert linkage(Scene.model_validate(raw)).mobility == 1
 
 
@@ -173,7 +173,7 @@ def test_a_structure_cannot_start_to_move() -> None:
 
 def test_a_link_that_flies_starts_as_it_is_told() -> None:
     joints = {"A": ("weld", "one", "other", (0.3, 0, 0))}
-    asked = {"one": {"at": [1, 2, 3], "velocity": [1, 0, -2], "spin": [3, 2, 1]}}
+    asked = {"one": {"at": [1, 2, 3], "velocity": [1, 0, -2], "angular_velocity": [3, 2, 1]}}
     _, v, omega = twists(joints, initial_motions=asked)
     for k in (1, 2):  # the weld takes the other along
         np.testing.assert_allclose(omega[k], [3, 2, 1], atol=1e-12)

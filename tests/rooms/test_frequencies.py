@@ -63,7 +63,7 @@ def test_a_free_drive_is_refused_where_there_is_none(tmp_path: Path) -> None:
     del raw["drive"]
     raw["analysis"] = {"end_time": 0.1, "step": 1e-3}
     scene = scene_from(raw, tmp_path)
-    with pytest.raises(SceneError, match="--free: must stand with a drive"):
+    with pytest.raises(SceneError, match="--free: must be combined with a drive"):
         frequencies(scene, Wanted(free=True), tmp_path / "out")
     found = frequencies(scene, Wanted(2), tmp_path / "out")
     assert (len(found.time), found.still, found.crossings) == (1, 1, ())

@@ -31,7 +31,8 @@ HOSTILE = [
     ({"analysis": {"end_time": 1e300, "step": 1}}, "analysis.end_time: must be at most 1e+30 in size [s]"),
     ({"analysis": {"end_time": 1e-298, "step": 1e-300}}, "analysis.step: must be at least 1e-30 [s]"),
     ({"analysis": {"end_time": 1e20, "step": 1e-20}}, "analysis: must end within 1e+09 steps, got 1e+40"),
-    ({"analysis": {"turns": 1e9, "steps_per_turn": 720}}, "analysis: must end within 1e+09 steps, got 7.2e+11"),
+    ({"analysis": {"revolutions": 1e9, "steps_per_revolution": 720}}, "analysis: must end within 1e+09 "
+    "steps, got 7.2e+11"),
     ({"links/crank/shape/width": 1e-300}, "links.crank.shape.width: must be at least 1e-30 [m]"),
     ({"links/crank/shape/width": "1 m**(9**9**9)"}, "links.crank.shape.width: must be a length [m]"),
     ({"bodies/wheel/inertia": 1e100}, "bodies.wheel.inertia: must be at most 1e+30 in size [kg*m^2]"),

@@ -40,10 +40,10 @@ def plucked(kind: str, R: np.ndarray, held: str, frames: str) -> Raw:
 
 
 CASES = [
-    ("beam", np.eye(3), "weld", "following"), ("beam", np.eye(3), "drive", "nominal"),
-    ("spatial beam", ASKEW, "weld", "following"), ("spatial beam", ASKEW, "drive", "nominal"),
-    ("spatial beam", np.eye(3), "drive", "following"),
-    ("solid", ASKEW, "drive", "following"),
+    ("beam", np.eye(3), "weld", "co-rotational"), ("beam", np.eye(3), "drive", "rigid-body"),
+    ("spatial beam", ASKEW, "weld", "co-rotational"), ("spatial beam", ASKEW, "drive", "rigid-body"),
+    ("spatial beam", np.eye(3), "drive", "co-rotational"),
+    ("solid", ASKEW, "drive", "co-rotational"),
 ]  # fmt: skip
 
 
@@ -68,8 +68,8 @@ def test_a_plucked_cantilever_swings_with_its_first_frequency(
 
 REFUSED = [
     ({"initial": "rest"}, "drive", "initial: must be 'quasi-static' with an initial deflection and a drive"),
-    ({"initial_speeds": {"A": 1.0}}, "drive", "initial_deflection: must stand without initial speeds and motions"),
-    ({"stiffening": True}, "drive", "initial_deflection: must stand without analysis.stiffening"),
+    ({"initial_speeds": {"A": 1.0}}, "drive", "initial_deflection: cannot be combined with initial speeds and motions"),
+    ({"stiffening": True}, "drive", "initial_deflection: cannot be combined with analysis.stiffening"),
     ({"initial_deflection": {"tip": {"link": "rod", "at": [0, 0], "force": [0, 1]}}}, "weld",
      "initial_deflection.tip.link: must name a link, got 'rod', known: arm"),
     ({"initial_deflection": {"tip": {"link": "arm", "at": [0.6, 0], "force": [0, 1]}}}, "weld", "tip.at: must"),
@@ -78,7 +78,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(("given", "held", "said"), REFUSED, ids=[str(k) for k in range(len(REFUSED))])
 def test_what_cannot_be_let_go_is_refused(given: Raw, held: str, said: str) -> None:
-    raw = plucked("beam", np.eye(3), held, "nominal")
+    raw = plucked("beam", np.eye(3), held, "rigid-body")
     raw["analysis"] |= given
     with pytest.raises(KedfemError) as caught:
         ran(raw)

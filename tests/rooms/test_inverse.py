@@ -232,7 +232,7 @@ def spatial() -> dict[str, Any]:
 def test_power_of_drive_and_loads_is_what_kinetic_energy_grows_by(raw: dict[str, Any]) -> None:
     h = 1e-4
     t = 0.02 + h * np.arange(701)  # within the ramp
-    found, motion, masses, _ = forces_of({**raw, "analysis": {"turns": 3}}, t)
+    found, motion, masses, _ = forces_of({**raw, "analysis": {"revolutions": 3}}, t)
     T = kinetic_energy(masses, motion)
     # eighth-order central differences
     growth = sum(c * (T[4 + k : len(T) - 4 + k] - T[4 - k : len(T) - 4 - k])
@@ -400,7 +400,7 @@ def test_told_columns() -> None:
 
 
 def test_rigid_channels_of_many_turns_are_those_of_the_first_again_where_loads_are() -> None:
-    raw = four_bar("beam", turns=3.5, steps_per_turn=50)
+    raw = four_bar("beam", revolutions=3.5, steps_per_revolution=50)
     ready = meshed(scene_from(raw))
     recorded = {x.channel.name: x for x in recording(ready.scene, ready.model, None, ready.path)}
     blocks = []
@@ -429,7 +429,7 @@ def test_motions_that_are_free_have_no_rigid_joint_forces() -> None:
         "A": ("revolute", "ground", "arm", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
         "B": ("revolute", "arm", "flail", (0.3, 0.0, 0.0), (0.0, 0.0, 1.0)),
     }
-    *_, forces = drawn(linkage_scene(table, frames="following"))
+    *_, forces = drawn(linkage_scene(table, frames="co-rotational"))
     assert list(columns(forces)) == ["drive/rigid_torque"]
 
 

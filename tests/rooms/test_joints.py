@@ -81,7 +81,7 @@ def solid_slider_crank(piston: dict[str, Any]) -> dict[str, Any]:
             "material": "steel", "shape": {**plate, "between": ends}, "mesh": {"elements_across": 1},
         }  # fmt: skip
     raw["links"]["piston"] = piston
-    raw["analysis"]["steps_per_turn"] = 120
+    raw["analysis"]["steps_per_revolution"] = 120
     return raw
 
 
@@ -105,7 +105,7 @@ def test_a_solid_slider_is_a_rigid_one_but_for_its_softness() -> None:
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
 def test_turning_the_whole_scene_turns_the_answer(kind: str) -> None:
-    raw, turned = four_bar(kind, turns=0.2), four_bar(kind, turns=0.2)
+    raw, turned = four_bar(kind, revolutions=0.2), four_bar(kind, revolutions=0.2)
     angle = 0.7
     c, s = np.cos(angle), np.sin(angle)
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -125,7 +125,7 @@ def test_turning_the_whole_scene_turns_the_answer(kind: str) -> None:
 
 
 def test_a_ball_leaves_turning_free_and_holds_the_point() -> None:
-    raw = four_bar("bar", turns=0.1)
+    raw = four_bar("bar", revolutions=0.1)
     raw["joints"]["C"]["kind"] = "spherical"
     model, _, snapshots = run(raw)
     coupler, rocker = model.joints[1], model.joints[2]
@@ -138,7 +138,7 @@ def test_a_ball_leaves_turning_free_and_holds_the_point() -> None:
 
 def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
-    raw = four_bar("beam", steps_per_turn=2000)
+    raw = four_bar("beam", steps_per_revolution=2000)
     scene = scene_from(raw)
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))

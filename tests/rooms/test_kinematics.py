@@ -69,8 +69,8 @@ D = { kind = "revolute", links = ["rocker", "ground"], at = "D" }
 joint = "A"
 motion = { kind = "constant_speed", speed = "60 rpm" }
 [analysis]
-turns = 2
-steps_per_turn = 90
+revolutions = 2
+steps_per_revolution = 90
 [output]
 plots = false
 """
@@ -123,7 +123,7 @@ def test_transmission_angle_of_a_slider_crank_is_the_rods_against_the_normal_of_
 def test_transmission_angle_in_space_is_the_coupler_against_the_balls_direction(ball: bool) -> None:
     joints, psi = drawn_rssr(ball)
     if ball:  # the coupler may turn about itself, which nothing drives
-        scene = linkage_scene(joints, frames="following")
+        scene = linkage_scene(joints, frames="co-rotational")
         (found,) = transmissions(scene, linkage(scene))
         assert (found.coupler, found.driven) == ("coupler", "rocker")
         return
@@ -191,7 +191,9 @@ def test_a_universal_joint_turns_about_both_its_axes() -> None:
     beta = 0.5
     joints = cardan(beta)
     axes = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    shafts = linkage_scene({key: joints[key] for key in "AD"}, drive=None, frames="following").model_dump()
+    shafts = linkage_scene(
+        {key: joints[key] for key in "AD"}, drive=None, frames="co-rotational"
+    ).model_dump()
     cross = {"kind": "universal", "links": ("shaft1", "shaft2"), "at": (0.0, 0.0, 0.0), "axes": axes}
     raw = {
         **{key: shafts[key] for key in ("links", "analysis", "materials")},
@@ -316,7 +318,7 @@ joint = "A"
 motion = {{ kind = "constant_speed", speed = "60 rpm" }}
 
 [analysis]
-turns = 1
+revolutions = 1
 
 [output]
 plots = false
@@ -364,7 +366,7 @@ def test_without_a_drive_the_linkage_rests_and_the_command_says_so(
 ) -> None:
     path = tmp_path / "free.toml"
     text = re.sub(
-        r"\[drive\].*\[analysis\]\nturns = 2\nsteps_per_turn = 90",
+        r"\[drive\].*\[analysis\]\nrevolutions = 2\nsteps_per_turn = 90",
         "[analysis]\nend_time = 1\nstep = 0.1",
         SKETCH,
         flags=re.S,
@@ -417,7 +419,7 @@ def scene_with_plots() -> Scene:
             "links": {"arm": {"material": "steel", "shape": bar, "fidelity": "beam"}},
             "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A"}},
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 3.0}},
-            "analysis": {"turns": 1, "steps_per_turn": 36},
+            "analysis": {"revolutions": 1, "steps_per_revolution": 36},
             "output": {
                 "animation": False,
                 "probes": {"tip": {"link": "arm", "at": "B", "quantity": "stress"}},

@@ -143,27 +143,29 @@ def test_a_load_factor_is_linear_between_its_times_and_held_outside():
 
 
 def test_turns_at_constant_speed_are_a_whole_number_of_steps():
-    scene = Driven(ConstantSpeed(speed=-2.0 * math.pi * 10.0), Analysis(turns=3.0, steps_per_turn=360))
+    scene = Driven(
+        ConstantSpeed(speed=-2.0 * math.pi * 10.0), Analysis(revolutions=3.0, steps_per_revolution=360)
+    )
     grid = time_grid(scene)
     assert grid.steps == 1080
     assert_allclose((grid.step, grid.end), (0.1 / 360, 0.3), rtol=1e-14)
 
 
 def test_steps_per_turn_default_to_720():
-    assert time_grid(Driven(ConstantSpeed(speed=1.0), Analysis(turns=1.0))).steps == 720
+    assert time_grid(Driven(ConstantSpeed(speed=1.0), Analysis(revolutions=1.0))).steps == 720
 
 
 @pytest.mark.parametrize("shape", ["smooth", "linear"])
 @pytest.mark.parametrize(
-    "turns", [0.1, 1.0, 4.0]
+    "revolutions", [0.1, 1.0, 4.0]
 )  # within the ramp of 1 s (5 turns at full speed) and after it
-def test_turns_with_a_ramp_end_when_the_angle_is_reached(shape, turns):
+def test_turns_with_a_ramp_end_when_the_angle_is_reached(shape, revolutions):
     motion = Ramp(speed=10.0 * math.pi, time=1.0, shape=shape)
-    grid = time_grid(Driven(motion, Analysis(turns=turns, steps_per_turn=1000)))
+    grid = time_grid(Driven(motion, Analysis(revolutions=revolutions, steps_per_revolution=1000)))
     assert_allclose(grid.step, 0.2 / 1000, rtol=1e-14)
     last, before = drive_angle(motion, np.array([grid.end, grid.end - grid.step]))[0] / (2.0 * math.pi)
-    assert before < turns * (1 - 1e-9)
-    assert last >= turns * (1 - 1e-9)
+    assert before < revolutions * (1 - 1e-9)
+    assert last >= revolutions * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(("step", "expected"), [(0.1, TimeGrid(0.1, 10)), (0.3, TimeGrid(0.25, 4))])

@@ -29,7 +29,7 @@ def cantilever(
             "end_time": 0.5,
             "step": 2e-3,
             "rho_inf": 0.6,
-            "frames": "following",
+            "frames": "co-rotational",
             "initial": initial,
         },
     }
@@ -51,7 +51,8 @@ RAMPED = {"frame": "link", "factor": {"time": [0.0, 0.3], "value": [0.0, 1.0]}}
 
 
 def test_a_load_turns_with_the_link_itself_with_and_without_a_drive() -> None:
-    """A follower force bends a cantilever further than the nominal frame says: the same tip, whatever holds the root."""
+    """A follower force bends a cantilever further than the rigid-body frame says: the same tip, whatever holds the
+    root."""
     driven, welded = tip(cantilever("drive", RAMPED)), tip(cantilever("weld", RAMPED))
     assert_allclose(driven, welded, atol=1e-4)
     world = tip(cantilever("drive", {**RAMPED, "frame": "world"}))
@@ -77,6 +78,6 @@ def test_a_motor_on_a_slide_between_moving_links_needs_frames_that_follow() -> N
     raw = inverted() | {"motors": {"m": {"joint": "S", "force": 10.0}}}
     with pytest.raises(
         SceneError,
-        match=r"m.joint: must name a slide on the ground, or stand with frames .*while the slide turns",
+        match=r"m.joint: must name a slide on the ground, or be combined with frames .*while the slide turns",
     ):
         scene_from(raw)

@@ -382,7 +382,7 @@ class TestElements:
 
     @pytest.mark.parametrize("name", ["linear", "serendipity"])
     def test_quadratic_keeps_the_form_of_curved_elements(self, name):
-        """The 27 functions hold those of 8 and 20 nodes: the same det J, hence the same volume."""
+        """The 27 modes hold those of 8 and 20 nodes: the same det J, hence the same volume."""
         mesh = {"linear": linear, "serendipity": serendipity}[name](plate(*PLATES[1]))
         random = np.random.default_rng(0)
         moved = SolidMesh(mesh.points + 2e-4 * random.uniform(-1, 1, mesh.points.shape), mesh.cells)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kedfem.links.offers import offers
+from kedfem.links.part_candidates import offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.hexahedra import HEX8, Face
 from kedfem.report import mesh_tables

@@ -8,11 +8,11 @@ from rich.console import Console
 
 from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
-from kedfem.motion.freedom import free_motions, remedy
 from kedfem.motion.linkage import drawn_linkage, linkage, looser_rows
 from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
 from kedfem.motion.redundancy import redundancy, without_redundancy, wrenches
+from kedfem.motion.released_motions import free_motions, remedy
 from kedfem.report.mobility import mobility_table
 from kedfem.scene import Scene, scene_from
 from tests.linkages import (

@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kedfem.errors import MotionError
+from kedfem.motion.constraints import ConstraintEquation, coupled, joint_rows, stacked, travel_row, turn_row
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.motion.rows import Row, coupled, joint_rows, stacked, travel_row, turn_row
 from kedfem.motion.values import convective, features, jacobian, residuals
 from tests.linkages import (
     RISE,
@@ -53,13 +53,13 @@ def angle_in(message: str) -> float:
 # -- refusals ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("turns", [1, 1.3])
+@pytest.mark.parametrize("revolutions", [1, 1.3])
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("drawn", [40, 43.21, 80])
 def test_a_crank_driven_past_its_limit_is_told_the_joint_and_the_angle(
-    drawn: float, direction: int, turns: float
+    drawn: float, direction: int, revolutions: float
 ) -> None:
-    message = refusal(four_bar(*NON_GRASHOF, np.radians(drawn)), direction * turns * TURN)
+    message = refusal(four_bar(*NON_GRASHOF, np.radians(drawn)), direction * revolutions * TURN)
     assert re.fullmatch(
         r"joints\.[BCD]: the linkage must follow its drive joints\.A over the whole range, "
         r"got: it locks \(dead point\) at drive angle -?[\d.]+ deg",
@@ -98,7 +98,7 @@ def test_a_linkage_drawn_in_its_dead_point_is_refused() -> None:
         "D": ("revolute", "rocker", "ground", D, Z),
     }
     assert refusal(joints) == (
-        "joints.A: the linkage locks (dead point) at drive angle 0 deg, the drawn position: "
+        "joints.A: the linkage locks (dead point) at drive angle 0 deg, the reference position: "
         "draw it at another angle or drive joint B, C or D"
     )
 
@@ -188,7 +188,7 @@ def test_a_time_off_the_path_leaves_a_joint_open_and_the_message_gives_time_and_
 # -- rows and their derivatives --------------------------------------------------------------------------------
 
 
-def open_rows(random: np.random.Generator) -> list[Row]:
+def open_rows(random: np.random.Generator) -> list[ConstraintEquation]:
     """Rows of all kinds between bodies 0, 1 and 2, couplings among them, drives on a turn and a travel."""
     axis = np.array([0.48, 0.6, 0.64])  # a unit vector
     turn, travel = turn_row("R", 2, 1, axis), travel_row("P", 1, 0, random.uniform(-1, 1, 3), axis)

@@ -147,7 +147,7 @@ def test_options_that_do_not_go_together(run_kedfem: Command) -> None:  # noqa: 
     assert said.err == "error: KIND: must be left out with --from, got 'four-bar'\n"
     assert run_kedfem("new").err.startswith("error: KIND: must be one of four-bar, ")
     assert run_kedfem("new", "four-bar", "--scale", "1").err.startswith(
-        "error: --scale: must stand with --from"
+        "error: --scale: must be combined with --from"
     )
 
 

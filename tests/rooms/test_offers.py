@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kedfem.links.offers import axis_in_words, offers
+from kedfem.links.part_candidates import axis_in_words, offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.words import face_form, face_in_words, with_faces_in_words

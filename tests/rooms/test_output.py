@@ -196,9 +196,9 @@ def test_a_file_in_the_way_of_the_folder(tmp_path: Path, kind: str) -> None:
         writers[kind]()
 
 
-def results(n: int = 721, turns: float = 2.0) -> Results:
+def results(n: int = 721, revolutions: float = 2.0) -> Results:
     """Made-up curves of a four-bar."""
-    angle = np.linspace(0, 2 * np.pi * turns, n)
+    angle = np.linspace(0, 2 * np.pi * revolutions, n)
     wave = np.sin(angle) + 0.2 * np.sin(23 * angle)
     columns = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
     stress = np.c_[4e7 * wave, 1e6 * wave, 0 * wave, 2e6 * wave, 0 * wave, 0 * wave, 4e7 * abs(wave)]
@@ -246,7 +246,7 @@ def test_every_channel_has_a_plot(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "made",
     [
-        results(n=100_000, turns=30),
+        results(n=100_000, revolutions=30),
         results(n=1),
         replace(results(), angle=np.sin(results().angle)),
         replace(results(), angle=np.zeros(721)),
@@ -431,15 +431,15 @@ def test_beams_too_thin_to_be_seen_are_drawn_thicker() -> None:
     np.testing.assert_allclose(np.ptp(surface.points[:, 1]), THINNEST * 8.0, rtol=1e-6)
 
 
-@pytest.mark.parametrize("exaggeration", [1.0, 500.0])
-def test_a_slider_without_a_shape_is_a_block_about_its_pin_along_its_guide(exaggeration: float) -> None:
+@pytest.mark.parametrize("deformation_scale", [1.0, 500.0])
+def test_a_slider_without_a_shape_is_a_block_about_its_pin_along_its_guide(deformation_scale: float) -> None:
     """Grey, and where the end of the rod that carries it is drawn."""
     ready, blocks = ran(pushed(driven=False))
     recoveries = [stress_recovery(link) for link in ready.model.links]
     (slider,) = ready.model.sliders
     rod = ready.model.links[slider.carrier]
     now = blocks[-1].at(len(blocks[-1]) - 1)
-    fields = {field.name: field for field in link_fields(ready.model, recoveries, now, exaggeration)}
+    fields = {field.name: field for field in link_fields(ready.model, recoveries, now, deformation_scale)}
     block, end = fields["ram"], fields[rod.name].points
     section = np.linalg.norm(recoveries[slider.carrier].at_points(rod.X) - P, axis=1) < 0.011  # about the pin
     np.testing.assert_allclose(block.points.mean(axis=0), end[section].mean(axis=0), atol=1e-9)

@@ -44,8 +44,8 @@ ratio = "=2 %"
 frequencies = ["=omega/(6 rad)", 500]
 
 [analysis]
-turns = "=1/n"
-steps_per_turn = 400
+revolutions = "=1/n"
+steps_per_revolution = 400
 """
 
 
@@ -74,7 +74,7 @@ def test_any_number_of_a_scene_may_be_an_expression() -> None:
     assert (shape.width, shape.thickness) == pytest.approx((0.02, 0.02), rel=1e-15)
     assert scene.links["arm"].mesh.elements == 8
     assert scene.drive.motion.speed == pytest.approx(20.0 * np.pi, rel=1e-15)
-    assert (*scene.damping.ratio, scene.analysis.turns) == pytest.approx((0.02, 0.02, 0.25), rel=1e-15)
+    assert (*scene.damping.ratio, scene.analysis.revolutions) == pytest.approx((0.02, 0.02, 0.25), rel=1e-15)
 
 
 def test_the_stored_scene_is_complete_and_gives_itself_again() -> None:
@@ -236,7 +236,7 @@ time = "0.1 s"
 def test_file_names_in_an_included_file_are_relative_to_it(tmp_path: Path) -> None:
     motion = '[drive]\njoint = "A"\nmotion = { kind = "table", file = "motion.csv" }\n'
     plain = GOOD[: GOOD.index("[drive]")] + GOOD[GOOD.index("[damping]") :].replace(
-        'turns = "=1/n"\nsteps_per_turn = 400', "end_time = 0.01\nstep = 1e-3"
+        'revolutions = "=1/n"\nsteps_per_turn = 400', "end_time = 0.01\nstep = 1e-3"
     )
     path = written(
         tmp_path,

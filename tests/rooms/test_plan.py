@@ -75,7 +75,7 @@ def test_links_whose_steps_in_full_would_be_dear_are_reduced_unless_they_or_the_
     ready, found = prepared(chosen.scene)
     assert found is not None
     errors = relative_errors(histories(ready), histories(prepared(full.scene)[0]))
-    assert worst(errors) <= chosen.scene.analysis.reduction == pytest.approx(0.005)
+    assert worst(errors) <= chosen.scene.analysis.reduction_tolerance == pytest.approx(0.005)
 
 
 @pytest.mark.long
@@ -122,7 +122,7 @@ def test_a_start_that_no_step_resolves_is_said() -> None:
     """Undamped from rest at full speed: joint forces hold all frequencies of the mesh."""
     raw = arm(accuracy=0.01)
     raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 60}
-    raw["analysis"] = {"turns": 0.5, "accuracy": 0.01, "rho_inf": 1.0}
+    raw["analysis"] = {"revolutions": 0.5, "accuracy": 0.01, "rho_inf": 1.0}
     del raw["damping"]
     raw["gravity"] = [0, -9.81, 0]
     plan = planned(scene_from(raw))
@@ -140,7 +140,7 @@ def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
     assert plan.reached
     assert plan.scene.links["arm"].fidelity == "beam"
     raw = slider_crank("rigid")
-    raw["analysis"] = {"turns": 0.25, "accuracy": 0.05, "initial": "quasi-static"}
+    raw["analysis"] = {"revolutions": 0.25, "accuracy": 0.05, "initial": "quasi-static"}
     for name in ("crank", "rod"):
         del raw["links"][name]["fidelity"], raw["links"][name]["mesh"]
     plan = planned(scene_from(raw))
@@ -153,13 +153,13 @@ def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
 
 
 def test_frames_follow_beams_in_space_that_bend_far() -> None:
-    """The arm bends by 4.5 % of its length, which nominal frames cannot have; linear strains would lock."""
+    """The arm bends by 4.5 % of its length, which rigid-body frames cannot have; linear strains would lock."""
     raw = whipped("spatial", 2)
     raw["links"]["arm"]["shape"]["up"] = [0, 0, 1]
     del raw["analysis"]["frames"]
     raw["analysis"] |= {"accuracy": 0.02}
     plan = planned(scene_from(raw))
-    assert plan.scene.analysis.frames == "following"
+    assert plan.scene.analysis.frames == "co-rotational"
     assert any("frames follow" in note for note in plan.notes)
 
 
@@ -174,7 +174,7 @@ def test_trials_that_differ_in_the_step_share_their_model() -> None:
 
 
 def test_functions_of_an_unchanged_link_are_found_once() -> None:
-    raw = four_bar("bar", turns=0.25, initial="quasi-static")
+    raw = four_bar("bar", revolutions=0.25, initial="quasi-static")
     for link in raw["links"].values():
         link["mesh"] = {"elements": [8, 2, 1]}
     trials = Trials(0.05, lambda name: None)
@@ -232,7 +232,7 @@ def beams(speed: str, **analysis: Any) -> dict[str, Any]:
     """The source's four-bar with elements, step and frames left open."""
     raw = tomllib.loads((EXAMPLES / "four_bar_beams" / "scene.toml").read_text())
     raw["drive"]["motion"]["speed"] = speed
-    raw["analysis"] = {"turns": 2, "initial": "quasi-static", **analysis}
+    raw["analysis"] = {"revolutions": 2, "initial": "quasi-static", **analysis}
     return raw
 
 
@@ -240,7 +240,7 @@ def test_at_60_rpm_frames_are_nominal_and_the_step_is_what_is_needed() -> None:
     """3,700 steps leave 0.13 % over two turns, 1,830 leave 0.29 % of the 0.3 % that the step may cost."""
     plan = planned(scene_from(beams("60 rpm")))
     assert plan.reached
-    assert plan.scene.analysis.frames == "nominal"
+    assert plan.scene.analysis.frames == "rigid-body"
     assert {link.element for link in plan.scene.links.values()} == {"beam5"}
     assert 1500 < time_grid(plan.scene).steps < 4500
 
@@ -248,20 +248,20 @@ def test_at_60_rpm_frames_are_nominal_and_the_step_is_what_is_needed() -> None:
 def test_at_600_rpm_frames_follow_and_beams_of_five_nodes_are_few() -> None:
     """Three beam5 a link or four leave 0.3 % and less."""
     plan = planned(scene_from(beams("600 rpm")))
-    assert plan.scene.analysis.frames == "following"
+    assert plan.scene.analysis.frames == "co-rotational"
     assert all(link.element == "beam5" and link.mesh.elements <= 4 for link in plan.scene.links.values())
-    assert any("nominal frames would be off by" in note for note in plan.notes)
+    assert any("rigid-body frames would be off by" in note for note in plan.notes)
     assert plan.reached
 
 
 def test_a_scene_that_states_all_but_its_frames_has_no_other_trial() -> None:
-    raw = beams("60 rpm", steps_per_turn=90)
+    raw = beams("60 rpm", steps_per_revolution=90)
     for link in raw["links"].values():
         link["mesh"] = {"elements": 2}
     plan = planned(scene_from(raw))
     assert [share.what for share in plan.shares] == ["frames"]
     assert (time_grid(plan.scene).steps, plan.scene.links["crank"].element) == (180, "beam3")
-    raw["analysis"]["frames"] = "nominal"
+    raw["analysis"]["frames"] = "rigid-body"
     assert plan_for(scene_from(raw)) is None
     assert plan_for(scene_from(beams("60 rpm", accuracy="quick"))) is None
 

@@ -15,7 +15,7 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
-from kedfem.links.seats import joint_seat
+from kedfem.links.coupling_surfaces import joint_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.picture import write_picture
@@ -119,7 +119,7 @@ def test_a_driven_bore_is_as_stiff_whatever_its_mesh(fidelity: str, sizes: tuple
     """The principal directions of a circle are rounding's choice (here 90° apart), and must have no influence."""
     found, across = [], []
     for size in sizes:
-        raw = four_bar("plate", steps_per_turn=24, turns=1 / 24, initial="quasi-static")
+        raw = four_bar("plate", steps_per_revolution=24, revolutions=1 / 24, initial="quasi-static")
         raw["drive"]["motion"]["speed"] = "60 rpm"
         raw["links"]["crank"] |= {"fidelity": fidelity, "mesh": {"elements_across": size}}
         for name in ("coupler", "rocker"):
@@ -137,7 +137,7 @@ def test_a_driven_bore_is_as_stiff_whatever_its_mesh(fidelity: str, sizes: tuple
 
 def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
     """The four-bar of plates with a fidelity per link; beams are as wide as the waist."""
-    raw = four_bar("plate", steps_per_turn=60, turns=0.5, initial="quasi-static", **analysis)
+    raw = four_bar("plate", steps_per_revolution=60, revolutions=0.5, initial="quasi-static", **analysis)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     for link, fidelity in zip(raw["links"].values(), fidelities, strict=True):
         link["fidelity"] = fidelity
@@ -153,7 +153,7 @@ def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
 def test_plane_links_beams_and_solids_share_a_scene(kinds: tuple[str, ...]) -> None:
     """Hinges close between rows of two and of three components; condensed is literal; pins stay upright."""
     model, _, fast = run(mixed(*kinds))
-    _, _, slow = run(mixed(*kinds, solver="literal"))
+    _, _, slow = run(mixed(*kinds, solver="monolithic"))
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
         for s, r in zip(a.states, b.states, strict=True):
@@ -184,7 +184,7 @@ def test_a_mixed_four_bar_behaves_as_its_solid_twin() -> None:
 def engine(fidelity: str) -> dict[str, Any]:
     """The example's crank, connecting rod and piston: parts, a guide along a side, a gas force on the crown."""
     raw = tomllib.loads((ROOT / "examples/slider_crank_solids/scene.toml").read_text("utf-8"))
-    raw["analysis"] |= {"turns": 0.5, "steps_per_turn": 180}
+    raw["analysis"] |= {"revolutions": 0.5, "steps_per_revolution": 180}
     for link in raw["links"].values():
         link["fidelity"] = fidelity
         link["shape"]["file"] = str(ROOT / "geometry" / Path(link["shape"]["file"]).name)
@@ -236,7 +236,7 @@ def test_a_rigid_slider_rides_on_a_plane_rod() -> None:
 
     def scene(fidelity: str, piston: str) -> dict[str, Any]:
         raw = slider_crank(piston)
-        raw["analysis"]["steps_per_turn"] = 120
+        raw["analysis"]["steps_per_revolution"] = 120
         for name, ends in (("crank", ["A", "B"]), ("rod", ["B", "C"])):
             shape = {**plate, "between": ends}
             raw["links"][name] = {"material": "steel", "shape": shape, "mesh": {"elements_across": 1}}
@@ -283,7 +283,7 @@ def test_gravity_forces_and_pressure_have_their_resultants() -> None:
 
 
 def test_turning_the_whole_scene_turns_the_answer_and_offset_plates_are_only_drawn_there() -> None:
-    raw, turned = four_bar("plane", turns=0.2), four_bar("plane", turns=0.2)
+    raw, turned = four_bar("plane", revolutions=0.2), four_bar("plane", revolutions=0.2)
     angle = 0.7
     c, s = np.cos(angle), np.sin(angle)
     R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -308,7 +308,9 @@ def test_turning_the_whole_scene_turns_the_answer_and_offset_plates_are_only_dra
 def test_torque_of_stiff_plane_links_is_the_virtual_work_of_the_rigid_linkage() -> None:
     found = {}
     for factor in (1, 16):
-        raw = four_bar("plane", steps_per_turn=120, turns=0.5, initial="quasi-static", rho_inf=0.8)
+        raw = four_bar(
+            "plane", steps_per_revolution=120, revolutions=0.5, initial="quasi-static", rho_inf=0.8
+        )
         raw["drive"]["motion"]["speed"] = "60 rpm"
         for key in ("youngs_modulus", "shear_modulus"):
             raw["materials"]["alloy"][key] *= factor
@@ -320,7 +322,7 @@ def test_torque_of_stiff_plane_links_is_the_virtual_work_of_the_rigid_linkage() 
 
 
 def test_probes_read_two_components_and_plane_stress() -> None:
-    raw = four_bar("plane", steps_per_turn=60, turns=0.2, initial="quasi-static")
+    raw = four_bar("plane", steps_per_revolution=60, revolutions=0.2, initial="quasi-static")
     raw["points"]["N"] = {"between": ["B", "C"], "fraction": 0.5}
     ask = {"link": "coupler", "at": "N"}
     raw["output"] = {"probes": {
@@ -337,8 +339,8 @@ def test_probes_read_two_components_and_plane_stress() -> None:
 
 
 def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) -> None:
-    raw = four_bar("plane", steps_per_turn=24)
-    raw["output"] = {"folder": str(tmp_path), "animation": {"frames_per_turn": 2}, "plots": False}
+    raw = four_bar("plane", steps_per_revolution=24)
+    raw["output"] = {"folder": str(tmp_path), "animation": {"frames_per_revolution": 2}, "plots": False}
     scene = scene_from(quick(raw))
     done = analyse(scene)
     assert done.peak is not None

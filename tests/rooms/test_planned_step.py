@@ -11,7 +11,7 @@ from kedfem.accuracy.plan import STEP, plan_for
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_analysis
-from kedfem.scene import Scene, following, scene_from, time_grid
+from kedfem.scene import Scene, corotational, scene_from, time_grid
 from tests.planned_steps import ASKED, Planned, four_bar, judged
 
 ALLOWED = STEP * ASKED
@@ -33,7 +33,7 @@ def held(found: Planned) -> None:
 def test_at_speed_levels_do_with_less_work_than_order_2() -> None:
     found = judged(four_bar(600, BEAMS))
     held(found)
-    assert found.scene.analysis.levels in {2, 3}
+    assert found.scene.analysis.extrapolation_levels in {2, 3}
     assert found.work < 0.9 * found.needed
 
 
@@ -44,29 +44,29 @@ def test_vibration_that_is_hardly_in_step_is_left_to_short_steps() -> None:
 
 @pytest.mark.long
 def test_co_rotational_links_from_rest() -> None:
-    held(judged(four_bar(600, BEAMS, frames="following", initial="rest")))
+    held(judged(four_bar(600, BEAMS, frames="co-rotational", initial="rest")))
 
 
 def test_levels_and_steps_that_the_scene_states_stay() -> None:
     for levels in (1, 2, 3):
-        scene, error, _ = chosen(four_bar(600, BEAMS, levels=levels, turns=0.5))
-        assert scene.analysis.levels == levels
+        scene, error, _ = chosen(four_bar(600, BEAMS, extrapolation_levels=levels, revolutions=0.5))
+        assert scene.analysis.extrapolation_levels == levels
         assert error <= ALLOWED
-    scene, error, notes = chosen(four_bar(600, BEAMS, steps_per_turn=360, turns=0.5))
-    assert scene.analysis.levels is None
+    scene, error, notes = chosen(four_bar(600, BEAMS, steps_per_revolution=360, revolutions=0.5))
+    assert scene.analysis.extrapolation_levels is None
     assert time_grid(scene).steps == 180
     assert error > ALLOWED
     assert notes[0].startswith("the scene states its step; its error is about")
-    assert "analysis.levels = 2" in notes[0]
-    both, better, _ = chosen(with_analysis(scene, levels=2))
-    assert both.analysis.levels == 2
+    assert "analysis.extrapolation_levels = 2" in notes[0]
+    both, better, _ = chosen(with_analysis(scene, extrapolation_levels=2))
+    assert both.analysis.extrapolation_levels == 2
     assert better < 0.5 * error
 
 
 def test_factors_that_do_not_fit_twice_leave_one_level(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(choices, "most_levels", lambda model: 1)
-    scene, _, _ = chosen(four_bar(600, BEAMS, turns=0.5))
-    assert scene.analysis.levels == 1
+    scene, _, _ = chosen(four_bar(600, BEAMS, revolutions=0.5))
+    assert scene.analysis.extrapolation_levels == 1
 
 
 def test_what_nothing_drives_has_its_beams_chosen() -> None:
@@ -89,7 +89,7 @@ def test_what_nothing_drives_has_its_beams_chosen() -> None:
     assert plan is not None
     assert plan.scene.links["arm"].element == "beam5"
     assert time_grid(plan.scene).steps == 1000
-    assert following(plan.scene)
+    assert corotational(plan.scene)
     assert not any(share.what == "frames" for share in plan.shares)
     coarse, chosen_, fine = (
         histories(meshed(with_beams(plan.scene, ["arm"], each) if each else plan.scene))

@@ -22,7 +22,7 @@ LINKS = {
     "plane": {"fidelity": "plane", "mesh": {"elements": [6, 2]}},
     "solid": {"element": "hex20", "mesh": {"elements": [6, 1, 1]}},
 }
-FRAMES = ["nominal", "following"]
+FRAMES = ["rigid-body", "co-rotational"]
 
 
 def bar(between: list[str], **keys: Any) -> dict[str, Any]:
@@ -107,7 +107,7 @@ def test_rigid_and_elastic_motion_add_up_on_links_of_every_kind(kind: str, frame
         for link in ("crank end", "coupler start", "coupler end", "rocker end")
     ]
     n = min(x.shape[1] for x in ends)
-    near = 1e-9 if frames == "nominal" else 1e-8
+    near = 1e-9 if frames == "rigid-body" else 1e-8
     np.testing.assert_allclose(ends[0][:, :n], ends[1][:, :n], atol=near)  # joints hold them together
     np.testing.assert_allclose(ends[2][:, :n], ends[3][:, :n], atol=near)
 
@@ -199,7 +199,7 @@ def test_a_falling_pendulum_travels_far_and_deflects_little() -> None:
 
 
 def test_a_slider_without_a_shape_moves_with_its_pin() -> None:
-    raw = four_bar("planar beam", "nominal", {
+    raw = four_bar("planar beam", "rigid-body", {
         "block": probe("block", [L, 0.1], "position"), "pin": probe("coupler", "C", "position"),
         "block moves": probe("block", [L, 0.1], "displacement", frame="world"),
     })  # fmt: skip
@@ -226,7 +226,7 @@ FAULTS = [
 @pytest.mark.parametrize(("keys", "message"), FAULTS)
 def test_probes_that_cannot_be_are_refused(keys: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError) as refused:
-        scene_from(four_bar("planar beam", "nominal", {"p": {"link": "coupler", "at": "B", **keys}}))
+        scene_from(four_bar("planar beam", "rigid-body", {"p": {"link": "coupler", "at": "B", **keys}}))
     assert f"output.{message}" in str(refused.value)
 
 
@@ -236,7 +236,7 @@ def test_probes_that_cannot_be_are_refused(keys: dict[str, Any], message: str) -
      ("acceleration", "total_acceleration")],
 )  # fmt: skip
 def test_what_is_against_the_rigid_motion_needs_a_drive(quantity: str, instead: str) -> None:
-    raw = four_bar("planar beam", "following", {"p": probe("coupler", "B", quantity)})
+    raw = four_bar("planar beam", "co-rotational", {"p": probe("coupler", "B", quantity)})
     del raw["drive"]
     wanted = f"output.probes.p.quantity: must be {instead} without a drive"
     with pytest.raises(SceneError, match=wanted):

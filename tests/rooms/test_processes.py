@@ -16,7 +16,7 @@ import kedfem
 BUSY = """
 import os, sys, time
 from pathlib import Path
-from kedfem.mesh.apart import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, apart
 
 def busy(file):
     file.write_text(str(os.getpid()))
@@ -123,8 +123,8 @@ at = [0, 0]
 joint = "A"
 motion = { kind = "constant_speed", speed = "60 rpm" }
 [analysis]
-turns = 0.1
-steps_per_turn = 100
+revolutions = 0.1
+steps_per_revolution = 100
 accuracy = "quick"
 initial = "quasi-static"
 """

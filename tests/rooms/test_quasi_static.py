@@ -21,7 +21,7 @@ def arm(part: float) -> dict[str, Any]:
         "loads": {
             "P": {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 10.0], "frame": "link"}
         },
-        "analysis": {"turns": 1, "steps_per_turn": 2000, "initial": "quasi-static"},
+        "analysis": {"revolutions": 1, "steps_per_revolution": 2000, "initial": "quasi-static"},
     }
 
 
@@ -40,6 +40,6 @@ def test_springs_in_joints_are_no_constraints_among_the_coordinates() -> None:
         "joints": raw["joints"] | {"W": {"kind": "weld", "links": ["arm", "end"], "at": [0.5, 0]}},
     }
     rigid = meshed(scene_from(raw | two)).model
-    two["joints"]["W"] = two["joints"]["W"] | {"bushing": {"stiffness": 1e6, "turning_stiffness": 1e3}}
+    two["joints"]["W"] = two["joints"]["W"] | {"bushing": {"stiffness": 1e6, "rotational_stiffness": 1e3}}
     soft = meshed(scene_from(raw | two | {"analysis": raw["analysis"] | {"rho_inf": 0.9}})).model
     assert soft.coordinates == rigid.coordinates + 3

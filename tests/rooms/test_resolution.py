@@ -35,7 +35,7 @@ def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
         constant_speed(20),
         materials={"steel": material(RHO, E)},
         gravity=[0, -9.81, 0],
-        analysis={"turns": 1, "steps_per_turn": 720, **analysis},
+        analysis={"revolutions": 1, "steps_per_revolution": 720, **analysis},
     )
 
 
@@ -45,7 +45,7 @@ def test_an_arm_vibrates_as_a_cantilever(fidelity: str, reduced: bool) -> None:
     raw = arm(fidelity)
     raw["links"]["arm"]["reduced"] = reduced
     if reduced:
-        raw["links"]["arm"]["functions"] = 12
+        raw["links"]["arm"]["modes"] = 12
     found = resolution(prepared(scene_from(raw))[0])
     assert found is not None
     assert_allclose(
@@ -57,7 +57,7 @@ def test_steps_in_a_period_are_counted_and_too_few_are_said() -> None:
     turn = 2 * np.pi / 20
     for per_period, said in ((8, True), (40, False)):
         steps = round(per_period * FIRST * turn)
-        found = resolution(meshed(scene_from(arm("beam", steps_per_turn=steps))))
+        found = resolution(meshed(scene_from(arm("beam", steps_per_revolution=steps))))
         assert found is not None
         assert_allclose(found.steps_per_period, per_period, rtol=0.02)
         assert ["steps in a period" in x for x in resolution_warnings(found)] == [True] * said

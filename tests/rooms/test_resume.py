@@ -18,15 +18,15 @@ from tests.scenes import constant_speed, four_bar, material
 
 STEPS = 96  # of an analysis
 LOOPS = {  # kinds of loops, as `dynamics.transient` chooses them, each in one of the ways to begin and to combine levels
-    "dense": ("nominal", {"levels": 1}),
-    "dense, two levels": ("nominal", {"levels": 2}),
-    "system": ("springs", {"levels": 1}),
-    "system, three levels": ("springs", {"levels": 3}),
-    "co-rotational": ("following", {"levels": 1}),
-    "co-rotational, two levels": ("following", {"levels": 2}),
-    "literal": ("nominal", {"levels": 1, "solver": "literal"}),
-    "rows": ("rows", {"levels": 1}),
-    "stiffened": ("stiffened", {"levels": 1}),
+    "dense": ("rigid-body", {"extrapolation_levels": 1}),
+    "dense, two levels": ("rigid-body", {"extrapolation_levels": 2}),
+    "system": ("springs", {"extrapolation_levels": 1}),
+    "system, three levels": ("springs", {"extrapolation_levels": 3}),
+    "co-rotational": ("co-rotational", {"extrapolation_levels": 1}),
+    "co-rotational, two levels": ("co-rotational", {"extrapolation_levels": 2}),
+    "monolithic": ("rigid-body", {"extrapolation_levels": 1, "solver": "monolithic"}),
+    "rows": ("rows", {"extrapolation_levels": 1}),
+    "stiffened": ("stiffened", {"extrapolation_levels": 1}),
 }
 CHEAP = {"dense, two levels", "co-rotational"}
 
@@ -34,7 +34,11 @@ CHEAP = {"dense, two levels", "co-rotational"}
 def scene_of(kind: str, folder: Path, analysis: dict[str, Any]) -> Scene:
     raw = linkage(kind)
     raw["analysis"] |= {"step": raw["analysis"]["end_time"] / STEPS, **analysis}
-    raw["output"] = raw["output"] | {"animation": {"frames_per_turn": 20}, "plots": False, "picture": False}
+    raw["output"] = raw["output"] | {
+        "animation": {"frames_per_revolution": 20},
+        "plots": False,
+        "picture": False,
+    }
     return scene_from(raw, folder)
 
 
@@ -49,7 +53,13 @@ def turning(folder: Path, **analysis: Any) -> Scene:
     }
     raw = four_bar((0.1, 0.3, 0.25, 0.3), beam, constant_speed("60 rpm"))
     raw |= {"materials": {"soft": material(2700, 7e10)}, "output": {"plots": False, "picture": False}}
-    raw["analysis"] = {"turns": 2, "steps_per_turn": 48, "levels": 1, "frames": "nominal", **analysis}
+    raw["analysis"] = {
+        "revolutions": 2,
+        "steps_per_revolution": 48,
+        "extrapolation_levels": 1,
+        "frames": "rigid-body",
+        **analysis,
+    }
     return scene_from(raw, folder)
 
 
@@ -109,7 +119,7 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
 @pytest.mark.parametrize("at", [pytest.param(0.1, marks=pytest.mark.long), 0.7])
 @pytest.mark.parametrize("points", [16, 1024])
 def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: int, monkeypatch: Any) -> None:
-    """Wherever blocks of the nominal motion end: beyond the first turn its poses are those of the first."""
+    """Wherever blocks of the rigid-body motion end: beyond the first turn its poses are those of the first."""
     monkeypatch.setattr(nominal, "POINTS", points)
     whole = content(analyse(turning(tmp_path / "whole")))
     ended_early(turning(tmp_path / "ended"), at)
@@ -133,7 +143,7 @@ def test_a_run_that_is_ended_twice_goes_on_twice(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("changed", "key"),
-    [({"turns": 3}, "analysis.turns"), ({"rho_inf": 0.5}, "analysis.rho_inf")],
+    [({"revolutions": 3}, "analysis.revolutions"), ({"rho_inf": 0.5}, "analysis.rho_inf")],
 )
 def test_another_scene_is_refused_with_the_key_that_differs(
     tmp_path: Path, changed: dict[str, Any], key: str

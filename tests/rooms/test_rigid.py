@@ -20,7 +20,7 @@ COUNTED = ("joints/A/force", "joints/B/force", "joints/C/force", "joints/D/force
 
 def scene(kind: str, rigid: tuple[str, ...] = (), stiff: tuple[str, ...] = ()) -> dict[str, Any]:
     """The four-bar with some links rigid, or of a material 1e5 times as stiff; slow, gravity, a load on the crank."""
-    raw = four_bar(kind, steps_per_turn=120, turns=0.5, initial="quasi-static", rho_inf=0.5)
+    raw = four_bar(kind, steps_per_revolution=120, revolutions=0.5, initial="quasi-static", rho_inf=0.5)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     raw["points"]["P"] = {"between": ["A", "B"], "fraction": 0.6}
     raw["gravity"] = [0, -9.81, 0]
@@ -76,7 +76,7 @@ def test_a_rigid_crank_has_no_unknowns() -> None:
 def test_a_rigid_link_stays_rigid_beside_reduced_ones() -> None:
     raw = {
         **mechanisms()["RSSR"],
-        "analysis": {"turns": 0.25, "steps_per_turn": 200, "initial": "quasi-static"},
+        "analysis": {"revolutions": 0.25, "steps_per_revolution": 200, "initial": "quasi-static"},
     }
     full = meshed(scene_from(raw))
     found = reduced(full, ["crank", "coupler", "rocker"], 1e-3)

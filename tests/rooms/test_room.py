@@ -10,8 +10,9 @@ from kedfem.dynamics import cost, levels
 from kedfem.dynamics.levels import level_steps
 from kedfem.errors import MeshError, SolveError
 from kedfem.links import build
-from kedfem.mesh import link, room
-from kedfem.mesh.room import FACTOR_BYTES, LINK_BYTES, check_room
+from kedfem.mesh import link
+from kedfem.mesh import memory_forecast as room
+from kedfem.mesh.memory_forecast import FACTOR_BYTES, LINK_BYTES, check_room
 from kedfem.scene import scene_from
 
 
@@ -21,7 +22,7 @@ def arm(**changes: Any) -> Any:
         "links": {"arm": {"material": "steel", "shape": shape, **changes}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }
     return scene_from(raw)
 

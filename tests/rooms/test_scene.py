@@ -51,7 +51,7 @@ at = "A"
 joint = "A"
 motion = { kind = "constant_speed", speed = 10 }
 [analysis]
-turns = 1
+revolutions = 1
 """
 
 
@@ -186,7 +186,7 @@ def test_defaults_that_depend_on_other_keys(tmp_path):
     link = scene.links["arm"]
     assert (link.element, link.mesh.elements, scene.joints["A"].axis) == ("beam3", 1, (0.0, 0.0, 1.0))
     assert scene.gravity == (0.0, 0.0, 0.0)
-    assert scene.output.animation.frames_per_turn == 36
+    assert scene.output.animation.frames_per_revolution == 36
     assert scene.results_folder == tmp_path / "arm-results"
     assert scene.folder == tmp_path
     assert scene.source == ARM
@@ -216,7 +216,7 @@ def test_a_scene_from_records_is_the_scene_from_its_file(tmp_path):
         },
         joints={"A": Joint(kind="revolute", links=("ground", "arm"), at=A)},
         drive=Drive(joint="A", motion=ConstantSpeed(speed=10)),
-        analysis=Analysis(turns=1),
+        analysis=Analysis(revolutions=1),
     )
     assert scene.model_dump() == read_scene(arm(tmp_path)).model_dump()
     assert scene.source is None

@@ -14,10 +14,10 @@ from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_link, bare_links
 from kedfem.links.candidates import candidates
+from kedfem.links.coupling_surfaces import CouplingSurface, face_seat, joint_seat, surface_weights
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid_functions
-from kedfem.links.rounds import rounds
-from kedfem.links.seats import Seat, face_seat, joint_seat, surface_weights
+from kedfem.links.round_surfaces import rounds
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh
@@ -35,7 +35,7 @@ def link_of(shape: dict[str, Any], **mesh: Any) -> Any:
         "links": {"part": {"material": "steel", "shape": shape, "mesh": mesh}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }
     return bare_links(scene_from(raw))["part"]
 
@@ -112,7 +112,7 @@ def test_a_node_of_a_domed_face_stands_for_the_whole_face(fidelity: str) -> None
         },
         "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0.03]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }
     link = bare_links(scene_from(raw))["part"]
     top = np.array([0.105, 0.03, 0.0])
@@ -132,7 +132,7 @@ def test_a_bars_end_is_held_as_a_whole_however_many_elements_it_has(across: int,
             "kind": "bar", "between": [[0, 0], list(end[:2])], "width": 0.0254, "thickness": 0.0254}}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "bar"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }  # fmt: skip
     link = bare_link(scene_from(raw), "bar")
     for point in (np.zeros(3), end):
@@ -153,7 +153,7 @@ def made(mesh: SolidMesh, motion: Motion | None = None) -> Link:
     return solid_link("part", mesh if motion is None else rotated(mesh, motion), MATERIAL, np.eye(3))
 
 
-def seat_at(link: Link, z: float, faces: Sequence[str] = ()) -> Seat:
+def seat_at(link: Link, z: float, faces: Sequence[str] = ()) -> CouplingSurface:
     return joint_seat(link, "joints.A", np.array([0.0, 0.0, z]), Z, faces)
 
 
@@ -289,7 +289,7 @@ def test_a_scene_names_the_faces_of_a_joint(tmp_path: Path, monkeypatch: pytest.
                          "faces": {"part": "wide"}}},
         "bodies": {"wheel": {"kind": "flywheel", "link": "part", "at": [0, 0, 0.003], "inertia": 1e-6}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }  # fmt: skip
     (tmp_path / "any").touch()
     scene = scene_from(raw, tmp_path)

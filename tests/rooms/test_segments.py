@@ -1,4 +1,4 @@
-"""Segments of links with frames that follow: reduced, chosen, told, stored and drawn."""
+"""Segments of links with co-rotational frames: reduced, chosen, told, stored and drawn."""
 
 from pathlib import Path
 from typing import Any
@@ -37,8 +37,15 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def bars(elements: int = 6, fidelity: str = "plane", **link: Any) -> dict[str, Any]:
-    """[KED]'s four-bar (Nath and Ghosh 1980) of bars with frames that follow, from rest at 600 rpm."""
-    raw = four_bar("bar", turns=0.15, steps_per_turn=600, rho_inf=0.95, frames="following", reduction=0.02)
+    """[KED]'s four-bar (Nath and Ghosh 1980) of bars with co-rotational frames, from rest at 600 rpm."""
+    raw = four_bar(
+        "bar",
+        revolutions=0.15,
+        steps_per_revolution=600,
+        rho_inf=0.95,
+        frames="co-rotational",
+        reduction_tolerance=0.02,
+    )
     mesh = {"plane": [elements, 1], "solid": [elements, 1, 1], "beam": elements}[fidelity]
     for each in raw["links"].values():
         each |= {"fidelity": fidelity, "mesh": {"elements": mesh}, **link}
@@ -69,7 +76,7 @@ def test_reduced_segments_keep_to_their_tolerance(fidelity: str) -> None:
 
 
 def test_the_number_of_functions_is_that_of_each_segment() -> None:
-    model = ready(bars(segments=3, reduced=True, functions=9)).model
+    model = ready(bars(segments=3, reduced=True, modes=9)).model
     assert [link.n for link in model.links] == 9 * [9]
 
 
@@ -136,7 +143,7 @@ def test_more_segments_than_layers_are_refused_where_they_are_asked_for() -> Non
 @pytest.mark.long
 def test_an_accuracy_chooses_segments_that_its_share_allows() -> None:
     raw = bars(24)
-    raw["analysis"] = {"turns": 0.1, "frames": "following", "accuracy": 0.03}
+    raw["analysis"] = {"revolutions": 0.1, "frames": "co-rotational", "accuracy": 0.03}
     plan = planned(scene_from(raw))
     share = next(each for each in plan.shares if each.what == "segments")
     chosen = {link.segments for link in plan.scene.links.values()}
@@ -149,7 +156,7 @@ def test_an_accuracy_chooses_segments_that_its_share_allows() -> None:
     finer = bars(24, segments=24)
     coarse = bars(24, segments=count)
     for each in (coarse, finer):
-        each["analysis"] = {"turns": 0.1, "step": 0.1 / 10 / 60, "frames": "following"}
+        each["analysis"] = {"revolutions": 0.1, "step": 0.1 / 10 / 60, "frames": "co-rotational"}
     errors = relative_errors(*(histories(meshed(scene_from(each))) for each in (coarse, finer)))
     assert worst(errors) <= 1.2 * share.error
 
@@ -158,12 +165,12 @@ def test_an_accuracy_chooses_segments_that_its_share_allows() -> None:
 
 
 def test_a_link_is_one_row_with_its_number_of_segments(capsys: pytest.CaptureFixture[str]) -> None:
-    found = ready(bars(segments=3, reduced=True, functions=9))
+    found = ready(bars(segments=3, reduced=True, modes=9))
     table = check_tables(found, None, None)[0]
     assert table.row_count == 3
     Console(width=200).print(table)
     shown = capsys.readouterr().out
-    assert shown.count("quad9, 3 segments that follow, 9 functions each") == 3
+    assert shown.count("quad9, 3 segments that follow, 9 modes each") == 3
     mass = 2796 * 0.0254**2 * 0.9144
     assert f"{mass:.4g} kg" in shown  # of the coupler as a whole
 
@@ -171,8 +178,8 @@ def test_a_link_is_one_row_with_its_number_of_segments(capsys: pytest.CaptureFix
 def test_a_run_tells_segments_and_draws_links(tmp_path: Path) -> None:
     raw = bars(4)
     raw["output"] = {"folder": str(tmp_path / "out"), "plots": False, "picture": False,
-                     "animation": {"frames_per_turn": 10}}  # fmt: skip
-    raw["analysis"] |= {"turns": 0.1}
+                     "animation": {"frames_per_revolution": 10}}  # fmt: skip
+    raw["analysis"] |= {"revolutions": 0.1}
     done = analyse(scene_from(quick(raw)))
     assert done.results.notes["segments of coupler"] == 4
     assert done.budget is not None
@@ -201,7 +208,7 @@ def test_segments_are_drawn_as_one_link_that_holds_together() -> None:
 
 
 def test_reduced_segments_are_the_same_from_a_file() -> None:
-    model = ready(bars(segments=2, reduced=True, functions=9)).model
+    model = ready(bars(segments=2, reduced=True, modes=9)).model
     packed = stored_model(model)
     assert packed is not None
     again = restored_model(packed)
@@ -215,7 +222,7 @@ def test_reduced_segments_are_the_same_from_a_file() -> None:
 
 def test_only_links_with_nominal_frames_have_a_geometric_error() -> None:
     raw = bars(3, segments=3)
-    raw["links"]["rocker"] |= {"frames": "nominal"}
+    raw["links"]["rocker"] |= {"frames": "rigid-body"}
     raw["links"]["rocker"].pop("segments")
     found = ready(raw)
     error, alone = GeometricError(found.model), 0.0

@@ -1,4 +1,5 @@
-"""Several joints on one seat of a link: three links at one pin, welds at driven nodes, a pin and a guide in one."""
+"""Several joints on one coupling surface of a link: three links at one pin, welds at driven nodes, a pin and a guide in
+one."""
 
 from dataclasses import fields
 from typing import Any
@@ -70,8 +71,8 @@ def assert_same(fast: Run, slow: Run, tolerance: float = 1e-8) -> None:
 
 @pytest.mark.parametrize(("kind", "steps"), [("beam", 240), ("bar", 120), ("plate", 24)])
 def test_three_links_at_one_pin_condensed_is_literal(kind: str, steps: int) -> None:
-    fast = run(ternary(kind, turns=0.25, steps_per_turn=steps))
-    slow = run(ternary(kind, turns=0.25, steps_per_turn=steps, solver="literal"))
+    fast = run(ternary(kind, revolutions=0.25, steps_per_revolution=steps))
+    slow = run(ternary(kind, revolutions=0.25, steps_per_revolution=steps, solver="monolithic"))
     assert_same(fast, slow, 1e-6 if kind == "plate" else 1e-8)
     model = fast[0]
     for joint in model.joints:
@@ -85,7 +86,7 @@ def test_three_links_at_one_pin_condensed_is_literal(kind: str, steps: int) -> N
 
 @pytest.mark.parametrize("kind", ["beam", "bar", "plate"])
 def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
-    raw = ternary(kind, turns=0.25)
+    raw = ternary(kind, revolutions=0.25)
     raw["gravity"], raw["damping"] = [0, -9.81, 0], {"beta": 1e-5}  # inner damping carries no resultant
     model, _, snapshots = run(raw)
     # each channel acts on the first elastic link of its joint and reversed on the other
@@ -113,12 +114,17 @@ def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
 def test_torque_of_a_driven_hub_that_carries_a_pin(kind: str) -> None:
     """A lever and a swing on the crank's two pins: driven slowly, the torque is that of rigid links."""
     raw = with_dyad(
-        kind, ("B", "crank"), ("A", "crank"), turns=0.1, steps_per_turn=240, initial="quasi-static"
+        kind,
+        ("B", "crank"),
+        ("A", "crank"),
+        revolutions=0.1,
+        steps_per_revolution=240,
+        initial="quasi-static",
     )
     raw["drive"]["motion"]["speed"] = "20 rpm"
     raw["gravity"] = [0, -9.81, 0]
     fast = run(raw)
-    raw["analysis"]["solver"] = "literal"
+    raw["analysis"]["solver"] = "monolithic"
     assert_same(fast, run(raw), 1e-6 if kind == "plate" else 1e-8)
     got = [channels(raw, fast[0], x) for x in fast[2]]
     torque, rigid = (np.array([x[f"drive/{n}"] for x in got]) for n in ("torque", "rigid_torque"))
@@ -157,7 +163,7 @@ def bell_crank(pieces: int) -> dict[str, Any]:
     return raw
 
 
-@pytest.mark.parametrize("solver", ["condensed", "literal"])
+@pytest.mark.parametrize("solver", ["condensed", "monolithic"])
 def test_arms_welded_at_the_driven_node_are_one_beam(solver: str) -> None:
     two = bell_crank(2)
     two["analysis"]["solver"] = solver
@@ -189,7 +195,7 @@ def test_a_beam_piston_with_pin_and_guide_at_one_node_is_a_rigid_slider() -> Non
         # 1e-3: the piston's own first frequency is thousands of times the drive's
         assert_allclose(a[name], b[name], rtol=0,
                         atol=1e-3 * np.abs(b[name]).max())  # fmt: skip
-    elastic["analysis"]["solver"] = "literal"
+    elastic["analysis"]["solver"] = "monolithic"
     again = histories(elastic)
     for name in a:
         assert_allclose(
@@ -199,7 +205,7 @@ def test_a_beam_piston_with_pin_and_guide_at_one_node_is_a_rigid_slider() -> Non
 
 def test_what_statics_do_not_tell_is_left_out() -> None:
     """Three hinges among three links at one pin: one too many, so that only their sums are known."""
-    raw, plain = ternary("beam", turns=0.1), ternary("beam", turns=0.1)
+    raw, plain = ternary("beam", revolutions=0.1), ternary("beam", revolutions=0.1)
     raw["joints"]["twice"] = {"kind": "revolute", "links": ["rocker", "lever"], "at": "C"}
     a, b = histories(raw), histories(plain)
     assert not {f"joints/{name}/force" for name in ("C", "pin", "twice")} & set(a)

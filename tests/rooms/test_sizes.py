@@ -55,7 +55,7 @@ def four_bar(factor: float = 1.0, **change: Any) -> dict[str, Any]:
             "C": hinge("C", "coupler", "rocker"), "D": hinge("D", "ground", "rocker"),
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "300 rpm"}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     }  # fmt: skip
     for path, value in change.items():
         *above, last = path.split("__")

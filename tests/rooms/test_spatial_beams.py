@@ -69,7 +69,7 @@ def rssr_of_beams(R: np.ndarray | None = None, **analysis: Any) -> dict[str, Any
         "bodies": {"wheel": {"kind": "flywheel", "link": "rocker", "at": "joints.D", "inertia": 1e-3}},
         "gravity": (R @ [1.0, -9.0, 3.0]).tolist(),
         "damping": {"alpha": 0.5, "beta": 1e-5},
-        "analysis": {"turns": 1, "steps_per_turn": 180, **analysis},
+        "analysis": {"revolutions": 1, "steps_per_revolution": 180, **analysis},
     }
 
 
@@ -88,7 +88,7 @@ def test_a_turned_spatial_linkage_of_beams_moves_the_same() -> None:
 def test_condensed_is_literal_on_a_spatial_linkage_of_beams(rho_inf: float) -> None:
     model, _, fast = run(rssr_of_beams(rho_inf=rho_inf))
     assert {link.kind for link in model.links} == {"spatial_beam"}
-    _, _, slow = run(rssr_of_beams(rho_inf=rho_inf, solver="literal"))
+    _, _, slow = run(rssr_of_beams(rho_inf=rho_inf, solver="monolithic"))
     assert worst_difference(fast, slow) < 1e-8
     forces, got = ([s.port_forces for s in x[-1].states] for x in (slow, fast))
     size = max(np.abs(f).max() for f in forces)
@@ -121,8 +121,8 @@ def apart(raw: dict[str, Any], other: dict[str, Any]) -> float:
 
 
 def test_a_planar_linkage_of_spatial_beams_moves_as_that_of_planar_beams() -> None:
-    """The same theory; what is left over is a turned section's own inertia, δ being of fixed direction (below)."""
-    raw = four_bar("beam", steps_per_turn=360)
+    """The same theory; the residual is a turned section's own inertia, δ being of fixed direction (below)."""
+    raw = four_bar("beam", steps_per_revolution=360)
     raw["bodies"] = {}
     assert apart(raw, in_space(raw)) < 1e-4  # 8.5e-5
     raw["links"]["rocker"]["shape"] = {
@@ -138,7 +138,7 @@ def test_planar_and_spatial_beams_differ_by_a_flywheels_centrifugal_couple_only(
     """
     differences = []
     for speed in ("60 rpm", "120 rpm"):
-        raw = four_bar("beam", steps_per_turn=360, initial="quasi-static")
+        raw = four_bar("beam", steps_per_revolution=360, initial="quasi-static")
         raw["drive"]["motion"]["speed"] = speed
         differences.append(apart(raw, in_space(raw)))
     assert differences[0] < 1e-4
@@ -165,7 +165,7 @@ def middles(raw: dict[str, Any]) -> tuple[set[str], np.ndarray]:
 @pytest.mark.parametrize("kind", ["planar", "spatial"])
 def test_beams_and_solids_in_one_linkage(beams: tuple[str, ...], kind: str) -> None:
     """Bars of solids and of beams against beams alone, slow: 0.1 % of the peak, of the solids' end faces."""
-    analysis = {"steps_per_turn": 60, "initial": "quasi-static"}
+    analysis = {"steps_per_revolution": 60, "initial": "quasi-static"}
     alone, mixed = four_bar("beam", **analysis), four_bar("bar", **analysis)
     for name in beams:
         mixed["links"][name] = {**alone["links"][name], "beam": kind}
@@ -216,7 +216,7 @@ def test_a_beam_welded_to_a_spatial_beam_or_a_solid_is_spatial() -> None:
     raw["links"]["tip"] |= {"fidelity": "solid", "mesh": {"elements": [4, 1, 1]}}
     del raw["links"]["tip"]["beam"]
     assert spatial_beams(scene_from(raw)) == {"arm"}
-    model, _, _ = run(raw)  # and the weld finds its seats: the solid's end face, the beam's end
+    model, _, _ = run(raw)  # and the weld finds its coupling surfaces: the solid's end face, the beam's end
     assert [link.kind for link in model.links] == ["spatial_beam", "solid"]
 
 
@@ -350,10 +350,10 @@ def test_a_beam_is_drawn_as_the_body_of_its_section(section: Any) -> None:
 
 
 def test_a_spatial_linkage_is_run_recorded_and_drawn(tmp_path: Path) -> None:
-    raw = rssr_of_beams(steps_per_turn=60)
+    raw = rssr_of_beams(steps_per_revolution=60)
     raw["output"] = {
         "folder": str(tmp_path),
-        "animation": {"frames_per_turn": 4},
+        "animation": {"frames_per_revolution": 4},
         "plots": False,
         "probes": {
             "side": {"link": "rocker", "at": "joints.D", "quantity": "stress"},

@@ -1,4 +1,4 @@
-"""Dense, condensed and literal steps of one model; the compiled loop without its compiler; runs that end early."""
+"""Dense, condensed and monolithic steps of one model; the compiled loop without its compiler; runs that end early."""
 
 from dataclasses import replace
 from typing import Any
@@ -39,7 +39,7 @@ KERNELS = (
 
 def mixed() -> dict[str, Any]:
     """A beam, a solid and a plane link."""
-    raw = four_bar("bar", turns=0.25, steps_per_turn=120)
+    raw = four_bar("bar", revolutions=0.25, steps_per_revolution=120)
     for link in raw["links"].values():
         link["mesh"] = {"elements": [3, 1, 1]}
     raw["links"]["crank"] |= {"fidelity": "beam", "mesh": {"elements": 3}}
@@ -49,7 +49,7 @@ def mixed() -> dict[str, Any]:
 
 def sliding() -> dict[str, Any]:
     raw = slider_crank("rigid")
-    raw["analysis"] = {"turns": 0.25, "steps_per_turn": 120}
+    raw["analysis"] = {"revolutions": 0.25, "steps_per_revolution": 120}
     return raw
 
 
@@ -83,7 +83,7 @@ def test_dense_condensed_and_literal_steps_are_one(made: Any, rho_inf: float) ->
 
 def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     raw = mixed()
-    raw["analysis"]["turns"] = 0.05
+    raw["analysis"]["revolutions"] = 0.05
     raw["analysis"]["rho_inf"] = 0.8
     ready = meshed(scene_from(raw))
     fast = displacements(ready, steps_of(ready.scene, ready.model))
@@ -107,7 +107,7 @@ def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPat
 
 
 def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
-    raw = four_bar("beam", turns=3, steps_per_turn=200)
+    raw = four_bar("beam", revolutions=3, steps_per_revolution=200)
     ready = meshed(scene_from(raw))
     law, points = ready.scene.drive.motion, 0
     for first, motion in motions(ready.scene, ready.linkage, ready.path):
@@ -122,7 +122,7 @@ def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
 
 def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
-    ready = meshed(scene_from(four_bar("beam", turns=1, steps_per_turn=300)))
+    ready = meshed(scene_from(four_bar("beam", revolutions=1, steps_per_revolution=300)))
     solver = steps_of(ready.scene, ready.model)
     advance, left, seen = solver.advance, [270], []  # not finite from a step in the second block on
 
@@ -185,7 +185,7 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
 
 def test_an_interruption_while_a_large_link_is_solved_ends_the_march() -> None:
     """Compiled steps call back for sparse factors: what is raised there must not be printed and forgotten."""
-    ready = meshed(scene_from(four_bar("plate", turns=0.1, steps_per_turn=40)))
+    ready = meshed(scene_from(four_bar("plate", revolutions=0.1, steps_per_revolution=40)))
     solver: Any = steps_of(ready.scene, ready.model)
 
     def stopped(r: np.ndarray) -> Any:

@@ -38,7 +38,7 @@ def stiff(raw: dict[str, Any], **analysis: Any) -> dict[str, Any]:
 
 def sliding() -> dict[str, Any]:
     raw = slider_crank("rigid")
-    raw["analysis"] = {"turns": 0.25, "steps_per_turn": 120}
+    raw["analysis"] = {"revolutions": 0.25, "steps_per_revolution": 120}
     return raw
 
 
@@ -113,7 +113,7 @@ def test_dense_condensed_and_literal_stiffened_steps_are_one(
     [
         ("beam", "condensed", DenseSteps),
         ("plate", "condensed", CondensedSteps),
-        ("beam", "literal", LiteralSteps),
+        ("beam", "monolithic", LiteralSteps),
     ],
 )
 def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str, taken: type) -> None:
@@ -121,12 +121,12 @@ def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str, ta
     ready = meshed(scene_from(raw))
     for scene, wanted in ((ready.scene, False), (scene_from(stiff(raw)), True)):
         found = steps_of(scene, ready.model)
-        assert isinstance(found, taken if wanted or solver == "literal" else SystemSteps)
+        assert isinstance(found, taken if wanted or solver == "monolithic" else SystemSteps)
         assert (found.stiffening is not None) is wanted
 
 
 def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    ready = meshed(scene_from(stiff(loaded(), turns=0.05, rho_inf=0.8)))
+    ready = meshed(scene_from(stiff(loaded(), revolutions=0.05, rho_inf=0.8)))
     fast = displacements(ready, steps_of(ready.scene, ready.model))
     for name in ("advance_stiffened", "settled", "sweep", "combined", "add_turned", "predicted"):
         monkeypatch.setattr(stiffened_kernel, name, getattr(stiffened_kernel, name).py_func)
@@ -146,12 +146,12 @@ def tip(ready: Prepared) -> np.ndarray:
 @pytest.mark.parametrize("rho_inf", [1.0, 0.6])
 def test_stiffened_steps_are_of_second_order(rho_inf: float) -> None:
     """At t = 0.02 s; beams soft enough for a step to resolve all of their motion that counts."""
-    raw = stiff(four_bar("beam", turns=0.2, rho_inf=rho_inf, initial="quasi-static"))
+    raw = stiff(four_bar("beam", revolutions=0.2, rho_inf=rho_inf, initial="quasi-static"))
     raw["drive"]["motion"]["speed"] = "300 rpm"
     raw["damping"] = {"alpha": 0.0, "beta": 1e-4}
     last = []
     for steps in (1000, 2000, 4000, 8000):
-        raw["analysis"]["steps_per_turn"] = steps
+        raw["analysis"]["steps_per_revolution"] = steps
         last.append(tip(meshed(scene_from(raw)))[-1])
     errors = [np.abs(x - y).max() for x, y in pairwise(last)]
     slopes = np.log2(np.divide(errors[:-1], errors[1:]))
@@ -163,7 +163,7 @@ def test_what_stiffening_changes_grows_with_the_square_of_the_speed() -> None:
     """Stresses and deflections are of the order of speed², so their product, of the deflection, is."""
     effect = []
     for rpm in (60, 120, 240):
-        raw = four_bar("beam", steps_per_turn=720, initial="quasi-static", rho_inf=0.9)
+        raw = four_bar("beam", steps_per_revolution=720, initial="quasi-static", rho_inf=0.9)
         raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
         raw["damping"] = {"alpha": 0.0, "beta": 1e-3}  # so that no vibration is left
         plain, stiffened_ = tip(meshed(scene_from(raw))), tip(meshed(scene_from(stiff(raw))))
@@ -177,7 +177,7 @@ def test_two_sweeps_a_step_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """On average, with the predictor; 720 steps a turn at 600 rpm, from rest."""
     solved = []
     monkeypatch.setattr(stiffening, "coupled", lambda *given: (solved.append(1), coupled(*given))[1])
-    ready = meshed(scene_from(stiff(four_bar("beam", steps_per_turn=720, turns=0.5))))
+    ready = meshed(scene_from(stiff(four_bar("beam", steps_per_revolution=720, revolutions=0.5))))
     scheme = generalised_alpha(time_grid(ready.scene).step, 0.95)
     stresses = stiffening.stiffening(ready.model)
     model = ready.model
@@ -218,7 +218,7 @@ def test_where_stiffening_is_no_small_term_the_run_ends_and_says_so(kind: str) -
 
 
 def test_reduced_links_are_stiffened_as_full_ones_are() -> None:
-    raw = stiff(four_bar("bar", turns=0.5, steps_per_turn=240, initial="quasi-static"))
+    raw = stiff(four_bar("bar", revolutions=0.5, steps_per_revolution=240, initial="quasi-static"))
     full = histories(meshed(scene_from(raw)))
     for link in raw["links"].values():
         link["reduced"] = True
@@ -254,7 +254,7 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A", "axis": [0, 0, 1]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
         "loads": {"tip": {"kind": "force", "link": "arm", "at": "B", "vector": force, "frame": "link"}},
-        "analysis": {"turns": 0.5, "steps_per_turn": 2000, "stiffening": True, "initial": "quasi-static"},
+        "analysis": {"revolutions": 0.5, "steps_per_revolution": 2000, "stiffening": True, "initial": "quasi-static"},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
     blocks = transient(

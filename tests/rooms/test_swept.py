@@ -11,16 +11,16 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from kedfem.links.offers import face_kind
+from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_basis, solid_link
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.carried import carried_mesh
 from kedfem.mesh.core import disc
 from kedfem.mesh.filling import filled_mesh
+from kedfem.mesh.path_sweep import carried_mesh
 from kedfem.mesh.quality import scaled_jacobian
 from kedfem.mesh.revolved import revolved_mesh
 from kedfem.mesh.session import gmsh_model

@@ -1,4 +1,4 @@
-"""Springs and motors on links with nominal frames: the system's steps record what those of the oracle do."""
+"""Springs and motors on links with rigid-body frames: the system's steps record what those of the oracle do."""
 
 from functools import partial
 from typing import Any
@@ -25,7 +25,7 @@ CURVE = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
 
 def bushed() -> dict[str, Any]:
     """A bushing in a hinge and a shaft that gives in the drive, both damped."""
-    raw = four_bar("nominal", springs=line(100.0), steps=72)
+    raw = four_bar("rigid-body", springs=line(100.0), steps=72)
     raw["joints"]["C"]["bushing"] = {"stiffness": [1e5, 2e5, 1e5], "damping": [10.0, 10.0, 10.0]}
     raw["drive"] |= {"shaft_stiffness": 500.0, "shaft_damping": 0.5}
     return raw
@@ -33,7 +33,7 @@ def bushed() -> dict[str, Any]:
 
 def large() -> dict[str, Any]:
     """Solid links, one of 1,407 unknowns with a sparse factor beside two with dense matrices."""
-    raw = four_bar("nominal", "solid", springs=line(20.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0})
+    raw = four_bar("rigid-body", "solid", springs=line(20.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0})
     for name, link in raw["links"].items():
         link["mesh"] = {"elements": SOLIDS[name]}
     return raw
@@ -41,20 +41,20 @@ def large() -> dict[str, Any]:
 
 DEAR = ("solid links, reduced", "plane links", "motor over speed", "spring along a slide")
 SCENES = {
-    "springs with dampers": lambda: four_bar("nominal", springs=line(200.0), steps=72),
+    "springs with dampers": lambda: four_bar("rigid-body", springs=line(200.0), steps=72),
     "from rest, damped links, rho_inf 0.8": lambda: four_bar(
-        "nominal", springs=line(50.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0},
+        "rigid-body", springs=line(50.0), steps=72, damping={"beta": 1e-5, "alpha": 1.0},
         analysis={"initial": "rest", "rho_inf": 0.8},
     ),
-    "motor over speed": lambda: four_bar("nominal", motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
+    "motor over speed": lambda: four_bar("rigid-body", motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
     "spring along a slide": partial(slider_crank, steps=72, damping=5.0),
     "bushing and shaft": bushed,
-    "solid links, reduced": lambda: four_bar("nominal", "reduced", springs=line(20.0), steps=36),
+    "solid links, reduced": lambda: four_bar("rigid-body", "reduced", springs=line(20.0), steps=36),
     "a pin in a slot": lambda: inverted(
-        "beam", "slot", steps_per_turn=72, rho_inf=0.8) | {
+        "beam", "slot", steps_per_revolution=72, rho_inf=0.8) | {
             "springs": {"s": {"kind": "torsion", "joint": "B", "stiffness": 20.0, "damping": 0.2}}},
     "plane links": lambda: four_bar(
-        "nominal", "plane", springs=line(20.0), motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
+        "rigid-body", "plane", springs=line(20.0), motors={"m": {"joint": "C", "torque": CURVE}}, steps=72),
 }  # fmt: skip
 
 
@@ -68,7 +68,7 @@ def channels(raw: dict[str, Any], solver_of: Any) -> tuple[Steps, dict[Channel, 
 
 
 def oracle_of(scene: Scene, model: Model) -> SystemSteps:
-    """The oracle on the same model, reduced or not: as of itself, `solver = "literal"` reduces nothing."""
+    """The oracle on the same model, reduced or not: as of itself, `solver = "monolithic"` reduces nothing."""
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal=True)
 
@@ -92,7 +92,7 @@ def apart(found: dict[Channel, np.ndarray], wanted: dict[Channel, np.ndarray]) -
 def test_all_that_is_recorded_is_as_by_the_oracle(name: str) -> None:
     """It shares the start and the reading of forces, and no step; beside reduced links its tangents keep eight digits."""
     raw = SCENES[name]()
-    raw["analysis"]["turns"] = 0.06
+    raw["analysis"]["revolutions"] = 0.06
     solver, found = channels(raw, steps_of)
     _, wanted = channels(raw, oracle_of)
     assert isinstance(solver, SystemSteps)
@@ -107,7 +107,7 @@ def test_quasi_static_starts_of_damped_bushings_and_shafts_do_not_ring(spring: b
     left = []
     for steps in (72, 144):
         raw = bushed()
-        raw["analysis"]["steps_per_turn"] = steps
+        raw["analysis"]["steps_per_revolution"] = steps
         if not spring:
             del raw["springs"]
             raw["gravity"] = [0, -9.81, 0]
@@ -131,7 +131,7 @@ def undamped() -> dict[str, Any]:
 def test_sparse_bodies_move_as_dense_ones(scene: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """From quasi-static starts, whose iterations end at 1e-10 of deflections; rates are of these over a quarter step."""
     raw = scene() | {"damping": {"beta": 1e-5, "alpha": 1.0}}
-    raw["analysis"]["turns"] = 0.1
+    raw["analysis"]["revolutions"] = 0.1
     found = {}
     for small in (0, 10_000):
         monkeypatch.setattr("kedfem.dynamics.system.layout.SMALL", small)

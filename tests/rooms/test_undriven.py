@@ -21,8 +21,8 @@ from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting
 from kedfem.report import check_tables, moment
 from kedfem.scene import (
-    following,
-    following_links,
+    corotational,
+    corotational_links,
     link_frames,
     read_scene,
     scene_from,
@@ -79,7 +79,7 @@ end_time = 0.5
 step = 0.0011
 initial_speeds = { A = "60 rpm" }
 [output.animation]
-frames_per_turn = 20
+frames_per_revolution = 20
 """
 
 
@@ -89,24 +89,24 @@ def prepared(**change: Any) -> Prepared:
 
 def test_frames_are_following_unless_a_drive_or_the_scene_says_otherwise() -> None:
     scene = scene_from(tomllib.loads(ARM))
-    assert scene.analysis.frames == "following"
-    assert following(scene)
-    assert following_links(scene) == {"arm", "crank", "shoe"}
+    assert scene.analysis.frames == "co-rotational"
+    assert corotational(scene)
+    assert corotational_links(scene) == {"arm", "crank", "shoe"}
     raw = tomllib.loads(ARM)
     for key in ("motors", "springs"):
         del raw[key]
     raw["drive"] = {"joint": "A", "motion": {"kind": "constant_speed", "speed": 6}}
     del raw["analysis"]["initial_speeds"]
     driven = scene_from(raw)
-    assert driven.analysis.frames == "nominal"
-    assert not following(driven)
-    raw["links"]["arm"]["frames"] = "following"
-    assert following_links(scene_from(raw)) == {"arm"}
-    raw["analysis"]["frames"] = "following"
-    raw["links"]["arm"]["frames"] = "nominal"
+    assert driven.analysis.frames == "rigid-body"
+    assert not corotational(driven)
+    raw["links"]["arm"]["frames"] = "co-rotational"
+    assert corotational_links(scene_from(raw)) == {"arm"}
+    raw["analysis"]["frames"] = "co-rotational"
+    raw["links"]["arm"]["frames"] = "rigid-body"
     assert {x: link_frames(scene_from(raw), x) for x in ("arm", "crank")} == {
-        "arm": "nominal",
-        "crank": "following",
+        "arm": "rigid-body",
+        "crank": "co-rotational",
     }
 
 
@@ -170,7 +170,7 @@ def test_a_scene_without_any_joint_can_be_built() -> None:
     raw = {
         "links": {"arm": bar(1, 0.03, 0.02, fidelity="beam", mesh={"elements": 3})},
         "analysis": {"end_time": 1, "step": 0.01,
-                     "initial_motions": {"arm": {"at": [0.5, 0], "velocity": [1, 2], "spin": [0, 0, 30]}}},
+                     "initial_motions": {"arm": {"at": [0.5, 0], "velocity": [1, 2], "angular_velocity": [0, 0, 30]}}},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
     assert ready.linkage.mobility == 6

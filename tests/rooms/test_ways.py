@@ -11,12 +11,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError, SceneError
-from kedfem.links.offers import face_kind
+from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh, ways
-from kedfem.mesh.apart import LONGEST, PART, apart
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import Solid
+from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.scene import LinkScene, Material, link_from, scene_from
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
@@ -39,7 +39,7 @@ def volume_and_centre(mesh: SolidMesh) -> tuple[float, np.ndarray]:
     return float(m1.sum()), np.asarray(m1 @ record.X / m1.sum())
 
 
-#: Radii [mm] of the bores, ball seats and balls that geometry/README.md lists.
+#: Radii [mm] of the bores, ball coupling surfaces and balls that geometry/README.md lists.
 SEATS = {
     "ball_ended_rod": [2.5, 12, 12],
     "bell_crank": [6, 7, 10],
@@ -262,8 +262,10 @@ class TestScene:
         ("change", "message"),
         [
             ({"step": "none.step"}, r"links.crank.step: must be a CAD file, got nothing at .*none.step"),
-            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.step: must stand without shape, got both"),
-            ({"mesh": {"unknowns": 500, "size": 0.003}}, r"links.crank.mesh.unknowns: must stand without size, got both"),
+            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.step: cannot be combined with "
+            r"shape, got both"),
+            ({"mesh": {"unknowns": 500, "size": 0.003}}, r"links.crank.mesh.unknowns: cannot be combined "
+            r"with size, got both"),
             ({"mesh": {"elements": [4, 2, 1]}}, r"links.crank.mesh.elements: must be left out for a cad"),
             ({"mesh": {"unknowns": 5}}, r"links.crank.mesh.unknowns: must be at least 100, got 5"),
             ({"fidelity": "plane"}, r"links.crank.shape.kind: must be one of .* for a plane link, got 'cad'"),

@@ -18,8 +18,8 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import COMPONENTS, nodal_stress, stress_recovery
 from kedfem.links.solid import solid_link
 from kedfem.mesh.cad.model import CadKeys
+from kedfem.mesh.methods import made_mesh
 from kedfem.mesh.session import gmsh_options
-from kedfem.mesh.ways import made_mesh
 from kedfem.scene import Cad, link_from
 
 from .cad import STEEL
@@ -227,7 +227,7 @@ def three_rods() -> list[Row]:
     """Eyes 90 mm apart, chamfers of 0.4 mm: frequencies of the free rod, stress in the waist where it is bent."""
     ways = {
         "sharp edges": meshed(rod, None),
-        "chamfers left out": meshed(chamfered_rod, None, ignore="0.5 mm"),
+        "chamfers left out": meshed(chamfered_rod, None, defeature_size="0.5 mm"),
         "chamfers": meshed(chamfered_rod, "tet10"),
     }
     finest = meshed(chamfered_rod, "tet10", unknowns=80_000)

@@ -46,10 +46,13 @@ def histories(scene: Scene, *names: str) -> tuple[int, list[np.ndarray]]:
 
 
 @cache
-def stress(elements: int, steps_per_turn: int, turns: float = 2.0) -> np.ndarray:
+def stress(elements: int, steps_per_revolution: int, revolutions: float = 2.0) -> np.ndarray:
     """σ on the rocker's outer side at 720 points a turn, 3-node beams [MPa]."""
-    scene = four_bar({"turns": turns, "steps_per_turn": steps_per_turn}, {"mesh": {"elements": elements}})
-    return histories(scene, STRESS)[1][0][:: steps_per_turn // 720, 0] / 1e6
+    scene = four_bar(
+        {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution},
+        {"mesh": {"elements": elements}},
+    )
+    return histories(scene, STRESS)[1][0][:: steps_per_revolution // 720, 0] / 1e6
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
@@ -111,7 +114,8 @@ def solids() -> list[Row]:
     hinges that hold an end face in the mean, beside the mesh's own error. Frequencies differ by parts of a percent,
     and the curves run apart with the turns."""
     scene = four_bar(
-        {"turns": 1, "steps_per_turn": 720}, {"fidelity": "solid", "mesh": {"elements": [16, 2, 1]}}
+        {"revolutions": 1, "steps_per_revolution": 720},
+        {"fidelity": "solid", "mesh": {"elements": [16, 2, 1]}},
     )
     _, (curve,) = histories(scene, STRESS)
     error = difference(curve[:, 0] / 1e6, stress(16, 720)[:721])
@@ -125,7 +129,7 @@ def rigid_errors() -> dict[int, float]:
     for factor in (1, 4, 16):
         alloy = {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}
         drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}}
-        analysis = {"turns": 0.5, "steps_per_turn": 720}
+        analysis = {"revolutions": 0.5, "steps_per_revolution": 720}
         scene = four_bar(analysis, {"mesh": {"elements": 4}}, materials={"alloy": alloy}, drive=drive)
         _, (torque, rigid) = histories(scene, "drive/torque", "drive/rigid_torque")
         found[factor] = float(np.sqrt(np.mean((torque - rigid) ** 2) / np.mean(rigid**2)))

@@ -1,4 +1,4 @@
-"""What nominal frames cost where links bend far: the linear equation against geometrically exact beams."""
+"""What rigid-body frames cost where links bend far: the linear equation against geometrically exact beams."""
 
 from functools import cache
 
@@ -14,13 +14,17 @@ STEP, ELEMENTS = 1e-4, 8  # s; 3-node beams a link
 def linear_difference(name: str, rpm: float, ratio: float) -> np.ndarray:
     """Signed difference (T,) of the linear stress from a kept history, of its peak."""
     kept: History = history(name)
-    steps_per_turn = round(60 / rpm / STEP)
-    analysis = {"turns": kept.t[-1] * rpm / 60, "steps_per_turn": steps_per_turn, "initial": "rest"}
+    steps_per_revolution = round(60 / rpm / STEP)
+    analysis = {
+        "revolutions": kept.t[-1] * rpm / 60,
+        "steps_per_revolution": steps_per_revolution,
+        "initial": "rest",
+    }
     drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": f"{rpm} rpm"}}
     damping = {"ratio": ratio, "frequencies": [20, 200]} if ratio else {}
     scene = four_bar(analysis, {"mesh": {"elements": ELEMENTS}}, drive=drive, damping=damping)
     stress = histories(scene, STRESS)[1][0][:, :1]
-    t = 60 / rpm / steps_per_turn * np.arange(len(stress))
+    t = 60 / rpm / steps_per_revolution * np.arange(len(stress))
     reference = kept.values[:, 0]
     return np.asarray((np.interp(kept.t, t, stress[:, 0]) - reference) / np.abs(reference).max())
 
@@ -36,7 +40,7 @@ def linear_errors() -> dict[str, tuple[float, float]]:
 
 
 @case(
-    "Source's four-bar from rest: nominal frames",
+    "Source's four-bar from rest: rigid-body frames",
     "geometrically exact beams, converged in step and mesh (tests/exact)",
     long=True,
 )

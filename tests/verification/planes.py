@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from kedfem.links.coupling_surfaces import face_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import face_seat
 from kedfem.links.surface import surface
 from kedfem.scene import Material, scene_from
 
@@ -137,7 +137,7 @@ CHANNELS = {
 def four_bar(fidelity: str, thickness: float) -> list[np.ndarray]:
     """Channels of the example's four-bar over a turn of 90 steps at 150 rpm, on the same quadrilaterals."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
-    raw["analysis"] |= {"turns": 1, "steps_per_turn": 90}
+    raw["analysis"] |= {"revolutions": 1, "steps_per_revolution": 90}
     for link in raw["links"].values():
         link["fidelity"], link["shape"]["thickness"] = fidelity, thickness
         link["element"] = {"plane": "quad9", "solid": "hex27"}[fidelity]

@@ -7,9 +7,9 @@ from scipy.sparse.linalg import spsolve
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.transient import snapshots, steps_of
+from kedfem.links.coupling_surfaces import face_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import face_seat
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import Material, Scene, scene_from
@@ -81,7 +81,7 @@ WIDE = 0.3  # of the bar in the scene; u(x) knows neither width nor thickness wh
 
 
 def turning_bar_scene(
-    initial: str, steps_per_turn: int = 360, turns: float = 4, width: float = WIDE
+    initial: str, steps_per_revolution: int = 360, revolutions: float = 4, width: float = WIDE
 ) -> Scene:
     """SSLV105 as a scene: a solid bar driven in a revolute joint about its end at a constant 3000 rad/s.
 
@@ -100,7 +100,11 @@ def turning_bar_scene(
             "joints": {"A": {"kind": "revolute", "links": ["ground", "bar"], "at": "A"}},
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": SPEED}},
             "damping": {"alpha": 0.0, "beta": 2e-4},
-            "analysis": {"turns": turns, "steps_per_turn": steps_per_turn, "initial": initial},
+            "analysis": {
+                "revolutions": revolutions,
+                "steps_per_revolution": steps_per_revolution,
+                "initial": initial,
+            },
         }
     )
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from kedfem.links.beam import beam_link
+from kedfem.links.coupling_surfaces import face_seat, surface_weights
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
-from kedfem.links.seats import face_seat, surface_weights
 from kedfem.links.section import rectangle
 from kedfem.scene import Material
 
@@ -105,7 +105,9 @@ def tip_deflections(link: Link) -> np.ndarray:
     seat = face_seat(link, "tip", np.array([6.0, 0, 0]))
     area = surface_weights(link, seat)
     loads = [np.outer(area / area.sum(), axis) for axis in np.eye(3)]
-    loads.append(np.stack([0 * area, -seat.fit[3] / 2, seat.fit[2] / 2], axis=1))  # work = mean turn about x
+    loads.append(
+        np.stack([0 * area, -seat.fit[3] / 2, seat.fit[2] / 2], axis=1)
+    )  # work = mean rotation about x
     return np.array([(f * deflection(link, T, f)).sum() for f in loads])
 
 

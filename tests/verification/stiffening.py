@@ -13,9 +13,9 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.links.beam import beam_link
 from kedfem.links.beam_axis import straight_axis
 from kedfem.links.bodies import flywheel_tensor, with_body
+from kedfem.links.coupling_surfaces import joint_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.seats import joint_seat
 from kedfem.links.section import Section, rectangle, tube
 from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions

@@ -91,7 +91,7 @@ def test_gears_turn_in_proportion(gear: dict[str, object], ratio: float) -> None
 
 
 @pytest.mark.parametrize(
-    ("gear", "turns"),
+    ("gear", "revolutions"),
     [
         ({"teeth": [3, 5]}, 5),
         pytest.param({"teeth": [24, 59]}, 59, marks=pytest.mark.long),
@@ -99,18 +99,18 @@ def test_gears_turn_in_proportion(gear: dict[str, object], ratio: float) -> None
     ],
 )
 def test_a_pair_of_gears_repeats_after_as_many_turns_as_its_teeth_ask_for(
-    gear: dict[str, object], turns: int
+    gear: dict[str, object], revolutions: int
 ) -> None:
     """Teeth z1, z2 without a common factor: after z2 turns; then 10⁴ turns are as exact as the first few."""
     joints, sections = pair(**gear)
     scene = linkage_scene(joints, motion=steady(2 * np.pi), sections=sections)
     link = linkage(scene)
     along = path(link, 0.0, 2e4 * np.pi)
-    assert along.period == pytest.approx(2 * np.pi * turns, rel=1e-12)
+    assert along.period == pytest.approx(2 * np.pi * revolutions, rel=1e-12)
     ratio = gear["ratio"] if "ratio" in gear else -gear["teeth"][0] / gear["teeth"][1]  # type: ignore[index]
     t = 1e4 - np.linspace(0, 3, 40)
     m = rigid_motion(link, along, t, path_parameter(scene, t))
-    angle = ratio * np.remainder(t, turns) * 2 * np.pi  # exact: a wheel is back after its turns
+    angle = ratio * np.remainder(t, revolutions) * 2 * np.pi  # exact: a wheel is back after its turns
     off = Rotation.from_matrix(m.R[:, body(scene, "wheel")]).inv() * Rotation.from_rotvec(np.outer(angle, Z))
     assert off.magnitude().max() < 3e-11  # φ itself, 6e4 rad, is known to 7e-12
 

@@ -1,9 +1,9 @@
-"""Order two in the step of frames that follow, from both sides."""
+"""Order two in the step of co-rotational frames, from both sides."""
 
 import numpy as np
 import pytest
 
-from .following import double_errors, flight_energy, flight_errors, four_bar_error
+from .corotational import double_errors, flight_energy, flight_errors, four_bar_error
 
 
 @pytest.mark.long

@@ -120,7 +120,7 @@ def test_two_flying_links_on_a_spring_keep_momentum_and_energy() -> None:
                   "between": [{"link": "one", "at": [0, 0]}, {"link": "other", "at": [2 * LENGTH, 0]}]},
         },
         "analysis": {"end_time": 1.0, "step": 0.001, "rho_inf": 1.0,
-                     "initial_motions": {"one": {"at": [0, 0], "velocity": [0.3, 0.2], "spin": [0, 0, 5]}}},
+                     "initial_motions": {"one": {"at": [0, 0], "velocity": [0.3, 0.2], "angular_velocity": [0, 0, 5]}}},
     }  # fmt: skip
     _, x, account = ran(raw)
     stored = 0.5 * 10 * (x["springs/t/angle"] - 0.5) ** 2 + 0.5 * 300 * (x["springs/l/length"] - 0.5) ** 2
@@ -141,7 +141,7 @@ def test_a_pendulum_hangs_on_a_driven_crank() -> None:
         "A": {"kind": "revolute", "links": ["crank", "arm"], "at": [0, 0]},
     }
     raw["drive"] = {"joint": "O", "motion": {"kind": "constant_speed", "speed": 0}}
-    raw["analysis"]["frames"] = "following"
+    raw["analysis"]["frames"] = "co-rotational"
     raw["springs"] = {"look": {"kind": "torsion", "joint": "A", "damping": 1e-9}}
     _, hung, _ = ran(raw)
     np.testing.assert_allclose(-hung["springs/look/angle"], alone["joints/A/angle"], atol=5e-3)

@@ -32,13 +32,13 @@ def spatial(factor: float) -> Any:
         link["material"] = "alloy"
         if name != "cross":
             link |= {"fidelity": "beam", "mesh": {"elements": 2}}
-    analysis = {"turns": 0.25, "steps_per_turn": 720, "initial": "quasi-static"}
+    analysis = {"revolutions": 0.25, "steps_per_revolution": 720, "initial": "quasi-static"}
     return scene_from({**raw, "materials": alloy(factor), "drive": SLOW, "analysis": analysis, "damping": {}})
 
 
 def planar(factor: float) -> Any:
     """The source's four-bar."""
-    analysis = {"turns": 0.5, "steps_per_turn": 720}
+    analysis = {"revolutions": 0.5, "steps_per_revolution": 720}
     return four_bar(analysis, {"mesh": {"elements": 4}}, materials=alloy(factor), drive=SLOW)
 
 

@@ -21,9 +21,7 @@ from kedfem.dynamics.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps
 
-FOLLOWED = (
-    0.5  # of the accuracy: nominal frames that err by more give way to frames that follow, in scenes of beams
-)
+FOLLOWED = 0.5  # of the accuracy: rigid-body frames that err by more give way to co-rotational frames, in scenes of beams
 DEARER = 1.5  # the same where solid or plane links would follow too: it costs them more, and the estimate is cautious
 ELEMENTS = (
     ("beam3", 1),
@@ -59,7 +57,7 @@ def open_frames(scene: Scene) -> bool:
 
 def open_step(scene: Scene) -> bool:
     """Whether it leaves its step open."""
-    return scene.analysis.step is None and scene.analysis.steps_per_turn is None
+    return scene.analysis.step is None and scene.analysis.steps_per_revolution is None
 
 
 def open_beams(scene: Scene) -> list[str]:
@@ -84,7 +82,7 @@ def elastic(link: LinkScene, family: str) -> bool:
 
 
 def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
-    """The scene with frames that follow where links bend too far for nominal ones, and the error of these else."""
+    """The scene with co-rotational frames where links bend too far for rigid-body ones, and the error of these else."""
     if not open_frames(scene):
         return scene, 0.0
     trial = shortened(with_beams(scene, open_beams(scene), ELEMENTS[2]))
@@ -96,16 +94,18 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     error = geometric.estimate
     if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
         return scene, error
-    following = with_analysis(scene, frames="following")
+    corotational = with_analysis(scene, frames="co-rotational")
     try:
-        scene_from(following.model_dump(mode="json"))
-        search.run(with_steps(shortened(with_beams(following, open_beams(scene), ELEMENTS[2])), _few(trial)))
+        scene_from(corotational.model_dump(mode="json"))
+        search.run(
+            with_steps(shortened(with_beams(corotational, open_beams(scene), ELEMENTS[2])), _few(trial))
+        )
     except KedfemError as fault:
         said = str(fault).splitlines()[0]
-        search.notes.append(f"frames that follow would be needed, but cannot be taken: {said}")
+        search.notes.append(f"co-rotational frames would be needed, but cannot be taken: {said}")
         return scene, error
-    search.notes.append(f"nominal frames would be off by {100 * min(error, 1.0):.2g} %: frames follow")
-    return following, 0.0
+    search.notes.append(f"rigid-body frames would be off by {100 * min(error, 1.0):.2g} %: frames follow")
+    return corotational, 0.0
 
 
 def _few(scene: Scene) -> int:
@@ -149,7 +149,7 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
             now = with_beams(scene, names, choice)
             try:
                 error = worst(relative_errors(search.run(now), reference))
-            except KedfemError:  # too coarse for frames that follow
+            except KedfemError:  # too coarse for co-rotational frames
                 continue
             if error <= allowed:
                 return now, error
@@ -180,7 +180,7 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     steps, patience = max(math.ceil(time_grid(trial).steps / COARSER), least), PATIENCE
     slow: set[str] = set()
     for _ in range(TRIES):
-        found, channels = search.step(with_analysis(with_steps(trial, steps), levels=TRIED))
+        found, channels = search.step(with_analysis(with_steps(trial, steps), extrapolation_levels=TRIED))
         slow = {name for name in channels if _slow(found, name, allowed)}
         choice = cheapest(found, allowed, set(channels) - slow, levels, longest)
         finest = span / choice.h * 2 ** (choice.levels - 1)
@@ -199,7 +199,9 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     if error > allowed:
         names = sorted(left, key=left.__getitem__, reverse=True) or _over(found, allowed)
         search.notes.append(_unresolved(math.ceil(whole / choice.h), error, names))
-    return with_analysis(scene, step=choice.h, steps_per_turn=None, levels=choice.levels), error
+    return with_analysis(
+        scene, step=choice.h, steps_per_revolution=None, extrapolation_levels=choice.levels
+    ), error
 
 
 def _fewest_rows(trial: Scene) -> int:
@@ -210,7 +212,7 @@ def _fewest_rows(trial: Scene) -> int:
 
 def _possible_levels(search: Trials, scene: Scene) -> range:
     """How many levels there may be: those stated, or as many as the memory holds factors of."""
-    stated = scene.analysis.levels
+    stated = scene.analysis.extrapolation_levels
     if stated is not None:
         return range(stated, stated + 1)
     model = search.ready(shortened(scene)).model
@@ -232,8 +234,8 @@ def _over(found: StepEstimate, allowed: float) -> list[str]:
 
 def _stated_error(search: Trials, trial: Scene) -> float:
     """The error of a step that the scene states, in the levels that it states."""
-    levels = trial.analysis.levels or 1
-    found, channels = search.step(with_analysis(trial, levels=max(levels, 2)))
+    levels = trial.analysis.extrapolation_levels or 1
+    found, channels = search.step(with_analysis(trial, extrapolation_levels=max(levels, 2)))
     if levels > 1:
         return max((found.errors.get(name, 0.0) for name in channels), default=0.0)
     left = ((found.differences[n][0], found.fast[n]) for n in channels if n in found.differences)
@@ -241,7 +243,11 @@ def _stated_error(search: Trials, trial: Scene) -> float:
 
 
 def _with_levels(scene: Scene) -> str:
-    return "" if scene.analysis.levels else "; analysis.levels = 2 would make it smaller"
+    return (
+        ""
+        if scene.analysis.extrapolation_levels
+        else "; analysis.extrapolation_levels = 2 would make it smaller"
+    )
 
 
 def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
 """What a run's error is, found beside it: the same linkage run again with other steps, other meshes.
 
-Small models are run again as they are; of large links a companion on a few functions is run instead, on which a step
+Small models are run again as they are; of large links a companion on a few modes is run instead, on which a step
 takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
 
 * **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`).
@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from kedfem.accuracy.budget import Budget, Share, by_kind, joined
+from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared
@@ -34,8 +34,10 @@ from kedfem.links.record import Link
 from kedfem.results.recording import recording
 from kedfem.scene import ForceLoad, Scene, time_grid
 
-LARGE = 100_000  # unknowns of a model for which no companion is made: its functions cost as much as hundreds of steps
-FUNCTIONS = 1e-3  # tolerance of the companion's functions: differences of runs need no better ones
+LARGE = (
+    100_000  # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
+)
+FUNCTIONS = 1e-3  # tolerance of the companion's modes: differences of runs need no better ones
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 SLOW = 1000  # the same where no compiled loop runs them
 REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
@@ -154,11 +156,13 @@ def spanned(scene: Scene, model: Model) -> Scene:
     most = SPAN if compiled else SLOW
     if grid.steps <= most:
         return scene
-    return with_analysis(scene, end_time=most * grid.step, turns=None, step=grid.step, steps_per_turn=None)
+    return with_analysis(
+        scene, end_time=most * grid.step, revolutions=None, step=grid.step, steps_per_revolution=None
+    )
 
 
 def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
-    """What nominal frames cost; None where all frames follow."""
+    """What rigid-body frames cost; None where all frames follow."""
     if all(link.fit is not None for link in geometric.model.links):
         return None
     warned = geometric_warning(geometric)
@@ -185,7 +189,9 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
 def _beside(scene: Scene, factor: float, steps: int) -> Scene:
     """The scene in so many steps, by a factor longer."""
     h = factor * time_grid(scene).step
-    return with_analysis(scene, end_time=h * steps, turns=None, step=h, steps_per_turn=None, levels=1)
+    return with_analysis(
+        scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None, extrapolation_levels=1
+    )
 
 
 def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
@@ -281,7 +287,7 @@ def reduction_share(reduction: Reduction | None) -> Share | None:
     """What reduced links cost."""
     if reduction is None or not reduction.estimate:
         return None
-    return Share("reduction", by_kind(reduction.estimate), "richer functions")
+    return Share("reduction", by_kind(reduction.estimate), "richer modes")
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
@@ -298,11 +304,15 @@ def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
     points = [name for name, x in loads if isinstance(x, ForceLoad) and x.link in meshed and x.at is not None]
     if points:
         out.append(f"stress where {', '.join(points)} acts on a point: it grows as elements shrink")
-    stiff = [name for name, joint in scene.joints.items() if _stiff(joint.port) and set(joint.links) & meshed]
+    stiff = [
+        name for name, joint in scene.joints.items() if _stiff(joint.coupling) and set(joint.links) & meshed
+    ]
     if stiff:
-        out.append(f"stress around joints {', '.join(stiff)} with stiff ports: it grows as elements shrink")
+        out.append(
+            f"stress around joints {', '.join(stiff)} with rigid couplings: it grows as elements shrink"
+        )
     return out
 
 
 def _stiff(port: object) -> bool:
-    return port == "stiff" or (isinstance(port, Mapping) and "stiff" in port.values())
+    return port == "rigid" or (isinstance(port, Mapping) and "rigid" in port.values())

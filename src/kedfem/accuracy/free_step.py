@@ -49,7 +49,7 @@ def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, floa
     SolveError
         If no march ends.
     """
-    single = with_analysis(scene, levels=scene.analysis.levels or 1)
+    single = with_analysis(scene, extrapolation_levels=scene.analysis.extrapolation_levels or 1)
     unknowns = max(1, meshed(with_steps(single, FIRST)).model.unknowns)
     most = max(FIRST * 2**PAIRS, min(MOST, int(WORK / unknowns)))
     steps, found, before = FIRST, None, None

@@ -54,7 +54,7 @@ class Slices:
     means : (k, n) mean displacement of each slice
     beyond : (k − 1, n) sum of the nodal forces beyond each cut
     mass : (k − 1, n) the same of M u
-    mended : (k − 1, 4) what `beyond` misses of −M (1 ⊗ p'' + X R''ᵀ) where functions are few
+    mended : (k − 1, 4) what `beyond` misses of −M (1 ⊗ p'' + X R''ᵀ) where modes are few
     ports : (k − 1, p) 1 where a port is beyond a cut
     gaps, lengths : (k − 1,) between the slices' middles; the same, but to the ends of the link [m]
     """
@@ -109,7 +109,7 @@ def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, looked at block by block, over links with nominal frames: others do not err so.
+    """Largest sums over time of a run, looked at block by block, over links with rigid-body frames: others do not err so.
 
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]
@@ -197,19 +197,19 @@ def _remedy(found: GeometricError, error: float) -> str:
     slots = [row.name for row in rows if any(side and side.stations for side in row.sides)]
     if slots:
         names = ", ".join(f"joints.{name}" for name in slots)
-        return f"stiffer links or a slower drive help (frames that follow do not know {names} yet)"
-    following = 'analysis.frames = "following"'
+        return f"stiffer links or a slower drive help (co-rotational frames do not know {names} yet)"
+    corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
-        return f"take {following}, which is right at any deflection"
+        return f"take {corotational}, which is right at any deflection"
     known = found.stiffened or rows  # neither once more, nor with constraint equations
     stiffening = "" if known else "analysis.stiffening = true leaves about a third of it, "
-    return f"{stiffening}{following} is right at any deflection"
+    return f"{stiffening}{corotational} is right at any deflection"
 
 
 def _projected(
     full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]
 ) -> Float[np.ndarray, "c s"]:
-    """Coefficients of functions Q that come nearest to weights of nodes, by the nodes' share in the volume."""
+    """Coefficients of modes Q that come nearest to weights of nodes, by the nodes' share in the volume."""
     share = np.sqrt(np.abs(full.volume))[:, None]
     return np.asarray(np.linalg.lstsq(share * Q, share * chosen.T, rcond=None)[0].T)
 

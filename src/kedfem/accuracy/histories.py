@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.accuracy.budget import kind_of_name
+from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled

@@ -25,16 +25,16 @@ def open_meshes(scene: Scene) -> list[str]:
     ]  # fmt: skip
 
 
-def open_functions(scene: Scene) -> list[str]:
+def open_modes(scene: Scene) -> list[str]:
     """Names of the elastic solid and plane links that do not say whether they are reduced, where a step or a mesh is open
-    too: what is chosen for these makes steps in full dear."""
-    if scene.analysis.solver == "literal" or not (open_step(scene) or open_meshes(scene)):
+    too: what is chosen for these makes unreduced steps dear."""
+    if scene.analysis.solver == "monolithic" or not (open_step(scene) or open_meshes(scene)):
         return []
     return [
         name
         for name, link in scene.links.items()
         if (elastic(link, "solid") or elastic(link, "plane"))
-        and not link.model_fields_set & {"reduced", "functions"}
+        and not link.model_fields_set & {"reduced", "modes"}
     ]
 
 
@@ -77,13 +77,13 @@ def distinct(meshes: list[tuple[float, Scene]]) -> list[tuple[float, Scene]]:
     return [now for now, before in pairs if before is None or now[1].links != before[1].links]
 
 
-def with_functions(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene with links on functions where all its steps, in full, would take longer than to find these."""
+def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
+    """The scene with links on modes where all its unreduced steps would take longer than to find these."""
     ready = search.ready(shortened(scene))
     if not names or ready.linkage.mobility:
         return scene
     unknowns = sum((link.full or link).unknowns for link in ready.model.links)
-    steps = time_grid(scene).steps * (2 ** (scene.analysis.levels or 1) - 1)
+    steps = time_grid(scene).steps * (2 ** (scene.analysis.extrapolation_levels or 1) - 1)
     if unknowns < LARGE or steps * unknowns < DEAR:
         return scene
     search.notes.append(

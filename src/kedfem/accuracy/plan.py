@@ -2,7 +2,7 @@
 
 Everything is found by short trial runs of the scene itself, with reduced links: whether frames must follow from how far
 links bend, beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
-meshes of hexahedra and quadrilaterals from their indicator, segments of links with frames that follow by taking more,
+meshes of hexahedra and quadrilaterals from their indicator, segments of links with co-rotational frames by taking more,
 simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
 """
 
@@ -25,7 +25,7 @@ from kedfem.accuracy.choices import (
     open_step,
     with_beams,
 )
-from kedfem.accuracy.meshes import chosen_meshes, distinct, open_functions, open_meshes, with_functions
+from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_modes
 from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
@@ -41,7 +41,7 @@ from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
-SEGMENTS = 0.2  # of the mesh's share, where links with frames that follow leave their number open
+SEGMENTS = 0.2  # of the mesh's share, where links with co-rotational frames leave their number open
 VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose fidelity is open
 ROUGH = "beam5", 2  # elements of beams where the first step of a motion without a drive is looked for
@@ -111,7 +111,7 @@ def anything_open(scene: Scene) -> bool:
 
 
 def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
-    """Choose fidelities, mesh sizes, functions, frames and step of a scene with `analysis.accuracy`.
+    """Choose fidelities, mesh sizes, modes, frames and step of a scene with `analysis.accuracy`.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)
     left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
-    functions = open_functions(scene)
+    functions = open_modes(scene)
     scene = _opened(scene, left_open)
     shares: list[Share] = []
     stage("plan: frames")
@@ -168,9 +168,9 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
         scene, segments = with_segments(search, scene, SEGMENTS * loose)
     stage("plan: simpler links")
     scene, model = _with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
-    scene = with_functions(search, scene, functions)
-    if "reduction" not in scene.analysis.model_fields_set:
-        scene = with_analysis(scene, reduction=REDUCTION * asked)
+    scene = with_modes(search, scene, functions)
+    if "reduction_tolerance" not in scene.analysis.model_fields_set:
+        scene = with_analysis(scene, reduction_tolerance=REDUCTION * asked)
     scene = with_analysis(scene, accuracy="quick")
     reduced = any(link.reduced for link in scene.links.values())
     mesh += beams + meshes
@@ -178,7 +178,7 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
         Share("time step", step, STEP * asked), Share("mesh", mesh, (MESH - cut) * asked),
         *([Share("segments", segments, SEGMENTS * asked)] if cut else []),
         Share("simpler links", model, max(MODEL, MESH - cut + MODEL - mesh / asked) * asked),
-        Share("reduction", scene.analysis.reduction if reduced else 0.0, REDUCTION * asked),
+        Share("reduction", scene.analysis.reduction_tolerance if reduced else 0.0, REDUCTION * asked),
     ]  # fmt: skip
     plan = Plan(scene, asked, finer, tuple(shares), ())
     return replace(plan, notes=(*search.notes, *_limits(plan)))

@@ -22,7 +22,7 @@ class Prepared:
 
 
 def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
-    """Rigid path and elastic model of a scene with all its links in full; nothing is solved.
+    """Rigid path and elastic model of a scene with all its links unreduced; nothing is solved.
 
     Raises
     ------

@@ -1,12 +1,12 @@
 """Links reduced as far as a tolerance allows, with an estimate of what the reduction costs.
 
 The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
-the full linkage; these are added to the functions, and the run is repeated. What changes, times a factor found on full
+the full linkage; these are added to the modes, and the run is repeated. What changes, times a factor found on full
 runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
-tolerance, the richer functions are kept and the same is done again.
+tolerance, the richer modes are kept and the same is done again.
 
-Of links with frames that follow each segment is reduced, with functions that nominal frames give; the runs that estimate
-the error have frames that follow. Of the residual in their frames only what moments do in turning these is left out.
+Of links with co-rotational frames each segment is reduced, with modes that rigid-body frames give; the runs that estimate
+the error have co-rotational frames. Of the residual in their frames only what moments do in turning these is left out.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -41,11 +41,11 @@ INSTANTS = 16  # where the linkage is looked at before the first run
 MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
 CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
-ADDED = 8  # functions that a round adds to a link, at most
+ADDED = 8  # modes that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
-FIRST = 0.1  # of the tolerance: what the first functions leave out of the training deflections' energy norm
-SEGMENT = 1.0  # the same of segments, whose functions are sorted by what they are needed for
+FIRST = 0.1  # of the tolerance: what the first modes leave out of the training deflections' energy norm
+SEGMENT = 1.0  # the same of segments, whose modes are sorted by what they are needed for
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
 
@@ -71,13 +71,13 @@ def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, 
     ------
     MotionError, MeshError, SceneError
     """
-    chosen = {name: link.functions for name, link in scene.links.items() if link.reduced}
+    chosen = {name: link.modes for name, link in scene.links.items() if link.reduced}
     if not chosen:
         return meshed(scene, stage), None
     counts = {name: count for name, count in chosen.items() if count is not None}
     found = kept(
         "reduction", key(scene),
-        lambda: reduced(meshed(scene, stage), chosen, scene.analysis.reduction, counts, stage),
+        lambda: reduced(meshed(scene, stage), chosen, scene.analysis.reduction_tolerance, counts, stage),
         _packed, lambda stored: _unpacked(stored, scene),
     )  # fmt: skip
     return found.ready, found
@@ -87,7 +87,7 @@ Stored = tuple[Linkage, Path, Model, dict[str, float]]
 
 
 def _packed(reduction: Reduction) -> Stored | None:
-    """A reduction as it is kept between runs; None if links are left in full."""
+    """A reduction as it is kept between runs; None if links are left unreduced."""
     ready, model = reduction.ready, stored_model(reduction.ready.model)
     return None if model is None else (ready.linkage, ready.path, model, reduction.estimate)
 
@@ -95,7 +95,7 @@ def _packed(reduction: Reduction) -> Stored | None:
 def _unpacked(stored: Stored, scene: Scene) -> Reduction:
     joined, along, model, estimate = stored
     return Reduction(
-        Prepared(scene, joined, along, restored_model(model)), estimate, scene.analysis.reduction
+        Prepared(scene, joined, along, restored_model(model)), estimate, scene.analysis.reduction_tolerance
     )
 
 
@@ -105,13 +105,13 @@ def reduced(
 ) -> Reduction:  # fmt: skip
     """Reduce some links of a prepared scene, as far as a tolerance allows.
 
-    Links that are not chosen but large are reduced too while the error is estimated, and left in full at the end.
+    Links that are not chosen but large are reduced too while the error is estimated, and left unreduced at the end.
 
     Parameters
     ----------
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
-    counts : number of functions of links that have it given
+    counts : number of modes of links that have it given
 
     Raises
     ------
@@ -120,10 +120,10 @@ def reduced(
     """
     if full.linkage.mobility:
         raise SceneError(
-            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (functions are found for a "
+            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (modes are found for a "
             f"motion that the drive prescribes), got {full.linkage.mobility} free"
         )
-    stage("functions")
+    stage("modes")
     parts = static_parts(full.model)
     needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
     needed &= reducible(full.model)
@@ -148,12 +148,13 @@ def reduced(
 
 
 def reducible(model: Model) -> set[str]:
-    """Names of the links that can be reduced: not beams with frames that follow, which are elements of few functions."""
+    """Names of the links that can be reduced: not beams with co-rotational frames, which are elements of few
+    functions."""
     return {link.name for link in model.links if link.fit is None or link.meshed}
 
 
 def _count(link: Link, basis: Basis, tolerance: float) -> int:
-    """How many functions serve a tolerance to begin with."""
+    """How many modes serve a tolerance to begin with."""
     return basis.count((FIRST if link.fit is None else SEGMENT) * tolerance)
 
 
@@ -166,7 +167,7 @@ def first_reduced(
 
     Parameters
     ----------
-    known : functions of links that need not be found any more, link by link
+    known : modes of links that need not be found any more, link by link
     """
     links = full.model.links
     if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):
@@ -188,12 +189,12 @@ def _settled(
     full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Functions], tolerance: float,
     chosen: Collection[str], fixed: Collection[str],
 ) -> tuple[Functions, dict[str, float]]:  # fmt: skip
-    """Functions whose estimated error is below the tolerance, or the last ones, and the estimate.
+    """Modes whose estimated error is below the tolerance, or the last ones, and the estimate.
 
     Parameters
     ----------
-    first : functions to begin with, for a share of the tolerance
-    fixed : names of links whose number of functions is given
+    first : modes to begin with, for a share of the tolerance
+    fixed : names of links whose number of modes is given
     """
     moments, Q = _moments(full), first(1.0)
     small, run = _run(full, Q, moments)
@@ -214,7 +215,7 @@ def _settled(
 
 
 def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
-    """The next functions of segments, of which few count, as long as there are any; else those of the richer run."""
+    """The next modes of segments, of which few count, as long as there are any; else those of the richer run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
     segments = (
         [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
@@ -223,7 +224,7 @@ def _closer(model: Model, now: Functions, next_ones: Functions, richer: Function
 
 
 def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:
-    """The model on given functions, and its run."""
+    """The model on given modes, and its run."""
     small = replace(full, model=reduced_model(full.model, Q))
     return small, histories(small, moments)
 

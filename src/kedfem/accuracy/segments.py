@@ -1,4 +1,4 @@
-"""How many segments solid and plane links with frames that follow need for an accuracy, by trial runs."""
+"""How many segments solid and plane links with co-rotational frames need for an accuracy, by trial runs."""
 
 from itertools import pairwise
 
@@ -15,7 +15,7 @@ def open_segments(scene: Scene) -> list[str]:
     """Names of the links whose number of segments the scene leaves open."""
     return [
         name for name, link in scene.links.items()
-        if link.fidelity in {"solid", "plane"} and link.segments is None and link_frames(scene, name) == "following"
+        if link.fidelity in {"solid", "plane"} and link.segments is None and link_frames(scene, name) == "co-rotational"
     ]  # fmt: skip
 
 

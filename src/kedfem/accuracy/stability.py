@@ -1,10 +1,11 @@
-"""Steps that links need as they turn, damped or in frames that follow, so that vibration which no step resolves dies."""
+"""Steps that links need as they turn, damped or in co-rotational frames, so that vibration which no step resolves
+dies."""
 
 import math
 
 import numpy as np
 
-from kedfem.scene import Scene, drive_angle, following, holds_by_rows, rayleigh, time_grid
+from kedfem.scene import Scene, by_constraint_equations, corotational, drive_angle, rayleigh, time_grid
 
 MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration neither grows nor dies (measured)
 
@@ -12,7 +13,7 @@ MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration
 def fewest_steps(scene: Scene) -> float:
     """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
     rho_inf = scene.analysis.rho_inf
-    if rayleigh(scene.damping)[1] == 0.0 and not following(scene) and not _moving(scene):
+    if rayleigh(scene.damping)[1] == 0.0 and not corotational(scene) and not _moving(scene):
         return 0.0
     if rho_inf == 1.0:
         return math.inf
@@ -26,10 +27,12 @@ def fewest_steps(scene: Scene) -> float:
 
 
 def _moving(scene: Scene) -> str | None:
-    """A joint that holds by rows, from whose force vibration comes that grows alike (from twice MARGIN on, measured)."""
+    """A joint enforced by constraint equations, from whose force vibration comes that grows alike (from twice MARGIN on,
+    measured)."""
     drives = scene.driven_joints
     return next(
-        (name for name, joint in scene.joints.items() if holds_by_rows(joint, drives.get(name))), None
+        (name for name, joint in scene.joints.items() if by_constraint_equations(joint, drives.get(name))),
+        None,
     )
 
 
@@ -38,8 +41,8 @@ def stability_warning(scene: Scene) -> tuple[str, ...]:
     fewest, steps = fewest_steps(scene), time_grid(scene).steps
     if steps >= fewest:
         return ()
-    cause = "frames that follow" if following(scene) else "damping in proportion to the stiffness"
-    if not following(scene) and (name := _moving(scene)):
+    cause = "co-rotational frames" if corotational(scene) else "damping in proportion to the stiffness"
+    if not corotational(scene) and (name := _moving(scene)):
         cause = f"joint {name} between links that move"
     what = f"with {cause} vibration that the step cannot resolve grows in links that turn"
     if fewest == math.inf:

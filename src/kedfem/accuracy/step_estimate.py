@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.accuracy.budget import kind_of_name
+from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.histories import Histories, counted
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
@@ -205,12 +205,12 @@ class StepWatch:
         """Of what was looked at so far."""
         analysis = self.ready.scene.analysis
         running, local, h = self.running.total, self.running.relative, time_grid(self.ready.scene).step
-        if (analysis.levels or 1) == 1:
+        if (analysis.extrapolation_levels or 1) == 1:
             errors = {each.channel.name: min(1.0, SINGLE * running) for each in self.recorded}
             return StepEstimate(h, 1, errors, {}, {}, running, local)
         sizes = {name: x for name, x in self.sizes.items() if x.peak}
         return StepEstimate(
-            h, analysis.levels or 1, {name: _error(x) for name, x in sizes.items()},
+            h, analysis.extrapolation_levels or 1, {name: _error(x) for name, x in sizes.items()},
             {name: tuple((x.differences / x.peak).tolist()) for name, x in sizes.items()},
             {name: x.fast for name, x in sizes.items()}, running, local,
         )  # fmt: skip

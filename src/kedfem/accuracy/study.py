@@ -6,7 +6,9 @@ from statistics import median
 from time import perf_counter
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.menu import (
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import reduced
+from kedfem.accuracy.study_variants import (
     FINENESS,
     STEPS,
     Fidelity,
@@ -18,8 +20,6 @@ from kedfem.accuracy.menu import (
     reference_variant,
     varied,
 )  # fmt: skip
-from kedfem.accuracy.prepared import meshed
-from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.cost import estimated_cost
 from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled

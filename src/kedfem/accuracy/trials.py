@@ -28,7 +28,7 @@ Stage = Callable[[str], None]
 
 @dataclass
 class Trials:
-    """What trial runs found, and what they were made of: links by their text, functions of each.
+    """What trial runs found, and what they were made of: links by their text, modes of each.
 
     asked : the accuracy
     """
@@ -94,7 +94,7 @@ class Trials:
         return self.links[key]
 
     def _reduced(self, full: Prepared) -> Prepared:
-        """With the functions of links that an earlier trial had too: the difference is then of the others alone."""
+        """With the modes of links that an earlier trial had too: the difference is then of the others alone."""
         texts = _texts(full)
         known = [self.functions.get(text) for text in texts]
         ready = first_reduced(full, TRIAL * self.asked, known if any(Q is not None for Q in known) else None)
@@ -105,7 +105,7 @@ class Trials:
 
 
 def _texts(full: Prepared) -> list[str]:
-    """All that the functions of each link of a model depend on, or of each segment."""
+    """All that the modes of each link of a model depend on, or of each segment."""
     names = [link.name for link in full.model.links]
     number = [f"{names[:k].count(name)} of {names.count(name)}" for k, name in enumerate(names)]
     return [f"{_text(full.scene, name)} {place}" for name, place in zip(names, number, strict=True)]
@@ -113,5 +113,5 @@ def _texts(full: Prepared) -> list[str]:
 
 def _text(scene: Scene, name: str) -> str:
     """All that a link's mesh and matrices depend on."""
-    text = scene.links[name].model_dump_json(exclude={"reduced", "functions"})
+    text = scene.links[name].model_dump_json(exclude={"reduced", "modes"})
     return f"{name} {name in spatial_beams(scene)} {text}"

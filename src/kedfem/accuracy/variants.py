@@ -1,4 +1,4 @@
-"""Changed copies of a scene: other fidelities, sizes, functions, steps."""
+"""Changed copies of a scene: other fidelities, sizes, modes, steps."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from kedfem.scene import (
 TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
 TURNS = 2  # of a trial run
 Family = Literal["solid", "plane", "beam", "rigid"]
-CHOSEN = {"element", "mesh", "fidelity", "reduced", "functions"}
+CHOSEN = {"element", "mesh", "fidelity", "reduced", "modes"}
 
 
 def with_links(scene: Scene, links: Mapping[str, LinkScene]) -> Scene:
@@ -36,7 +36,7 @@ def with_analysis(scene: Scene, **keys: Any) -> Scene:
 
 def with_steps(scene: Scene, steps: int) -> Scene:
     """The scene in so many equal steps over the same time."""
-    return with_analysis(scene, step=time_grid(scene).end / steps, steps_per_turn=None)
+    return with_analysis(scene, step=time_grid(scene).end / steps, steps_per_revolution=None)
 
 
 def shortened(scene: Scene) -> Scene:
@@ -49,7 +49,7 @@ def shortened(scene: Scene) -> Scene:
     span = min(span, TRIAL_STEPS * grid.step)
     if span >= grid.end * (1 - 1e-9):
         return scene
-    return with_analysis(scene, end_time=span, turns=None, step=grid.step, steps_per_turn=None)
+    return with_analysis(scene, end_time=span, revolutions=None, step=grid.step, steps_per_revolution=None)
 
 
 def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:

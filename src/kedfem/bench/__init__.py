@@ -5,8 +5,8 @@ from pathlib import Path
 
 from kedfem.bench.accuracy import bench_accuracy
 from kedfem.bench.beams import bench_beams
+from kedfem.bench.corotational import bench_corotational
 from kedfem.bench.elements import bench_elements
-from kedfem.bench.following import bench_following
 from kedfem.bench.growth import bench_growth
 from kedfem.bench.kinematics import bench_kinematics
 from kedfem.bench.levels import bench_levels
@@ -27,7 +27,7 @@ BENCHMARKS: dict[str, Callable[[Path, bool, Watch], str]] = {
     "ports": bench_ports,
     "start": bench_start,
     "elements": bench_elements,
-    "following": bench_following,
+    "corotational": bench_corotational,
     "beams": bench_beams,
     "levels": bench_levels,
     "suite": bench_suite,

@@ -64,7 +64,7 @@ def reference(scene: Scene, plan: Plan) -> Scene:
         for name, link in scene.links.items() if link.fidelity == "auto"
     }  # fmt: skip
     fine = with_steps(with_links(scene, links), SHORTER * time_grid(plan.scene).steps)
-    return with_analysis(fine, accuracy="quick", reduction=TOLERANCE)
+    return with_analysis(fine, accuracy="quick", reduction_tolerance=TOLERANCE)
 
 
 def _planned_run(scene: Scene) -> tuple[Plan, Histories, tuple[float, float, float]]:

@@ -1,4 +1,4 @@
-"""Planar beams of several numbers of nodes: the four-bar from rest, linear and with frames that follow."""
+"""Planar beams of several numbers of nodes: the four-bar from rest, linear and with co-rotational frames."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ def bench_beams(folder: Path, quick: bool, watch: Watch) -> str:
     meshes, steps = (QUICK, BY_STEP[1:3]) if quick else (MESHES, BY_STEP)
     total = 2 * (len(meshes) + 1) + len(steps) + 1
     finest = {}
-    for number, frames in enumerate(("nominal", "following")):
+    for number, frames in enumerate(("rigid-body", "co-rotational")):
         watch("beams", number, total)
         finest[frames] = _run(*FINEST, frames, STEPS)[0]
     rows: list[Sequence[str]] = []
@@ -35,7 +35,7 @@ def bench_beams(folder: Path, quick: bool, watch: Watch) -> str:
         errors = [_percent(found[frames][0], finest[frames]) for frames in finest]
         times = [f"{1e6 * found[frames][1]:.1f}" for frames in finest]
         rows.append((f"beam{nodes}", str(elements), str(3 * (elements * (nodes - 1) + 1)), *errors, *times))
-    header = ("element", "elements a link", "unknowns a link", "error, nominal frames", "error, following",
+    header = ("element", "elements a link", "unknowns a link", "error, rigid-body frames", "error, following",
               "step, nominal [µs]", "step, following [µs]")  # fmt: skip
     after = [*_by_step(steps, watch, total), "", *_NOTE]
     text = markdown("Beams of many nodes", "kedfem bench beams", header, rows, "\n".join(after))
@@ -45,11 +45,11 @@ def bench_beams(folder: Path, quick: bool, watch: Watch) -> str:
 
 def _by_step(steps: Sequence[int], watch: Watch, total: int) -> list[str]:
     watch("beams", total - len(steps) - 1, total)
-    reference = _run(*FINEST, "following", 2 * max(steps))[0]
+    reference = _run(*FINEST, "co-rotational", 2 * max(steps))[0]
     rows = []
     for number, count in enumerate(steps):
         watch("beams", total - len(steps) + number, total)
-        rows.append((f"{count:,}", _percent(_run(*FINEST, "following", count)[0], reference)))
+        rows.append((f"{count:,}", _percent(_run(*FINEST, "co-rotational", count)[0], reference)))
     return table(("steps a turn", "error, following"), rows)
 
 
@@ -65,7 +65,7 @@ def _scene(nodes: int, elements: int, frames: str, steps: int) -> Scene:
         name: {**link, "element": f"beam{nodes}", "mesh": {"elements": elements}}
         for name, link in raw["links"].items()
     }
-    analysis = {"turns": TURNS, "steps_per_turn": steps, "initial": "rest", "frames": frames}
+    analysis = {"revolutions": TURNS, "steps_per_revolution": steps, "initial": "rest", "frames": frames}
     return scene_from({**raw, "links": links, "analysis": analysis})
 
 

@@ -108,7 +108,7 @@ def cost(scene: Scene) -> tuple[float, Steps]:
 
 
 def _motion_at(ready: Prepared) -> Motion:
-    """Nominal motion at given times."""
+    """Rigid-body motion at given times."""
     return lambda t: rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
 
 

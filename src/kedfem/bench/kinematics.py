@@ -105,7 +105,7 @@ def _scene(joints: dict[str, tuple[Any, ...]]) -> Scene:
             for name, (kind, one, other, at, keys) in joints.items()
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1.0}},
-        "analysis": {"turns": 1},
+        "analysis": {"revolutions": 1},
     })  # fmt: skip
 
 

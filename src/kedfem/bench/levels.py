@@ -22,7 +22,7 @@ from kedfem.scene import scene_from
 TURN = 0.1  # s
 SHOWN = {"stress": "probes/stress/stress", "torque": "drive/torque"}
 MARCHES = ((500, 1), (1000, 1), (2000, 1), (4000, 1), (250, 2), (500, 2), (1000, 2), (250, 3), (500, 3))
-BEAMS, PLATES = {"fidelity": "beam", "mesh": {"elements": 1}}, {"reduced": True, "functions": 8}
+BEAMS, PLATES = {"fidelity": "beam", "mesh": {"elements": 1}}, {"reduced": True, "modes": 8}
 HEADER = ("levels, steps a turn", "stress", "estimated", "torque", "estimated", "seconds", "order 2 needs")
 
 
@@ -40,9 +40,9 @@ class Case:
 STILL, REST = {"initial": "quasi-static"}, {"initial": "rest"}
 CASES = (
     Case("Equation (20), quasi-static start", BEAMS, analysis=STILL),
-    Case("Co-rotational, quasi-static start", BEAMS, analysis=STILL | {"frames": "following"}),
+    Case("Co-rotational, quasi-static start", BEAMS, analysis=STILL | {"frames": "co-rotational"}),
     Case("Plates of solids, reduced, quasi-static start", PLATES, analysis=STILL),
-    Case("Co-rotational, from rest: a jump", BEAMS, analysis=REST | {"frames": "following"}),
+    Case("Co-rotational, from rest: a jump", BEAMS, analysis=REST | {"frames": "co-rotational"}),
     Case("Equation (20), from rest, undamped", BEAMS, False, 4000, REST),
 )
 
@@ -102,7 +102,12 @@ def _ready(case: Case, steps: int, levels: int) -> Prepared:
     raw["points"]["B"]["angle"] = 0 if case.link is BEAMS else "60 deg"
     if case.damped:
         raw["damping"] = DAMPED
-    raw["analysis"] = {"end_time": 2 * TURN, "step": TURN / steps, "levels": levels, **(case.analysis or {})}
+    raw["analysis"] = {
+        "end_time": 2 * TURN,
+        "step": TURN / steps,
+        "extrapolation_levels": levels,
+        **(case.analysis or {}),
+    }
     raw["output"] = {"probes": {"stress": {"link": "rocker", "at": "M", "quantity": "stress"}}}
     return prepared(scene_from(raw))[0]
 

@@ -30,13 +30,13 @@ def four_bar_with(functions: int) -> tuple[Prepared, Prepared]:
     }
     scene = scene_from({**raw, "output": {"probes": probes}})
     full = meshed(scene)
-    return full, with_functions(full, functions)
+    return full, with_modes(full, functions)
 
 
-def with_functions(full: Prepared, functions: int) -> Prepared:
+def with_modes(full: Prepared, functions: int) -> Prepared:
     """All links with so many of kedfem's functions."""
     counts = {link.name: functions for link in full.model.links}
-    return reduced(full, list(counts), full.scene.analysis.reduction, counts).ready
+    return reduced(full, list(counts), full.scene.analysis.reduction_tolerance, counts).ready
 
 
 def loop_time(ready: Prepared, repeats: int = 9) -> float:

@@ -18,14 +18,18 @@ def plates(accuracy: float) -> Scene:
     }
     raw = four_bar_of(shape, {})
     raw["drive"]["motion"]["speed"] = "150 rpm"
-    return _asking(raw, accuracy, {"turns": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"})
+    return _asking(
+        raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"}
+    )
 
 
 def bars(accuracy: float) -> Scene:
     """The same of bars, from a quasi-static start at 300 rpm."""
     raw = four_bar_of({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {})
     raw["drive"]["motion"]["speed"] = "300 rpm"
-    return _asking(raw, accuracy, {"turns": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"})
+    return _asking(
+        raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"}
+    )
 
 
 def slider_crank(accuracy: float) -> Scene:
@@ -53,7 +57,7 @@ def slider_crank(accuracy: float) -> Scene:
         "damping": {"ratio": 0.02, "frequencies": [300, 2000]},
     }  # fmt: skip
     on = {"stress": ("rod", "M", "stress"), "middle": ("rod", "N", "displacement")}
-    return _asking(raw, accuracy, {"turns": 0.5, "initial": "quasi-static"}, on)
+    return _asking(raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, on)
 
 
 def arm(accuracy: float) -> Scene:
@@ -109,6 +113,6 @@ def _asking(raw: dict[str, Any], accuracy: float, analysis: dict[str, Any], on: 
             for name, (link, at, quantity) in probes.items()
         }
     }
-    raw["analysis"] = {**analysis, "accuracy": accuracy, "frames": "nominal"}  # as the reference has them
+    raw["analysis"] = {**analysis, "accuracy": accuracy, "frames": "rigid-body"}  # as the reference has them
     raw.setdefault("damping", {"ratio": 0.02, "frequencies": [20, 200]})
     return scene_from(raw)

@@ -1,6 +1,6 @@
 """Parts to compare elements by: deflection and stress under a load, free frequencies, without any singularity.
 
-A force spread over one seat is balanced by the mean reactions of the other, as a joint's forces are.
+A force spread over one coupling surface is balanced by the mean reactions of the other, as a joint's forces are.
 """
 
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix
 from kedfem.links.build import link_axes
+from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import point_rows, von_mises
-from kedfem.links.seats import Seat, joint_seat
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.hexahedra import linear, quadratic, serendipity
@@ -40,8 +40,8 @@ class BenchPart:
     """A part, how it is loaded and which meshes it gets.
 
     name : in tables
-    shape : from one seat, that reacts, to the other, that is loaded
-    ends : the seats of an extrusion [m]; of others where the shape says
+    shape : from one coupling surface, that reacts, to the other, that is loaded
+    ends : the coupling surfaces of an extrusion [m]; of others where the shape says
     force : (3,) its direction
     stressed : (3,) where the stress is read [m]
     near : of the order of the first free frequency [Hz]
@@ -115,8 +115,9 @@ def _moved(mesh: SolidMesh, part: float, counts: Size) -> SolidMesh:
 
 
 def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]]:
-    """Mean deflection of the loaded seat under a unit force, along it, as seen from the other; and the link's state."""
-    fixed, moved = (joint_seat(link, "seat", np.asarray(end), None) for end in ends(part))
+    """Mean deflection of the loaded coupling surface under a unit force, along it, as seen from the other; and the link's
+    state."""
+    fixed, moved = (joint_seat(link, "coupling surface", np.asarray(end), None) for end in ends(part))
     force = np.outer(moved.fit[0], np.asarray(part.force) / np.linalg.norm(part.force))
     modes = _rigid_modes(link, fixed.origin)
     u = _free_solution(link, modes, force + _reaction(fixed, modes, force))
@@ -125,7 +126,7 @@ def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]
 
 
 def ends(part: BenchPart) -> tuple[tuple[float, float, float], ...]:
-    """The seats, the loaded one last."""
+    """The coupling surfaces, the loaded one last."""
     return part.ends if isinstance(part.shape, Extrusion) else part.shape.between
 
 
@@ -135,15 +136,15 @@ def _rigid_modes(link: Link, origin: Float[np.ndarray, "3"]) -> Float[np.ndarray
     return np.stack([*(np.tile(axis, (link.n, 1)) for axis in np.eye(3)), *turns], axis=2)
 
 
-def _fits(seat: Seat, modes: Float[np.ndarray, "n 3 6"]) -> Float[np.ndarray, "12 6"]:
-    """Value and gradient at a seat of the rigid modes."""
+def _fits(seat: CouplingSurface, modes: Float[np.ndarray, "n 3 6"]) -> Float[np.ndarray, "12 6"]:
+    """Value and gradient at a coupling surface of the rigid modes."""
     return np.asarray(np.einsum("cn,nik->cik", seat.fit, modes).reshape(-1, RIGID))
 
 
 def _reaction(
-    seat: Seat, modes: Float[np.ndarray, "n 3 6"], force: Float[np.ndarray, "n 3"]
+    seat: CouplingSurface, modes: Float[np.ndarray, "n 3 6"], force: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 3"]:
-    """The forces in a seat's mean value and gradient that balance a load."""
+    """The forces in a coupling surface's mean value and gradient that balance a load."""
     resultant = np.einsum("ni,nik->k", force, modes)
     amounts = np.linalg.lstsq(_fits(seat, modes).T, -resultant, rcond=None)[0]
     return np.asarray(seat.fit.T @ amounts.reshape(-1, 3))

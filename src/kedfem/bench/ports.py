@@ -1,4 +1,5 @@
-"""What stiff ports change: a plate link with two bores on three meshes, averaged against stiff; how stiff is enough."""
+"""What rigid couplings change: a plate link with two bores on three meshes, averaged against stiff; how stiff is
+enough."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,10 @@ from kedfem.bench.parts import PARTS, BenchPart, Size, ends, frequencies, loaded
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix
+from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient, von_mises
-from kedfem.links.seats import Seat, joint_seat
-from kedfem.links.stiff import STIFF, radius, surface_gram, with_stiff_seat
+from kedfem.links.rigid_coupling import STIFF, radius, surface_gram, with_stiff_seat
 
 PLATE = next(part for part in PARTS if part.name == "plate with bores")
 LOADS = {"pull": (1.0, 0.0, 0.0), "bend": (0.0, 1.0, 0.0)}
@@ -59,7 +60,7 @@ def bench_ports(folder: Path, quick: bool, watch: Watch) -> str:
         *(f"{load}: peak stress [MPa]" for load in LOADS),
     )  # fmt: skip
     text = markdown(
-        "Averaged and stiff ports", "kedfem bench ports --folder docs", header, rows, _after(sizes[-1])
+        "Averaged and rigid couplings", "kedfem bench ports --folder docs", header, rows, _after(sizes[-1])
     )
     write_page(folder, "ports", text)
     return text
@@ -71,8 +72,8 @@ def _stiffened(link: Link, times: float) -> Link:
     return link
 
 
-def _bores(link: Link) -> list[Seat]:
-    return [joint_seat(link, "seat", np.asarray(end), None) for end in ends(PLATE)]
+def _bores(link: Link) -> list[CouplingSurface]:
+    return [joint_seat(link, "coupling surface", np.asarray(end), None) for end in ends(PLATE)]
 
 
 def _found(link: Link) -> _Found:
@@ -94,7 +95,7 @@ def _peak_stress(link: Link, u: Float[np.ndarray, "n 3"]) -> float:
     return float(von_mises(stress_of_gradient(H[near], link)).max())
 
 
-def _out_of_round(link: Link, seat: Seat, u: Float[np.ndarray, "n 3"]) -> float:
+def _out_of_round(link: Link, seat: CouplingSurface, u: Float[np.ndarray, "n 3"]) -> float:
     """Root mean square, over a bore, of what no rigid motion of it is."""
     nodes, G = surface_gram(link, seat.facets)  # type: ignore[arg-type]
     r = link.X[nodes] - seat.origin
@@ -134,30 +135,33 @@ def _after(size: Size) -> str:
     words = [
         "A joint holds a bore by its *port*. An `averaged` one (the default) takes the bore's mean displacement and",
         "turn and spreads the joint's force over it evenly, so that the bore may become an ellipse: a pin with play,",
-        'or a soft bush. A `stiff` one (`port = "stiff"`, or `port = { rod = "stiff" }` for one link) keeps the bore\'s',
+        'or a soft bush. A rigid one (`coupling = "rigid"`, or `coupling = { rod = "rigid" }` for one link) '
+        'keeps the bore\'s',
         "shape, as a pressed-in pin does. Real pins lie between the two: they push on one side only.",
         "",
         "The plate is of steel, 100 mm between bores of 15 mm, 30 mm wide, 5 mm thick, of hex20; a mesh is named by its",
         f"elements across and through. {FORCE:g} N on one bore, along the plate or across it, are balanced by the mean",
         "reactions of the other; the deflection is that of the loaded bore, along the force, as seen from the other. The",
         "frequency is that of the free plate, the peak stress the highest equivalent one of nodes within",
-        f"{NEAR:g} radii of the loaded bore. Each cell: averaged, stiff, and the change. A stiff port makes a link",
+        f"{NEAR:g} radii of the loaded bore. Each cell: averaged, stiff, and the change. A rigid coupling makes a link",
         "shorter by a part of its bore; in this short plate that is much, and the longer a link is, the less. Stress",
         "beside a bore always depends on its port.",
         "",
         "## How stiff",
         "",
         "What of a bore's displacement is no rigid motion costs energy, κ = `STIFF` · E / radius",
-        "([theory.md](theory.md#stiff-ports)). By `STIFF`: how far the pulled bore is out of round, as a part of what an",
+        "([theory.md](theory.md#rigid-couplings)). By `STIFF`: how far the pulled bore is out of round, as "
+        "a part of what an",
         f"averaged one is; how far its deflection is above that with {TRIED[-1]:.0e}; and how many times worse than with",
-        f"averaged ports the matrix of a step of {STEP:g} s is conditioned.",
+        f"distributing couplings the matrix of a step of {STEP:g} s is conditioned.",
         "",
         *table(("STIFF", "out of round", "deflection", "condition"), rows),
         "",
         "The condition number is that of the few nodes that the others are tied to; the rounding of results grows with",
         "STIFF alone. It shows first where a mechanism is soft and nothing loads it, as plates that lie side by side are",
         "out of their plane. In the source's four-bar of plates two orientations of one scene differ by 3e-10 of the",
-        "largest displacement with averaged ports, 8e-7 with STIFF = 1e3 and 5e-6 with 1e4 at 24 steps a turn, by",
+        "largest displacement with distributing couplings, 8e-7 with STIFF = 1e3 and 5e-6 with 1e4 at 24 "
+        "steps a turn, by",
         "6e-11, 1e-8 and 2e-7 at 240.",
     ]  # fmt: skip
     return "\n".join(words)

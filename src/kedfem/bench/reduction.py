@@ -1,4 +1,4 @@
-"""Reduced links: which functions, how good the estimate of their error is, what a step and their preparation cost."""
+"""Reduced links: which modes, how good the estimate of their error is, what a step and their preparation cost."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ ERRORS = ("stress at the probe", "whole stress field", "joint forces")
 
 def bench_reduction(folder: Path, quick: bool, watch: Watch) -> str:
     """Four measurements; tables and plots go to the folder."""
-    watch("reduction: functions", 0, 4)
+    watch("reduction: modes", 0, 4)
     ways = _ways(folder, COUNTS[2:4] if quick else COUNTS)
     watch("reduction: estimate", 1, 4)
     scenes = dict(list(varied_scenes().items())[15 : 16 if quick else None]) if quick else varied_scenes()
@@ -71,7 +71,7 @@ def _errors(run: _Run, truth: _Run) -> tuple[float, float, float]:
 
 
 def _ways(folder: Path, counts: Sequence[int]) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
-    """Header and rows: errors of three ways to choose functions, against their number."""
+    """Header and rows: errors of three ways to choose modes, against their number."""
     full, _ = loop.four_bar_with(counts[0])
     moments = [30 * k for k in range(1, MOMENTS + 1)]
     truth = _run(full, moments)
@@ -79,14 +79,14 @@ def _ways(folder: Path, counts: Sequence[int]) -> tuple[Sequence[str], Sequence[
     textbook = {way: interface_bases(full.model, parts, way == WAYS[1]) for way in WAYS[1:]}
     errors: dict[str, list[tuple[float, float, float]]] = {way: [] for way in WAYS}
     for count in counts:
-        errors[WAYS[0]].append(_errors(_run(loop.with_functions(full, count), moments), truth))
+        errors[WAYS[0]].append(_errors(_run(loop.with_modes(full, count), moments), truth))
         for way, bases in textbook.items():
             model: Model = reduced_model(full.model, [basis.first(count) for basis in bases])
             errors[way].append(_errors(_run(replace(full, model=model), moments), truth))
     for k, name in enumerate(("reduction", "reduction_field")):
         curves = {way: (counts, [each[k] for each in found]) for way, found in errors.items()}
-        write_loglog(folder, name, curves, ("functions per link", f"relative error, {ERRORS[k]}"))
-    header = ("functions per link", *(f"{what}: {way}" for what in ERRORS for way in WAYS))
+        write_loglog(folder, name, curves, ("modes per link", f"relative error, {ERRORS[k]}"))
+    header = ("modes per link", *(f"{what}: {way}" for what in ERRORS for way in WAYS))
     rows = [
         (str(count), *(f"{100 * errors[way][row][k]:.2g} %" for k in range(3) for way in WAYS))
         for row, count in enumerate(counts)
@@ -96,7 +96,7 @@ def _ways(folder: Path, counts: Sequence[int]) -> tuple[Sequence[str], Sequence[
 
 def _ways_note() -> str:
     return (
-        "The four-bar of examples/four_bar_solids over a turn, against the same links in full. kedfem: static "
+        "The four-bar of examples/four_bar_solids over a turn, against the same links unreduced. kedfem: static "
         "deflections of the linkage at 16 instants and the modes of the frozen linkage that they excite. Fixed "
         "interface: constraint modes and eight normal modes with the ports held. Free interface: answers to port forces "
         "and eight free normal modes. Both with answers to the twelve inertia loads, each of unit strain energy: such a "
@@ -125,7 +125,7 @@ def _estimates(scenes: dict[str, dict[str, object]], tolerances: Sequence[float]
     header = ["scene"]
     for tolerance in tolerances:
         header += [
-            f"{100 * tolerance:g} % asked for: functions, at most",
+            f"{100 * tolerance:g} % asked for: modes, at most",
             "true error",
             "estimate / true",
             "single channels",
@@ -147,7 +147,7 @@ def _loop(folder: Path, counts: Sequence[int]) -> str:
     rows, fast, limits, made = [], [], [], []
     speed = loop.machine_speed()
     for count in counts:
-        small = loop.with_functions(full, count)
+        small = loop.with_modes(full, count)
         memory, arithmetic = loop.least_time(small, *speed)
         made.append(max(link.n for link in small.model.links))
         fast.append(loop.loop_time(small))
@@ -155,8 +155,8 @@ def _loop(folder: Path, counts: Sequence[int]) -> str:
         rows.append((str(made[-1]), f"{1e6 * fast[-1]:.1f}", f"{1e6 * memory:.1f}", f"{1e6 * arithmetic:.1f}",
                      f"{fast[-1] / limits[-1]:.1f}", f"{loop.recorded_rate(small):,.0f}"))  # fmt: skip
     curves = {"step": (made, fast), "limit": (made, limits)}
-    write_loglog(folder, "reduction_loop", curves, ("functions per link", "seconds per step"))
-    header = ("functions per link", "a step [µs]", "matrices from memory [µs]",
+    write_loglog(folder, "reduction_loop", curves, ("modes per link", "seconds per step"))
+    header = ("modes per link", "a step [µs]", "matrices from memory [µs]",
               "flops at BLAS speed [µs]", "step / limit", "steps a second, recorded")  # fmt: skip
     said = (
         "Three links. The limit is the greater of reading G, Y, S, W once from main memory and their flops at the speed "

@@ -10,7 +10,10 @@ LENGTHS = {"crank": ("A", "B"), "coupler": ("B", "C"), "rocker": ("C", "D")}
 
 
 def bar_four_bar(
-    elements: tuple[int, int, int], solver: str = "condensed", steps_per_turn: int = 720, turns: float = 1.0
+    elements: tuple[int, int, int],
+    solver: str = "condensed",
+    steps_per_revolution: int = 720,
+    revolutions: float = 1.0,
 ) -> Scene:
     """[KED]'s four-bar (Nath and Ghosh 1980) with bars of 27-node hexahedra, 600 rpm.
 
@@ -20,7 +23,11 @@ def bar_four_bar(
     """
     bar = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
     raw = four_bar_of(bar, {"element": "hex27", "mesh": {"elements": list(elements)}})
-    raw["analysis"] = {"turns": turns, "steps_per_turn": steps_per_turn, "solver": solver}
+    raw["analysis"] = {
+        "revolutions": revolutions,
+        "steps_per_revolution": steps_per_revolution,
+        "solver": solver,
+    }
     return scene_from(raw)
 
 
@@ -29,12 +36,12 @@ def ten_turns(folder: str) -> Scene:
     raw = plate_four_bar("solid", 2, 0.0254).model_dump(mode="json", exclude_unset=True)
     for link in raw["links"].values():
         link |= {"reduced": True, "element": "hex20"}
-    raw["analysis"] |= {"turns": 10, "steps_per_turn": 1000, "reduction": 0.01}
+    raw["analysis"] |= {"revolutions": 10, "steps_per_revolution": 1000, "reduction_tolerance": 0.01}
     raw["output"] |= {"folder": folder, "animation": False, "plots": False, "picture": False}
     return scene_from(raw)
 
 
-def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn: int = 360) -> Scene:
+def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_revolution: int = 360) -> Scene:
     """The same with bores in eyes of 45 mm, quasi-static at 150 rpm; stress at the rocker, displacement of the coupler.
 
     Parameters
@@ -53,7 +60,11 @@ def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_turn:
     raw = four_bar_of(plate, {"fidelity": fidelity, "element": element, "mesh": {"elements_across": across}})
     raw["drive"]["motion"]["speed"] = "150 rpm"
     raw["damping"] = {"ratio": 0.02, "frequencies": [20, 200]}
-    raw["analysis"] = {"turns": 1, "steps_per_turn": steps_per_turn, "initial": "quasi-static"}
+    raw["analysis"] = {
+        "revolutions": 1,
+        "steps_per_revolution": steps_per_revolution,
+        "initial": "quasi-static",
+    }
     raw["output"] = {
         "probes": {
             "stress": {"link": "rocker", "at": "M", "quantity": "stress"},
@@ -94,7 +105,7 @@ def four_bar_of(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
 
 
 EYE = {"eye_diameter": 0.045, "bore_diameter": 0.02, "width": 0.0254, "thickness": 0.0254}
-TURN = {"turns": 1, "steps_per_turn": 720, "initial": "quasi-static"}
+TURN = {"revolutions": 1, "steps_per_revolution": 720, "initial": "quasi-static"}
 DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
 
 

@@ -25,7 +25,7 @@ from kedfem.scene import time_grid
 
 SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100
-STEPS_PER_TURN = 720
+STEPS_PER_REVOLUTION = 720
 
 Step = Callable[[Sequence[LinkState], Sequence[Nominal]], list[LinkState]]
 
@@ -48,7 +48,7 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     for number, size in enumerate(sizes):
         watch("steps", number, len(sizes))
         fast = _stepped(size, "condensed", CONDENSED_STEPS)
-        slow = _stepped(size, "literal", LITERAL_STEPS)
+        slow = _stepped(size, "monolithic", LITERAL_STEPS)
         unknowns.append(fast.unknowns)
         condensed_times.append(fast.step)
         literal_times.append(slow.step)
@@ -59,7 +59,7 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
     header = ("unknowns", "literal [ms/step]", "condensed [ms/step]", "ratio", "of it triangular solves",
               "factorisations in the run", "difference of u after 5 steps")  # fmt: skip
     note = "Four-bar of three bars of 27-node hexahedra, both solvers in one run.\n\n![steps](steps.png)"
-    text = markdown("Condensed step against literal step", "kedfem bench steps", header, rows, note)
+    text = markdown("Condensed step against monolithic step", "kedfem bench steps", header, rows, note)
     write_page(folder, "steps", text)
     curves = {
         "literal (assemble, sparse LU)": (unknowns, literal_times),
@@ -71,12 +71,12 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
 
 def _stepped(size: tuple[int, int, int], solver: str, steps: int) -> "_Measured":
     """Take some steps of a scene and measure them."""
-    scene = bar_four_bar(size, solver, turns=steps / STEPS_PER_TURN)
+    scene = bar_four_bar(size, solver, revolutions=steps / STEPS_PER_REVOLUTION)
     joined = linkage(scene)
     along = path(joined, *drive_range(scene))
     model = elastic_model(scene, joined)
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    kind = LiteralSteps if solver == "literal" else CondensedSteps
+    kind = LiteralSteps if solver == "monolithic" else CondensedSteps
     taken = kind(model.links, model.joints, scheme, model.damping)
     watch = _Stopwatch(taken)
     run = snapshots(scene, joined, along, model, taken)

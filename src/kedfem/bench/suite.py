@@ -16,7 +16,7 @@ from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 
 REPEATS = 3
-STAGES = ("motion", "mesh and matrices", "functions", "factor", "steps")
+STAGES = ("motion", "mesh and matrices", "modes", "factor", "steps")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +41,11 @@ def bench_suite(folder: Path, quick: bool, watch: Watch) -> str:
         for kind, keys in (("full", raw), ("reduced", with_reduced_links(raw))):
             watch("suite", 2 * number + (kind == "reduced"), 2 * len(cases))
             found.append((f"{name}, {kind}", _measured(scene_from(keys), 1 if quick else REPEATS)))
-    header = ("scene", "unknowns", "motion [s]", "mesh, matrices [s]", "functions [s]", "factor [s]", "steps [s]",
+    header = ("scene", "unknowns", "motion [s]", "mesh, matrices [s]", "modes [s]", "factor [s]", "steps [s]",
               "a step [µs]", "whole [s]", "estimated error")  # fmt: skip
     note = (
         "One turn of 720 steps with recording, quasi-static start; no files, nothing kept from earlier runs. Medians of "
-        "3 runs. Solids of the usual mesh; functions: static factors, training, trial runs and the error's estimate, "
+        "3 runs. Solids of the usual mesh; modes: static factors, training, trial runs and the error's estimate, "
         "asked for: 0.1 %.\n\n![suite](suite.png)"
     )
     text = markdown(
@@ -75,7 +75,7 @@ def _once(scene: Scene) -> tuple[dict[str, float], int, Reduction | None]:
     ready, reduction = meshed(scene, clock.stage), None
     chosen = [name for name, link in scene.links.items() if link.reduced]
     if chosen:
-        reduction = reduced(ready, chosen, scene.analysis.reduction, stage=clock.stage)
+        reduction = reduced(ready, chosen, scene.analysis.reduction_tolerance, stage=clock.stage)
         ready = reduction.ready
     solver: Steps = clock.timed("factor", lambda: steps_of(scene, ready.model))
 
@@ -86,7 +86,7 @@ def _once(scene: Scene) -> tuple[dict[str, float], int, Reduction | None]:
 
     clock.timed("steps", stepped)
     spent = dict(clock.seconds)
-    spent["functions"] = spent.get("functions", 0.0) + spent.pop("error of the reduction", 0.0)
+    spent["modes"] = spent.get("modes", 0.0) + spent.pop("error of the reduction", 0.0)
     return spent, ready.model.unknowns, reduction
 
 

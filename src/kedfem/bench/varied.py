@@ -24,7 +24,7 @@ def varied_scenes() -> dict[str, dict[str, Any]]:
         "bars, load put on at once": _four_bar(
             60, loads={"hit": _force("rocker", "M", [300, 0, 0], STEP_LOAD)}
         ),
-        "bars, two turns": _four_bar(300, turns=2),
+        "bars, two turns": _four_bar(300, revolutions=2),
         "bars, no flywheel, damped": _four_bar(300, damping=DAMPED, bodies={}),
         "bars, 6 mm thick": _four_bar(100, BAR | {"thickness": 0.006}, damping=DAMPED),
         "plates, 150 rpm, from rest": _four_bar(150, PLATE),
@@ -51,14 +51,14 @@ def _force(link: str, at: str, vector: list[float], factor: Any = None) -> dict[
 
 
 def _four_bar(
-    rpm: float, shape: dict[str, Any] | None = None, turns: float = 0.5, **changed: Any
+    rpm: float, shape: dict[str, Any] | None = None, revolutions: float = 0.5, **changed: Any
 ) -> dict[str, Any]:
     """Half a turn in 360 steps; keys of the analysis and of the scene may be changed."""
     shape = shape or BAR
     raw = four_bar_of(shape, {"mesh": {"elements": [12, 2, 1]}} if shape["kind"] == "bar" else {})
     raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
     raw["output"] = {"probes": {"stress": _probe("rocker", "M", "stress"), "middle": _probe("coupler", "N")}}
-    return _changed(raw, {"turns": turns, "steps_per_turn": 720}, changed)
+    return _changed(raw, {"revolutions": revolutions, "steps_per_revolution": 720}, changed)
 
 
 def _arm(

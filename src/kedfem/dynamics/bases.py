@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.reduction import Basis, energy_sorted, excited, port_functions
-from kedfem.dynamics.segment_functions import segment_basis
+from kedfem.dynamics.segment_modes import segment_basis
 from kedfem.dynamics.start import Instant
 from kedfem.dynamics.state import NodalOf
 from kedfem.dynamics.substructure import Substructure
@@ -16,7 +16,8 @@ def bases(
 ) -> list[Basis | None]:  # fmt: skip
     """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
 
-    Segments with frames that follow are among them: what they do is looked at in nominal frames, all segments coupled.
+    Segments with co-rotational frames are among them: what they do is looked at in rigid-body frames, all segments
+    coupled.
 
     Parameters
     ----------

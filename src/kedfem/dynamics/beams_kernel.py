@@ -5,14 +5,14 @@ At a point, with x' the derivative of the position by arc length as drawn, where
     ε = |x'| − 1,   γ = θ − ψ,   κ = ψ'
 
 exactly what `dynamics.frames` finds with a frame at each point, see `links.segments.beam_segments`. World components:
-ψ and θ count from the nominal motion, so that x' = R t + u' with t the tangent as drawn.
+ψ and θ count from the rigid-body motion, so that x' = R t + u' with t the tangent as drawn.
 
     segment, body : (b,) number of each, and of its rotation
     at, stride : (b,) where its coordinates begin, and the number of one component
     rows (b, 3, E, S) : x' from u, ψ and ψ' from ψ, at the E points
     tangent (b, 2, E) : t
     rigidity (b, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
-    strain (3, b, 3, E) and rates, direction (b, 2, E) of the tangents in the nominal frame, turn (b, E) : state
+    strain (3, b, 3, E) and rates, direction (b, 2, E) of the tangents in the rigid-body frame, turn (b, E) : state
 
 One call does all segments: a call costs as much as a short beam.
 """
@@ -26,7 +26,8 @@ SMALL_TURN = 0.05  # tan of half the angle: up to here the series is exact to ro
 
 @compiled
 def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[no-untyped-def]
-    """What stays for a step: R t, and where tangents would point had they turned as the nominal motion; damped strains.
+    """What stays for a step: R t, and where tangents would point had they turned as the rigid-body motion; damped
+    strains.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The condensed step: one constant factorisation per link, joints solved on a dozen unknowns.
 
-With geometric stiffening what K_σ δ is at the end of a step goes to the right-hand side, and sweeps make it right.
+With geometric stiffening what K_σ δ is at the end of a step goes to the right-hand side, and iterations make it right.
 """
 
 from collections.abc import Sequence
@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
 from kedfem.dynamics.interface import RowState, Tie
-from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import Rotation, add_port_forces, port_rotation
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
@@ -69,7 +69,8 @@ class CondensedSteps:
     def tied_step(
         self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
     ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-        """The same where joints hold by rows; also the interface unknowns and the rows' forces."""
+        """The same where joints are enforced by constraint equations; also the interface unknowns and the rows'
+        forces."""
         rhs = [self._rhs(s, nominal) for s, nominal in zip(states, at, strict=True)]
         g, forces, z, m = tied(self.parts, [nominal.R for nominal in at], rhs, tie)
         return (
@@ -82,7 +83,7 @@ class CondensedSteps:
         self, states: Sequence[LinkState], at: Sequence[Nominal], rhs: Sequence[Nodal],
         turnings: Sequence[Turning],
     ) -> list[LinkState]:  # fmt: skip
-        """The same with K_σ δ in the internal force; each sweep is one more pair of triangular solves per link."""
+        """The same with K_σ δ in the internal force; each iteration is one more pair of triangular solves per link."""
         first = [predicted(s, self.scheme.h) @ nominal.R for s, nominal in zip(states, at, strict=True)]
         share = 1 - self.scheme.alpha_f
         full, g, forces = swept(self.parts, [now.R for now in at], rhs, first, turnings, share)

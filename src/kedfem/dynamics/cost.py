@@ -11,12 +11,12 @@ from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.levels import level_steps
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.transient import Steps
-from kedfem.mesh.room import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
+from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
 FACTOR_FLOPS, SOLVE_BYTES = 1.0e4, 45.0  # times N^1.5
-SWEEPS = 4.0  # times the work of a step with nominal frames, where frames follow
+SWEEPS = 4.0  # times the work of a step with rigid-body frames, where frames follow
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
@@ -42,7 +42,7 @@ class Cost:
 
 def estimated_cost(scene: Scene, model: Model) -> Cost:
     """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
-    N, fill, levels = _unknowns(model), _fill(model), scene.analysis.levels or 1
+    N, fill, levels = _unknowns(model), _fill(model), scene.analysis.extrapolation_levels or 1
     bandwidth, rate = _machine()
     small = bool((N <= SMALL).all())
     step = (LOOP if small else OVERHEAD) + float(
@@ -119,7 +119,7 @@ def tried_cost(scene: Scene, model: Model, run: Callable[[Scene, list[Steps]], N
 def _begun(scene: Scene, steps: int) -> Scene:
     """The first steps of a scene's analysis."""
     h = time_grid(scene).step
-    changed = {"end_time": steps * h, "turns": None, "step": h, "steps_per_turn": None}
+    changed = {"end_time": steps * h, "revolutions": None, "step": h, "steps_per_revolution": None}
     return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=changed)})
 
 

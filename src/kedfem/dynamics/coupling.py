@@ -1,7 +1,7 @@
 """Joints as shared port points: W u = B z with constant scalar weights W and a constant selection B.
 
 Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once. Joints whose directions
-vary in time have port points of each link's own, and hold by rows over these (`row_joints`).
+vary in time have port points of each link's own, and is enforced by constraint equations over these (`row_joints`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,9 +11,8 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Bool, Float, Int
 
-from kedfem.dynamics.places import part_seat, slider_axis
-from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import (
+from kedfem.dynamics.constraint_joints import ConstraintJoint, needs_rows
+from kedfem.dynamics.constraint_ports import (
     Own,
     Ways,
     can_be_bars,
@@ -22,14 +21,17 @@ from kedfem.dynamics.row_ports import (
     rigid_points,
     row_joint,
 )
+from kedfem.dynamics.places import part_seat, slider_axis
 from kedfem.errors import MeshError
+from kedfem.links.coupling_surfaces import CouplingSurface, holds, is_flat, port_weights
 from kedfem.links.record import Link
-from kedfem.links.seats import Seat, holds, is_flat, port_weights
+from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import joint_axis
-from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
 
-DEPENDENT = 1e-9  # relative: ports of one seat repeat each other to rounding, others differ by far more
+DEPENDENT = (
+    1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,10 +119,10 @@ class _Ports:
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """All joints of a scene: what each link has of them, and those that hold by rows."""
+    """All joints of a scene: what each link has of them, and those enforced by constraint equations."""
 
     attachments: dict[str, Attachment]
-    rows: tuple[RowJoint, ...]
+    rows: tuple[ConstraintJoint, ...]
 
 
 def joined(
@@ -144,7 +146,7 @@ def joined(
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
-    rows: list[tuple[RowJoint, list[Own | None]]] = []
+    rows: list[tuple[ConstraintJoint, list[Own | None]]] = []
     columns: list[list[int]] = []  # of each side's own unknowns
     held_by_rows = [row_joint(scene, name, links, ways) for name in scene.joints if needs_rows(scene, name)]
     geared = [gear_joint(scene, name, links, ways) for name in scene.gears]
@@ -196,7 +198,8 @@ def joined(
 def _own_columns(
     ports: dict[str, _Ports], name: str, own: Own | None, first_of: dict[str, int], unknowns: int
 ) -> list[int]:
-    """The unknowns of one side of a joint that holds by rows: all components of its ports; a slider's own travel."""
+    """The unknowns of one side of a joint enforced by constraint equations: all components of its ports; a slider's own
+    travel."""
     if own is None:
         return []
     if own.slider:
@@ -208,12 +211,12 @@ def _own_columns(
 
 
 def _on(
-    rows: Sequence[tuple[RowJoint, list[Own | None]]], columns: Sequence[list[int]], Z: np.ndarray
-) -> Iterator[RowJoint]:
+    rows: Sequence[tuple[ConstraintJoint, list[Own | None]]], columns: Sequence[list[int]], Z: np.ndarray
+) -> Iterator[ConstraintJoint]:
     """Joints with rows on the interface unknowns, as these turned out."""
     of_side = iter(columns)
 
-    def on(row: RowJoint, own: Iterator[Own | None]) -> RowJoint:
+    def on(row: ConstraintJoint, own: Iterator[Own | None]) -> ConstraintJoint:
         sides = [
             None if side is None or each is None
             else replace(side, onto=(each.selection @ Z[here]).reshape(*side.onto.shape[:2], -1))
@@ -227,7 +230,7 @@ def _on(
         yield on(row, iter(own))
 
 
-def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first: int) -> int:
+def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:
     """A hinge between a planar link and one in space: the pin of the latter stays upright; two new unknowns."""
     joint = scene.joints[name]
     if joint.kind not in {"revolute", "spherical"}:
@@ -248,7 +251,7 @@ def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, Seat]], first:
 def independent(
     every: Sequence[Attachment], own: Sequence[int] = (), riding: Sequence[int] = ()
 ) -> tuple[list[Attachment], Float[np.ndarray, "k r"]]:
-    """Joints on one seat repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
+    """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
 
     With all rows W = L W_r of the independent ones W_r, (B − L B_r) z = 0. An orthonormal basis Z of these z makes
     B_r Z the new B. L is scalar, so it commutes with the link's rotation.
@@ -343,17 +346,17 @@ def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarra
 
 
 def port_points(
-    scene: Scene, name: str, joint: Joint, seats: dict[str, Seat], links: dict[str, Link]
+    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface], links: dict[str, Link]
 ) -> Float[np.ndarray, "p 3"]:
     """Points of a joint that its links share: 1 spherical, 2 revolute; in a plane 1 for both.
 
-    Where turning is held too, points off these in all directions that the seats know: were a bore held along one
-    direction only, its eye would be soft or stiff as that happens to lie.
+    Where turning is held too, points off these in all directions that the coupling surfaces know: were a bore held along
+    one direction only, its eye would be soft or stiff as that happens to lie.
 
     Raises
     ------
     MeshError
-        If a flat seat cannot hold a point outside its plane.
+        If a flat coupling surface cannot hold a point outside its plane.
     """
     at = np.asarray(joint.at)
     if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
@@ -384,7 +387,7 @@ def port_points(
 
 
 def _unheld(link: Link, kind: str) -> str:
-    """What to do about a seat that does not hold a joint's points."""
+    """What to do about a coupling surface that does not hold a joint's points."""
     if link.kind == "spatial_beam":
         return (
             f"must sit at an end or a corner of beam '{link.name}', or need its section only, got a joint that "
@@ -401,8 +404,11 @@ def _unheld(link: Link, kind: str) -> str:
     )
 
 
-def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat]) -> Float[np.ndarray, "p 3"]:
-    """The joint's point and, where turning is held, others: along a slide, else along the narrowest seat, and across."""
+def _plane_points(
+    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface]
+) -> Float[np.ndarray, "p 3"]:
+    """The joint's point and, where turning is held, others: along a slide, else along the narrowest coupling surface, and
+    across."""
     at = np.asarray(joint.at)
     if joint.kind == "revolute" and name not in scene.driven_joints:
         return at[None, :]
@@ -418,19 +424,22 @@ def _plane_points(scene: Scene, name: str, joint: Joint, seats: dict[str, Seat])
 
 
 def _points_off(
-    centre: Float[np.ndarray, "3"], seats: dict[str, Seat], directions: list[Float[np.ndarray, "3"]]
+    centre: Float[np.ndarray, "3"],
+    seats: dict[str, CouplingSurface],
+    directions: list[Float[np.ndarray, "3"]],
 ) -> list[Float[np.ndarray, "3"]]:
-    """A point off the centre in each direction that all seats know, as far as the first seat is wide there."""
+    """A point off the centre in each direction that all coupling surfaces know, as far as the first coupling surface is
+    wide there."""
     known = [d for d in directions if all(holds(seat, d) for seat in seats.values())]
     first = next(iter(seats.values()))
     return [centre + 2 * _spread_along(first, d) * d for d in known]
 
 
-def _spread_along(seat: Seat, axis: Float[np.ndarray, "3"]) -> float:
+def _spread_along(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> float:
     return float(np.linalg.norm((seat.directions @ axis) * seat.spread))
 
 
-def _widest_across(seat: Seat, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+def _widest_across(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     candidates = [np.asarray(d - (d @ axis) * axis) for d in seat.directions]
     widest = max(candidates, key=lambda d: _spread_along(seat, d))
     return widest / np.linalg.norm(widest) if np.linalg.norm(widest) > 1e-9 else perpendiculars(axis)[0]

@@ -9,10 +9,10 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.interface import RowState
-from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Rayleigh
@@ -109,7 +109,7 @@ class DenseSteps:
         ----------
         state : of `begin` or of the block before; it is used up
         forcing : per link over the block
-        rows : of joints that hold by rows, over the block
+        rows : of joints enforced by constraint equations, over the block
 
         Returns
         -------

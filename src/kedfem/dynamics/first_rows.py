@@ -1,4 +1,5 @@
-"""Joints that hold by rows at the first time point: C z = 0 differentiated, C z' = −C' z, C z'' = −2 C' z' − C'' z."""
+"""Joints enforced by constraint equations at the first time point: C z = 0 differentiated, C z' = −C' z, C z'' = −2 C' z'
+− C'' z."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.interface import RowState, Tie
-from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import port_rotation, port_values
 from kedfem.dynamics.state import LinkState, NodalOf
 

@@ -1,6 +1,7 @@
-"""Frames that follow a segment: its mean rotation, its deformation seen from there, and the force that belongs to it.
+"""Co-rotational frames of a segment: its mean rotation, its deformation seen from there, and the force that belongs to
+it.
 
-With y the segment's position in the link's nominal frame, c the weights of the frame and K0 its stiffness,
+With y the segment's position in the link's rigid-body frame, c the weights of the frame and K0 its stiffness,
 
     Σ y_a ⊗ c_a = Q U,  Q a rotation, U symmetric          g = Qᵀ y − X          strain energy ½ gᵀ K0 g
 
@@ -22,7 +23,7 @@ NUDGE = 1e-5  # of a link's size: what it moves by to tell the rate of its defor
 
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
-    """The frames of a link: several, one, or none where it keeps the nominal frame."""
+    """The frames of a link: several, one, or none where it keeps the rigid-body frame."""
     if link.frames or link.fit is None:
         return link.frames
     return (Frame(link.fit, link.K0),)
@@ -109,7 +110,7 @@ def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Fo
 
     Parameters
     ----------
-    y, y1 : (n, d) position in the nominal frame, of a planar beam (x, y, ψ), and its rate; at rest if not given
+    y, y1 : (n, d) position in the rigid-body frame, of a planar beam (x, y, ψ), and its rate; at rest if not given
     """
     Q, angle = rotation(link, frame.fit, y, 0.0)
     g = deformation(link, y, Q, angle)
@@ -124,7 +125,7 @@ def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Fo
 
 
 def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:
-    """Internal force of a frame in the nominal frame: (∂g/∂y)ᵀ K0 (g + β g'), and its strain energy."""
+    """Internal force of a frame in the rigid-body frame: (∂g/∂y)ᵀ K0 (g + β g'), and its strain energy."""
     Kg = _times(frame.K0, now.g)
     energy = 0.5 * float(np.vdot(now.g, Kg))
     f = Kg + beta * _times(frame.K0, now.g1) if beta else Kg

@@ -17,7 +17,7 @@ def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work
     rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
     before, now : g (3, L, N) seen from the frame, and its rates, at the beginning and at the end of the step
     Q, angle : (L, 3, 3) and (L,) of the frame in the nominal one; at the beginning an earlier one
-    work : y (D, n) becomes its shape in the nominal frame
+    work : y (D, n) becomes its shape in the rigid-body frame
     """
     n0, n1, n2, h1, h0, beta = rates
     X, one = shapes
@@ -48,7 +48,7 @@ def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    work : y (D, n) the shape in the nominal frame; turned (D, n) K of what is strained
+    work : y (D, n) the shape in the rigid-body frame; turned (D, n) K of what is strained
     """
     y, turned, _, _, U, change = work
     d, n = (2 if kind == PLANE else len(turned)), turned.shape[1]

@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes of a linkage frozen at positions of its nominal motion.
+"""Natural frequencies and mode shapes of a linkage frozen at positions of its rigid-body motion.
 
     (K + κ c cᵀ) x = ω² M x,   joints closed: W x = Rᵀ B z,  C z = 0
 

@@ -1,4 +1,4 @@
-"""Links as rigid bodies: masses, their moments, and loads, in the drawn position; what acts on each over time.
+"""Links as rigid bodies: masses, their moments, and loads, in the reference position; what acts on each over time.
 
 All that a rigid body does to the balance of forces is in ∫ρ dV, ∫ρ X dV and ∫ρ X ⊗ X dV; all that a load does in Σ f and
 Σ X ⊗ f, whatever the link is made of.
@@ -16,9 +16,9 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.places import slider_axis
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.scene import (
     ROTARY,
     Body,

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.joint_rows import JointRows
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.scheme import Scheme
 from kedfem.errors import SolveError
 

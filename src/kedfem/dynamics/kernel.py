@@ -8,7 +8,8 @@ N = D·S coordinates (component first), P ports, Q = D·P port components; k int
     matrices : G (L, N, N), Yt (L, Q, N), S (L, Q, Q), W (L, Q, N), B (L, Q, k)
     columns, count : (L, k), (L,) which interface unknowns a link knows, and how many
     forcing : R (T, L, D, D), F (T, L, D, S)
-    ties : C (T, r, k), 1/κ (r,), (1 − α_f) c (r,) and Newmark's rate (3) of joints that hold by rows, e = C z
+    ties : C (T, r, k), 1/κ (r,), (1 − α_f) c (r,) and Newmark's rate (3) of joints enforced by constraint equations, e =
+    C z
     state : u, v, a, F, f (L, D, S), R (L, D, D), port forces (L, Q), C (3, L, D, S), rows' forces on z (k,), e (3, r)
     history : u, v, a, g (T, L, D, S), port forces (T, L, Q), strain energy (T, L); K0 g (T, L, D, S), or none
 
@@ -18,7 +19,7 @@ Imported when it is first needed: numba takes a while to load. Plain loops, so t
 import numpy as np
 
 from kedfem.compiled import compiled
-from kedfem.dynamics.mixing_kernel import definite_solved, partly_factored
+from kedfem.dynamics.anderson_kernel import definite_solved, partly_factored
 
 
 @compiled

@@ -32,7 +32,7 @@ from kedfem.dynamics.segment import position
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.transient import Steps, block_length, started, steps_of, transient
 from kedfem.errors import SolveError
-from kedfem.mesh.room import memory
+from kedfem.mesh.memory_forecast import memory
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
@@ -58,13 +58,13 @@ def level_scenes(scene: Scene) -> list[Scene]:
     """The scene with its own step, half of it, and so on, as many as it has levels."""
     grid, analysis = time_grid(scene), scene.analysis
     out = [scene]
-    for k in range(1, analysis.levels or 1):
+    for k in range(1, analysis.extrapolation_levels or 1):
         keys = {
             "step": grid.step / 2**k,
             "end_time": grid.end,
-            "turns": None,
-            "steps_per_turn": None,
-            "levels": 1,
+            "revolutions": None,
+            "steps_per_revolution": None,
+            "extrapolation_levels": 1,
         }
         out.append(scene.model_copy(update={"analysis": analysis.model_copy(update=keys)}))
     return out
@@ -93,11 +93,12 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
             f"links: must have factors that fit in this machine's memory of {memory() / 1e9:.3g} GB, got "
             f"{model.unknowns:,} unknowns in all, whose factors take about {need / 1e9:.3g} GB; take larger elements"
         )
-    levels, fit = scene.analysis.levels or 1, most_levels(model)
+    levels, fit = scene.analysis.extrapolation_levels or 1, most_levels(model)
     if levels > max(fit, 1):
         most = "1" if fit == 1 else f"at most {fit}"
         raise SolveError(
-            f"analysis.levels: must be {most} with {model.unknowns:,} unknowns: each level has matrices of its own, "
+            f"analysis.extrapolation_levels: must be {most} with {model.unknowns:,} unknowns: each level "
+            "has matrices of its own, "
             f"and {levels} sets of them do not fit in {memory() / 1e9:.3g} GB of memory, got {levels}"
         )
     return [steps_of(each, model) for each in level_scenes(scene)]

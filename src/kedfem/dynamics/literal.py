@@ -1,4 +1,5 @@
-"""The literal step: assemble T K0 Tᵀ, share nodes, factor, at every step. Oracle for tests, baseline for the benchmark.
+"""The monolithic step: assemble T K0 Tᵀ, share nodes, factor, at every step. Oracle for tests, baseline for the
+benchmark.
 
 It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the condensed step.
 """
@@ -12,10 +13,10 @@ import scipy.sparse.linalg
 from jaxtyping import Float
 
 from kedfem.dynamics.condensed import end_forces
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
 from kedfem.dynamics.interface import RowState, Tie
-from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.ports import Rotation, port_columns, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
@@ -151,7 +152,8 @@ class LiteralSteps:
     def tied_step(
         self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
     ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-        """The same where joints hold by rows, which border the system; see `CondensedSteps.tied_step`."""
+        """The same where joints are enforced by constraint equations, which border the system; see
+        `CondensedSteps.tied_step`."""
         A = self._matrices(at)
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]
         system = sp.csc_array(self.T.T @ sp.csr_array(sp.block_diag(A)) @ self.T)
@@ -206,7 +208,7 @@ class LiteralSteps:
     def _port_forces(
         self, k: int, A: sp.csr_array, u: Nodal, rhs: Nodal, R: Rotation
     ) -> Float[np.ndarray, " q"]:
-        """λ from what is left over at the dependent components: A u − r = Wᵀ λ; turned into the link frame."""
+        """λ from the residual at the dependent components: A u − r = Wᵀ λ; turned into the link frame."""
         s = self.dependent[k]
         if not len(s):
             return np.zeros(0)

@@ -13,10 +13,8 @@ from jaxtyping import Float
 
 from kedfem.dynamics.places import on_part, seat_of
 from kedfem.errors import MeshError, SceneError
-from kedfem.links.record import Link, as_rows
-from kedfem.links.recovery import point_rows
-from kedfem.links.seats import (
-    Seat,
+from kedfem.links.coupling_surfaces import (
+    CouplingSurface,
     face_normals,
     face_seat,
     is_flat,
@@ -25,6 +23,8 @@ from kedfem.links.seats import (
     seat_couples,
     surface_weights,
 )
+from kedfem.links.record import Link, as_rows
+from kedfem.links.recovery import point_rows
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,
@@ -236,7 +236,9 @@ def _point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"
     return rows.value
 
 
-def _face(where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]) -> dict[str, Seat]:
+def _face(
+    where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]
+) -> dict[str, CouplingSurface]:
     """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
     at = np.asarray(load.at)
     for link in parts.values():

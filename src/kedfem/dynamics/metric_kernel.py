@@ -73,7 +73,7 @@ def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, 
 
 @compiled
 def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
-    """Strains of element e at the position y (3, S) in the nominal frame; x', g, d and rotations of its nodes."""
+    """Strains of element e at the position y (3, S) in the rigid-body frame; x', g, d and rotations of its nodes."""
     tangents, gradients, node, drawn = elements.tangents, elements.gradients, elements.node, elements.drawn
     directors, N, D, bend, pairs = elements.directors, elements.N, elements.D, elements.bend, elements.pairs
     E, M, K, P = elements.sizes[e]

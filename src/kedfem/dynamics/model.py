@@ -7,21 +7,28 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_joints import ConstraintJoint, needs_rows
+from kedfem.dynamics.constraint_ports import Ways
 from kedfem.dynamics.coupling import Attachment, SharedCut, joined
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
 from kedfem.dynamics.places import on_part, part_seat, slider_axis, slider_guide
-from kedfem.dynamics.row_joints import RowJoint, needs_rows
-from kedfem.dynamics.row_ports import Ways
+from kedfem.dynamics.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.slots import slot_ways
 from kedfem.dynamics.state import Rayleigh
-from kedfem.dynamics.stiff_ports import with_stiff_ports
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
+from kedfem.links.coupling_surfaces import (
+    CouplingSurface,
+    holds,
+    is_flat,
+    joint_seat,
+    port_weights,
+    rigid_seat,
+)
 from kedfem.links.record import Link
 from kedfem.links.recovery import PointRows, point_rows
 from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, rigid_functions, wave_frequency
-from kedfem.links.seats import Seat, holds, is_flat, joint_seat, port_weights, rigid_seat
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, joint_axis, unit
@@ -42,7 +49,9 @@ from kedfem.scene.capabilities import SLIDERS
 T = TypeVar("T")
 
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-RESOLVED = 30.0  # ω h of rigid links whose frames follow: they deform by (turn in a step / 30)²; from 100 on sweeps fail
+# ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
+# fail
+RESOLVED = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +77,7 @@ class Slider:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class PrescribedBody:
     """A rigid link that the drive turns on the ground: its motion is the nominal one, it has no unknowns.
 
     link : its record, with attached bodies
@@ -90,7 +99,7 @@ class Model:
     bodies : number of each link in the linkage
     joints, loads : per link
     carried : rigid links that move with the drive
-    rows : joints that hold by rows
+    rows : joints enforced by constraint equations
     cuts : where segments of a link meet, by `link_keys`
     """
 
@@ -100,8 +109,8 @@ class Model:
     loads: tuple[tuple[Pattern, ...], ...]
     sliders: tuple[Slider, ...]
     damping: Rayleigh
-    carried: tuple[Carried, ...] = ()
-    rows: tuple[RowJoint, ...] = ()
+    carried: tuple[PrescribedBody, ...] = ()
+    rows: tuple[ConstraintJoint, ...] = ()
     cuts: tuple[SharedCut, ...] = ()
 
     @property
@@ -132,7 +141,7 @@ def elastic_model(
     Raises
     ------
     MeshError
-        If a link cannot be meshed, or a joint or body finds no seat on its link.
+        If a link cannot be meshed, or a joint or body finds no coupling surface on its link.
     SceneError
         If a load or body does not fit its link.
     """
@@ -148,7 +157,7 @@ def elastic_model(
             on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     carried = tuple(
-        Carried(rigid(links.pop(name)), linkage.bodies.index(name), hub, ())
+        PrescribedBody(rigid(links.pop(name)), linkage.bodies.index(name), hub, ())
         for name in list(cut) if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
@@ -185,7 +194,7 @@ def elastic_model(
 def _made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
     """The same with rigid links made so: stiff beside the elastic ones, whatever they are made of themselves.
 
-    Those whose frames follow are no stiffer than what bends them less by far in a step than the step's own error.
+    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error.
 
     Parameters
     ----------
@@ -280,7 +289,7 @@ def link_keys(model: Model) -> list[str]:
 
 
 def segments(model: Model) -> dict[str, list[Link]]:
-    """The segments of each link by its name; of a link with nominal frame itself."""
+    """The segments of each link by its name; of a link with rigid-body frame itself."""
     out: dict[str, list[Link]] = {}
     for link in model.links:
         out.setdefault(link.name, []).append(link)
@@ -386,7 +395,9 @@ def _on_axis(link: Link, where: str, point: PointRows, at: Float[np.ndarray, "3"
     return point.value
 
 
-def _carrying(link: Link, seat: Seat, where: str, body: Body, axis: Float[np.ndarray, "3"] | None) -> Link:
+def _carrying(
+    link: Link, seat: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None
+) -> Link:
     at = np.asarray(body.at)
     match body:
         case Flywheel(mass=mass, inertia=inertia):

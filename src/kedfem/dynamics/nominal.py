@@ -1,14 +1,14 @@
-"""The nominal motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
+"""The rigid-body motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.interface import static_tie
-from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.start import Instant

@@ -1,4 +1,4 @@
-"""Where joints are on links: their seats, on links and on segments of links."""
+"""Where joints are on links: their coupling surfaces, on links and on segments of links."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeVar
@@ -6,10 +6,10 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.row_joints import bore_axis
+from kedfem.dynamics.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
+from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link
-from kedfem.links.seats import Seat, joint_seat
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import GROUND, Scene
 
@@ -30,8 +30,8 @@ def slider_guide(scene: Scene, name: str) -> str:
     return next((key for key in on if GROUND in scene.joints[key].links), on[0] if on else "")
 
 
-def seat_of(scene: Scene, name: str, link: Link) -> Seat:
-    """The seat of a joint on a link."""
+def seat_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
+    """The coupling surface of a joint on a link."""
     joint = scene.joints[name]
     axis = bore_axis(joint, link.name)
     return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
@@ -61,7 +61,7 @@ def on_part(
     raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
 
 
-def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, Seat]:
+def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, CouplingSurface]:
     """The segment of a link on which a joint sits, and the seat."""
     at = np.asarray(scene.joints[joint].at)
     return on_part(links, name, at, lambda link: seat_of(scene, joint, link))

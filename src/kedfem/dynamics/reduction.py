@@ -1,4 +1,4 @@
-"""Functions for reduced links: what the loads of this scene excite, and no more.
+"""Modes for reduced links: what the loads of this scene excite, and no more.
 
 At some instants of the motion the linkage stands still in thought. Its static deflection under P − M R0'' there, and the
 vibration modes that this deflection excites (Lanczos steps K⁻¹ M on the whole linkage, drive held), are what its links do
@@ -27,16 +27,16 @@ from kedfem.links.reduced import (
 )
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
-INDEPENDENT = 1e-14  # of the largest energy: functions below repeat others
+INDEPENDENT = 1e-14  # of the largest energy: modes below repeat others
 REPEATED = 1e-9  # of a deflection: what is left of it beside those before is rounding
 
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Functions of one link, most important first.
+    """Modes of one link, most important first.
 
-    needed : (n, k) what every basis must hold: 1, position, one function per port
-    functions : (n, f) orthonormal in strain energy to those and to each other
+    needed : (n, k) what every basis must hold: 1, position, one mode per port
+    modes : (n, f) orthonormal in strain energy to those and to each other
     weights : (f,) share of the training deflections' strain-energy norm that each carries [-]
     """
 
@@ -45,12 +45,12 @@ class Basis:
     weights: Float[np.ndarray, " f"]
 
     def first(self, count: int) -> Float[np.ndarray, "n s"]:
-        """The needed functions and as many others as make up the count."""
+        """The needed modes and as many others as make up the count."""
         more = max(0, count - self.needed.shape[1])
         return np.concatenate([self.needed, self.functions[:, :more]], axis=1)
 
     def count(self, tolerance: float) -> int:
-        """How many functions leave out no more than a part of the strain-energy norm."""
+        """How many modes leave out no more than a part of the strain-energy norm."""
         left = np.sqrt(np.cumsum((self.weights**2)[::-1])[::-1])
         return int(self.needed.shape[1] + np.count_nonzero(left > tolerance))
 
@@ -148,12 +148,12 @@ def energy_sorted(
 def enriched(
     link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: int
 ) -> Float[np.ndarray, "n s"]:
-    """The functions of a reduced link and those components of deflections that have most strain energy beside them.
+    """The modes of a reduced link and those components of deflections that have most strain energy beside them.
 
     Parameters
     ----------
     deflections : of the link that it was made from
-    most : functions to add
+    most : modes to add
     """
     full, Q = link.full or link, on_functions(link)
     H = energy_product(full)
@@ -182,7 +182,7 @@ def port_functions(link: Link, joint: Attachment, part: Substructure) -> Float[n
 def orthonormal(
     S: Float[np.ndarray, "n k"], H: sp.csr_array, least: float
 ) -> tuple[Float[np.ndarray, "n f"], Float[np.ndarray, " f"]]:
-    """Principal functions of S in the product H, and their weights; those below `least` of the first's energy go."""
+    """Principal modes of S in the product H, and their weights; those below `least` of the first's energy go."""
     G = S.T @ np.asarray(H @ S)
     values, vectors = np.linalg.eigh((G + G.T) / 2)
     values, vectors = values[::-1], vectors[:, ::-1]

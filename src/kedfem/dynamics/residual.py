@@ -1,13 +1,13 @@
-"""What a reduced model leaves over in the full equation, and the deflection that would answer it."""
+"""The residual of a reduced model in the full equation, and the deflection that would answer it."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.interface import static_tie
-from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.ports import add_port_forces

@@ -9,18 +9,18 @@ from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation
 from kedfem.dynamics.state import Nodal
 from kedfem.links.record import Link
 
-CONVERGED = 1e-7  # change of a sweep, of the largest that a step has made
+CONVERGED = 1e-7  # change of a iteration, of the largest that a step has made
 FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
 
 def position(link: Link, u: Float[np.ndarray, "... n d"]) -> Float[np.ndarray, "... n d"]:
-    """Position of a segment displaced by u, both in the nominal frame; of a planar beam (x, y, ψ)."""
+    """Position of a segment displaced by u, both in the rigid-body frame; of a planar beam (x, y, ψ)."""
     X = link.X[:, : link.d]
     return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
 
 
 def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
-    """Mean orientation of a segment displaced by u, link to world; R where it keeps the nominal frame."""
+    """Mean orientation of a segment displaced by u, link to world; R where it keeps the rigid-body frame."""
     if link.fit is None:
         return R
     return np.asarray(R @ rotation(link, link.fit, position(link, u @ R), 0.0)[0])
@@ -38,7 +38,7 @@ def internal_force(
 
     Parameters
     ----------
-    y : (n, d) position in the nominal frame R
+    y : (n, d) position in the rigid-body frame R
     damped : α M δ and its rates there
     """
     if link.fit is None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from kedfem.dynamics.joint_rows import seen_from
-from kedfem.dynamics.row_joints import ordered
+from kedfem.dynamics.constraint_joints import ordered
+from kedfem.dynamics.constraint_matrices import seen_from
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion

@@ -16,14 +16,14 @@ from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
 from kedfem.dynamics.substructure import Substructure, coupled, factored, mass_substructure
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
+from kedfem.motion.constraints import cross
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.rows import cross
 from kedfem.scene import Scene
 
 TURNING_SWEEPS = 20
 KRYLOV = 50  # vectors
-CONVERGED = 1e-9  # change of a sweep, of the deflection
+CONVERGED = 1e-9  # change of a iteration, of the deflection
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,8 @@ def initial_states(
     ----------
     at : orientation and P − M R0'' of each link now
     deflected : joints closed
-    rows : of joints that hold by rows; rates are made to keep these closed, C z' = −C' z, accelerations too
-    """
+    rows : of joints enforced by constraint equations; rates are made to keep these closed, C z' = −C' z, accelerations
+    too"""
     parts = [mass_substructure(link, joint) for link, joint in zip(links, joints, strict=True)]
     tie = None
     if rows is not None:
@@ -119,10 +119,11 @@ def _with_rates(
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and spin = [α]× + [ω]×².
+    """What a quasi-static deflection needs at one time, per link: R and F = P − M R0'', and angular_velocity = [α]× +
+    [ω]×².
 
     turnings : g → k g P of the links' stress stiffness, if it counts
-    tie : of joints that hold by rows
+    tie : of joints enforced by constraint equations
     """
 
     at: Sequence[Nominal]
@@ -153,7 +154,7 @@ def quasi_static(
 
 
 def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Instant) -> list[NodalOf]:
-    """Static deflection, then sweeps with the inertia that it has as it turns."""
+    """Static deflection, then iterations with the inertia that it has as it turns."""
     R = [now.R for now in instant.at]
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]

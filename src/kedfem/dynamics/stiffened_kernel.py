@@ -1,12 +1,13 @@
 """The compiled inner loop with geometric stiffening; see `kernel`, whose parts and arrays it shares.
 
-limits : h; the remainder of the sweeps, of the displacement; the most sweeps
+limits : h; the remainder of the iterations, of the displacement; the most iterations
 stressed : factors s (T, L, m); stress stiffness k (L, m, S, S); P (L, D, D)
 """
 
 import numpy as np
 
 from kedfem.compiled import compiled
+from kedfem.dynamics.anderson_kernel import definite_solved
 from kedfem.dynamics.kernel import (
     add_transposed,
     end_of_step,
@@ -15,15 +16,14 @@ from kedfem.dynamics.kernel import (
     times,
     turned_ports,
 )
-from kedfem.dynamics.mixing_kernel import definite_solved
 
 
 @compiled
 def advance_stiffened(coefficients, limits, matrices, columns, count, forcing, stressed, state, history):  # type: ignore[no-untyped-def]
     """Take T generalised-α steps of all links in place with f = K δ + C δ' + K_σ δ.
 
-    What k g P is at the end of the step goes to the right-hand side and is found by sweeps; from where they do not settle
-    the history is nan.
+    What k g P is at the end of the step goes to the right-hand side and is found by iterations; from where they do not
+    settle the history is nan.
     """
     S, W, B = matrices[2:]
     Rs, Fs = forcing

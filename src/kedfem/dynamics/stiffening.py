@@ -1,4 +1,4 @@
-"""Geometric stiffening: M δ'' + C δ' + (K + K_σ) δ = P − M R0'', K_σ from the stresses of the nominal motion.
+"""Geometric stiffening: M δ'' + C δ' + (K + K_σ) δ = P − M R0'', K_σ from the stresses of the rigid-body motion.
 
 The stresses are quasi-static: those of P − M R0'' and the joint forces that go with it, in balance on each link. In the
 link frame such loads are combinations of a few constant ones: six of turning, three in a plane (what deforms of −M R0''
@@ -28,14 +28,14 @@ BALANCED = 1e-9  # of a load: what is left of one that only accelerates the link
 INDEPENDENT = 1e-10  # of the largest energy: loads below repeat others
 NEGLIGIBLE = 1e-12  # of the largest stress: rounding, as of what leaves the plane of a planar linkage
 SWEEPS = 30
-SETTLED = 1e-9  # what the sweeps left undone, of the displacement
+SETTLED = 1e-9  # what the iterations left undone, of the displacement
 Turning = Callable[[Nodal], Nodal]
 """k g P of a link at one time, from g."""
 
 
 @dataclass(frozen=True, slots=True)
 class StressModes:
-    """What the loads of the nominal motion can do to one link.
+    """What the loads of the rigid-body motion can do to one link.
 
     states : (m, n, d) g_i, without rigid motion, orthonormal in strain energy [1/√J times a state's unit]
     k : (m, z) their stress stiffness, entries of one sparsity pattern or all n² of dense matrices [N/m, times 1/√J]
@@ -110,7 +110,7 @@ def stiffening(model: Model) -> Stiffening:
 
 
 def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> StressModes:
-    """Static states of a link under all loads in balance that the nominal motion can put on it, and their k.
+    """Static states of a link under all loads in balance that the rigid-body motion can put on it, and their k.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> St
 
 
 def unit_loads(link: Link, joint: Attachment, loads: Sequence[Pattern]) -> Float[np.ndarray, "k u"]:
-    """Loads, link frame, that those of the nominal motion are combinations of, but for accelerations of the link."""
+    """Loads, link frame, that those of the rigid-body motion are combinations of, but for accelerations of the link."""
     space = 2 if link.planar else 3
     columns: list[Nodal] = []
 
@@ -202,7 +202,7 @@ def swept(
     parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], first: Sequence[NodalOf],
     turnings: Sequence[Turning], share: float,
 ) -> tuple[list[NodalOf], list[NodalOf], list[Float[np.ndarray, " _"]]]:  # fmt: skip
-    """Solve A g = r − share · k g P + Wᵀ λ by sweeps with the constant A.
+    """Solve A g = r − share · k g P + Wᵀ λ by iterations with the constant A.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def swept(
 
     Returns
     -------
-    r − share · k g P as last used; g; λ. g is nan where the sweeps do not settle
+    r − share · k g P as last used; g; λ. g is nan where the iterations do not converge
     """
     before, g = 0.0, list(first)
     for _ in range(SWEEPS):

@@ -102,7 +102,7 @@ def coupled(
     Parameters
     ----------
     parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
-    tie : what joints that hold by rows ask of z; then Σ Bᵀ R λ is what these exert
+    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
 
     Returns
     -------

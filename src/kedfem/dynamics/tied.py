@@ -1,4 +1,4 @@
-"""Steps of a solver that takes one at a time, where joints hold by rows."""
+"""Steps of a solver that takes one at a time, where joints are enforced by constraint equations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.history import Forcing, LinkHistory, history
 from kedfem.dynamics.interface import RowState, Tie, after_step, step_tie
-from kedfem.dynamics.joint_rows import JointRows
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nominal
 
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """What a solver carries from block to block: states of all links, and of joints that hold by rows."""
+    """What a solver carries from block to block: states of all links, and of joints enforced by constraint equations."""
 
     links: list[LinkState]
     rows: RowState | None = None

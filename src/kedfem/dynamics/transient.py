@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.condensed import CondensedSteps
+from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
-from kedfem.dynamics.joint_rows import joint_rows
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.marks import Mark
 from kedfem.dynamics.model import Model
@@ -32,7 +32,7 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, following, path_parameter, time_grid
+from kedfem.scene import Scene, corotational, path_parameter, time_grid
 
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
@@ -41,8 +41,8 @@ ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps
 Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
 UNSETTLED = (
-    ": the sweeps of stiffening do not settle, it is not a small term; "
-    'take a smaller step, or frames = "following"'
+    ": the iterations of stiffening do not settle, it is not a small term; "
+    'take a smaller step, or frames = "co-rotational"'
 )
 
 
@@ -54,12 +54,12 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     SolveError
         If an effective matrix is not positive definite.
     MeshError
-        If a force element finds no seat on its link that tells how it turns.
+        If a force element finds no coupling surface on its link that tells how it turns.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    if following(scene):
+    if corotational(scene):
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
-    literal = scene.analysis.solver == "literal"
+    literal = scene.analysis.solver == "monolithic"
     stresses = stiffening(model) if scene.analysis.stiffening else None
     # the system's starts know dampers of bushings, but lose digits where constraint equations are beside stiff links
     hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
@@ -207,9 +207,9 @@ def _stuck(model: Model, step: int, part: RigidMotion, failed: ConvergenceError)
         failed.moves in beams
     )
     return (
-        f"analysis: the sweeps of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
+        f"analysis: the iterations of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
         f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; {moves} moves most from "
-        "sweep to sweep: give it more elements or segments"
+        "iteration to iteration: give it more elements or segments"
         + needed
         + ", take a smaller step, or more numerical damping "
         "(rho_inf)"
@@ -222,7 +222,7 @@ def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     if not eased:
         return ()
     return (
-        f"the iterations of {eased} steps with frames that follow converged to a hundred times the tolerance only "
+        f"the iterations of {eased} steps with co-rotational frames converged to a hundred times the tolerance only "
         "(stiff springs or hubs): take a smaller step to see whether results change",
     )
 

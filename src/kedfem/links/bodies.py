@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from kedfem.links.coupling_surfaces import CouplingSurface, face_normal, is_flat
 from kedfem.links.record import Link, Mass, mass_constants, read_only
-from kedfem.links.seats import Seat, face_normal, is_flat
 
 
 def euler_tensor(inertia: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
@@ -20,7 +20,9 @@ def inertia_of(euler: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
     return np.asarray(np.trace(euler) * np.eye(3) - euler)
 
 
-def flywheel_tensor(seat: Seat, axis: Float[np.ndarray, "3"], inertia: float) -> Float[np.ndarray, "3 3"]:
+def flywheel_tensor(
+    seat: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float
+) -> Float[np.ndarray, "3 3"]:
     """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
 
     On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so
@@ -33,17 +35,23 @@ def flywheel_tensor(seat: Seat, axis: Float[np.ndarray, "3"], inertia: float) ->
 
 
 def with_body(
-    link: Link, seat: Seat, mass: float, centre: Float[np.ndarray, "3"], euler: Float[np.ndarray, "3 3"]
+    link: Link,
+    seat: CouplingSurface,
+    mass: float,
+    centre: Float[np.ndarray, "3"],
+    euler: Float[np.ndarray, "3 3"],
 ) -> Link:
-    """A link with a rigid body on one of its seats: W4ᵀ Γ W4 is added to the scalar mass.
+    """A link with a rigid body on one of its coupling surfaces: W4ᵀ Γ W4 is added to the scalar mass.
 
-    Γ = [[mass, mass·cᵀ], [mass·c, G]], c the body's centre from the seat's origin, G its Euler tensor about that origin.
-    On a planar beam the body adds its mass to the node's translation and its inertia about z to the node's turn.
+    Γ = [[mass, mass·cᵀ], [mass·c, G]], c the body's centre from the coupling surface's origin, G its Euler tensor about
+    that origin. On a planar beam the body adds its mass to the node's translation and its inertia about z to the node's
+    turn.
 
     Parameters
     ----------
     mass : [kg]
-    centre : centre of mass in the reference position [m]; on a beam or a flat face the seat must know the direction to it
+    centre : centre of mass in the reference position [m]; on a beam or a flat face the coupling surface must know the
+    direction to it
     euler : (3, 3) Euler tensor ∫ ρ x xᵀ dV about the centre [kg m²]
     """
     c = centre - seat.origin
@@ -67,7 +75,7 @@ def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -
     return _with_mass(link, (m, m, link.mass[2]) if link.kind == "beam" else (m,) * link.d)
 
 
-def _with_node_body(link: Link, seat: Seat, mass: float, inertia: float) -> Link:
+def _with_node_body(link: Link, seat: CouplingSurface, mass: float, inertia: float) -> Link:
     w = sp.csr_array(seat.fit[:1])
     lump = sp.csr_array(w.T @ w)
     xy = sp.csr_array(link.mass[0] + mass * lump)

@@ -9,16 +9,16 @@ from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, line_axes, spaced
 from kedfem.links.beam_axis import Axis, directions, smooth_axis, straight_axis
 from kedfem.links.choosing import with_chosen_faces
+from kedfem.links.coupling_surfaces import joint_seat
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.seats import joint_seat
 from kedfem.links.section import scene_section
 from kedfem.links.segments import (
     Interval,
     Segments,
     along,
     beam_segments,
-    following,
+    corotational,
     segmented,
     space_segments,
 )
@@ -43,7 +43,7 @@ from kedfem.scene import (
 
 SEATED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
 SAME = 1e-6  # of a segment's length: what is so near is at one place
-SEGMENTS = 6  # of a solid or plane link with frames that follow, where none are given
+SEGMENTS = 6  # of a solid or plane link with co-rotational frames, where none are given
 
 
 def bare_links(scene: Scene) -> dict[str, Link]:
@@ -123,10 +123,10 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         If the mesh has fewer layers of elements than segments.
     """
     given = scene.links[name]
-    if link_frames(scene, name) == "nominal":
+    if link_frames(scene, name) == "rigid-body":
         return Segments((link,))
     if given.fidelity == "rigid" or link.full is not None:
-        return Segments((following(link),))
+        return Segments((corotational(link),))
     material = scene.materials[str(given.material)]
     match link.kind:
         case "beam":

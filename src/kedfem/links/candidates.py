@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.optimize import least_squares
 
 from kedfem.links.record import Link, LinkFace
-from kedfem.links.rounds import CLOSED
+from kedfem.links.round_surfaces import CLOSED
 from kedfem.links.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface
 
 FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from kedfem.links.candidates import Candidate, candidates
 from kedfem.links.record import Link
-from kedfem.links.rounds import Round
+from kedfem.links.round_surfaces import Round
 
 MOST = 8  # candidates in a message
 SMALL = 0.1  # [m]: shorter lengths are told in millimetres

@@ -1,6 +1,6 @@
-"""Links in the span of a few scalar functions: the equation stays what it is.
+"""Links in the span of a few scalar modes: the equation stays what it is.
 
-Q (n, s) holds functions of a link, column by column. Q ⊗ Rᵈ is closed under rotation, so the reduced link is again a
+Q (n, s) holds modes of a link, column by column. Q ⊗ Rᵈ is closed under rotation, so the reduced link is again a
 link: mass Qᵀ m Q, stiffness (Q ⊗ I)ᵀ K0 (Q ⊗ I) [KED, eqs. (12)(14)]. The same idea: Pechstein, Reischl, Gerstmayr
 (2013), "A generalized component mode synthesis approach for flexible multibody systems"; Gerstmayr, Schöberl (2006).
 """
@@ -20,11 +20,11 @@ INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats othe
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
-    """The changed copy of a link that moves in the span of functions Q only.
+    """The changed copy of a link that moves in the span of modes Q only.
 
     Parameters
     ----------
-    Q : (n, s) independent functions whose span holds 1 and the position [-]; they are made mass-orthonormal
+    Q : (n, s) independent modes whose span holds 1 and the position [-]; they are made mass-orthonormal
 
     Returns
     -------
@@ -56,9 +56,9 @@ def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
 
 
 def mass_orthonormal(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n _"]:
-    """Functions of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
+    """Modes of the same span with Qᵀ m Q = 1; fewer if some depend on others."""
     Q = Q / np.sqrt(np.einsum("as,as->s", Q, np.asarray(link.mass[0] @ Q)))
-    for _ in range(3):  # the second time for rounding, the third where functions nearly depend on each other
+    for _ in range(3):  # the second time for rounding, the third where modes nearly depend on each other
         values, vectors = np.linalg.eigh(_gram(link.mass[0], Q))
         kept = values > INDEPENDENT * values[-1]
         Q = Q @ (vectors[:, kept] / np.sqrt(values[kept]))
@@ -79,7 +79,7 @@ def projected_stiffness(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.nda
 
 
 def _unstrained(K0: Float[np.ndarray, "k k"], modes: Float[np.ndarray, "k r"]) -> Float[np.ndarray, "k k"]:
-    """K0 without what rounding left of it on rigid motions: with stiff functions in it that is not little."""
+    """K0 without what rounding left of it on rigid motions: with stiff modes in it that is not little."""
     B = np.linalg.qr(modes)[0]
     K0 = K0 - B @ (B.T @ K0)
     K0 = K0 - (K0 @ B) @ B.T

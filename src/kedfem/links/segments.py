@@ -1,4 +1,4 @@
-"""Links cut into segments, each a link again, whose frames follow their own shape: large deflection.
+"""Links cut into segments, each a link again, with co-rotational frames: large deflection.
 
 The segments of a beam are its elements, those of a solid or plane link slices of its mesh. Neighbours share the ports of
 the cut between them: of beams its node, of meshed links the affine field that fits the cut best, so that the two sides of
@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beam_axis import Axis
+from kedfem.links.coupling_surfaces import facet_seat, joint_seat, port_weights
 from kedfem.links.metric import beam_element
 from kedfem.links.plane import plane_link
 from kedfem.links.record import BeamPoint, Frame, Link
-from kedfem.links.seats import facet_seat, joint_seat, port_weights
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import rigidities, spatial_beam_link
 from kedfem.mesh import QuadMesh, SolidMesh
@@ -59,7 +59,7 @@ class Segments:
     functions: tuple[Int[np.ndarray, " _"], ...] = ()
 
 
-def following(link: Link) -> Link:
+def corotational(link: Link) -> Link:
     """The changed copy of a link whose frame is its own mean rotation: the one that fits its shape best, by mass.
 
     Meant for links without attached bodies: a heavy one would pull the frame to it.
@@ -78,7 +78,7 @@ def segmented(
     link : without attached bodies
     count : number of slices
     ends : joints of the link, as drawn [m]
-    whole : ranges along `along(ends)` that no cut may divide, those of bores and other seats [m]
+    whole : ranges along `along(ends)` that no cut may divide, those of bores and other coupling surfaces [m]
 
     Raises
     ------
@@ -86,7 +86,7 @@ def segmented(
         If the mesh has not so many layers of elements.
     """
     if count == 1:
-        return Segments((following(link),), functions=(np.arange(link.n),))
+        return Segments((corotational(link),), functions=(np.arange(link.n),))
     e = along(link, ends)
     s = link.X[link.cells] @ e  # (e, m)
     places = _places(count, ends @ e if len(ends) > 1 else s, whole)
@@ -101,7 +101,7 @@ def segmented(
             f"be divided into more slices across the link, got {count}; take a finer mesh"
         )
     return Segments(
-        tuple(following(part) for part, _ in parts),
+        tuple(corotational(part) for part, _ in parts),
         tuple(cut for cut in cuts if cut),
         tuple(n for _, n in parts),
     )
@@ -211,7 +211,7 @@ def beam_segments(link: Link, material: Material) -> Segments:
         if section is None:
             raise TypeError(f"links.{link.name}: has no section")  # a beam has
         part = beam_link(link.name, link.X[cell[:2]], section, material, 1, nodes)
-        parts.append(replace(following(part), axes=link.axes, frames=_gauss_frames(part, material)))
+        parts.append(replace(corotational(part), axes=link.axes, frames=_gauss_frames(part, material)))
     cuts = [
         Cut((k, k + 1), link.X[link.cells[k][1:2]], (_unit(parts[k], -1), _unit(parts[k + 1], 0)))
         for k in range(len(parts) - 1)
@@ -271,7 +271,7 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
     x, order = own.frame[own.cells[0]][:, [0, 2, 3]], own.node[own.cells[0]]
     element = beam_element(x, part.X, part.one, order, rigidities(section, material))
     K0 = sp.csr_array((element.rows.T * element.stiffness) @ element.rows)
-    return replace(following(part), axes=link.axes, K0=K0, element=element)
+    return replace(corotational(part), axes=link.axes, K0=K0, element=element)
 
 
 def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:

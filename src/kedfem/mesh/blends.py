@@ -32,8 +32,8 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
     solid : Solid
         The solid.
     sizing : Sizing
-        With `ignore`: rounds of less radius, chamfers of shorter sides go, whether convex or concave. Without it those
-        that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner corner made.
+        With `defeature_size`: rounds of less radius, chamfers of shorter sides go, whether convex or concave. Without it
+        those that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner corner made.
         Blends near the points in `kept` stay.
 
     Returns

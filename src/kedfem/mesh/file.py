@@ -9,9 +9,9 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
-from kedfem.mesh.apart import MESH_FILE, READING, apart
 from kedfem.mesh.groups import named_faces
 from kedfem.mesh.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
+from kedfem.mesh.isolated import MESH_FILE, READING, apart
 from kedfem.mesh.mixed import one_kind
 from kedfem.mesh.raw import CORNERS, ENDINGS, RawMesh, read_mesh
 from kedfem.store import contents, itself, kept

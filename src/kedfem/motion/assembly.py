@@ -8,11 +8,11 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.motion.freedom import RANK_TOLERANCE
+from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
 from kedfem.motion.linkage import GROUND, passive_rows, scene_centre, scene_size
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.redrawn import Shift, redrawn
-from kedfem.motion.rows import GAP, Row, Rows, stacked
+from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import Poses, features, jacobian, residuals
 from kedfem.scene import Scene
 
@@ -159,7 +159,7 @@ def _points(scene: Scene, link: str) -> Iterator[tuple[float, float, float]]:
     return (joint.on(link) for joint in scene.joints.values() if link in joint.links)
 
 
-def _misfits(scene: Scene, rows: list[Row]) -> dict[str, float]:
+def _misfits(scene: Scene, rows: list[ConstraintEquation]) -> dict[str, float]:
     """How far each joint whose links are drawn apart is open, in the directions that it holds [m]."""
     bodies, square = (GROUND, *scene.links), {name: 0.0 for name, joint in scene.joints.items() if joint.open}
     for row in rows:

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
+from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import SETTLED, Target, driven_rows, moved, remainder, stride, twists
-from kedfem.motion.rows import Rows
 from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian
 
 EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it

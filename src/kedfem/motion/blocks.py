@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.motion.rows import Rows
+from kedfem.motion.constraints import Rows
 from kedfem.motion.values import Features, coupled_terms, gradients
 
 

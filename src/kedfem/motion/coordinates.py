@@ -1,4 +1,4 @@
-"""Coordinates of joints: how far a hinge has turned and a slide has travelled, from the drawn position.
+"""Coordinates of joints: how far a hinge has turned and a slide has travelled, from the reference position.
 
 They are of the joint's first link that is not the ground, against the other, about or along the joint's axis; of a slot,
 of the link with the pin along the line of the other.
@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import Linkage, moving_pair, unit
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import perpendiculars
 from kedfem.scene import Joint, Scene
 
 Vector = Float[np.ndarray, "3"]

@@ -8,7 +8,7 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.motion.freedom import RANK_TOLERANCE
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import (
     Linkage,
     drawn_jacobian,
@@ -18,7 +18,7 @@ from kedfem.motion.linkage import (
     resting_poses,
 )
 from kedfem.motion.newton import cross_matrix
-from kedfem.motion.rows import cross
+from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import features, jacobian
 from kedfem.scene import Scene
 
@@ -121,7 +121,7 @@ def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
         turn = -cross_matrix(np.asarray(motion.at) - linkage.centre)
         for key, blocks, vector, unit in (
             ("velocity", (np.eye(3), turn), motion.velocity, "m/s"),
-            ("spin", (np.zeros((3, 3)), np.eye(3)), motion.spin, "rad/s"),
+            ("angular_velocity", (np.zeros((3, 3)), np.eye(3)), motion.angular_velocity, "rad/s"),
         ):
             for c, value in enumerate(vector or ()):
                 row = np.zeros((len(linkage.bodies), 2, 3))

@@ -1,4 +1,4 @@
-"""The linkage as rigid bodies and constraint rows; its mobility and redundancy in the drawn position.
+"""The linkage as rigid bodies and constraint rows; its mobility and redundancy in the reference position.
 
 Where frames follow the links, motions may be left free. Nominally joints that bear them are held as drawn while the drive
 moves the rest; without a drive everything nominally rests.
@@ -12,14 +12,10 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.blocks import Blocks, blocks
-from kedfem.motion.drives import Drives, drives
-from kedfem.motion.freedom import RANK_TOLERANCE, Drawn, free_motions, listed, rank
-from kedfem.motion.freedom import remedy as held_by
-from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.rows import (
+from kedfem.motion.constraints import (
     ANGLE,
     GAP,
-    Row,
+    ConstraintEquation,
     Rows,
     coupled,
     free_rows,
@@ -28,8 +24,12 @@ from kedfem.motion.rows import (
     travel_row,
     turn_row,
 )
+from kedfem.motion.drives import Drives, drives
+from kedfem.motion.redundancy import LOOSER, Looser, would_move
+from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, rank
+from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
-from kedfem.scene import Joint, Scene, following_links
+from kedfem.scene import Joint, Scene, corotational_links
 
 GROUND = "ground"
 MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
@@ -83,7 +83,8 @@ def linkage(scene: Scene) -> Linkage:
     Raises
     ------
     MotionError
-        If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with nominal frames.
+        If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with rigid-body
+        frames.
     """
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
@@ -120,7 +121,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
     return float(np.abs(plan.left(values, rates)).max()) <= RANK_TOLERANCE
 
 
-def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
+def _drawn(scene: Scene) -> tuple[list[ConstraintEquation], Drives, Drawn]:
     """All rows of joints, couplings and drives, and their derivatives as drawn."""
     bodies = (GROUND, *scene.links)
     centre, size = scene_centre(scene), scene_size(scene)
@@ -132,7 +133,7 @@ def _drawn(scene: Scene) -> tuple[list[Row], Drives, Drawn]:
     return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
 
 
-def passive_rows(scene: Scene) -> list[Row]:
+def passive_rows(scene: Scene) -> list[ConstraintEquation]:
     """Rows of joints and couplings, without the drives'."""
     bodies, centre = (GROUND, *scene.links), scene_centre(scene)
     rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
@@ -191,7 +192,7 @@ def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
 
 def _rows_of(
     scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray, kind: str | None = None
-) -> list[Row]:
+) -> list[ConstraintEquation]:
     """Rows of a joint, of its own kind or another."""
     joint = scene.joints[name]
     axis: np.ndarray | tuple[np.ndarray, np.ndarray] | None = None if joint.axis is None else unit(joint.axis)
@@ -208,7 +209,9 @@ def _rows_of(
     return rows
 
 
-def _reaching(row: Row, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray) -> Row:
+def _reaching(
+    row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray
+) -> ConstraintEquation:
     """A row of a joint whose links are drawn apart: gaps are between their own points."""
     if row.kind != GAP:
         return row
@@ -222,7 +225,9 @@ def moving_pair(joint: Joint) -> tuple[str, str]:
     return (other, one) if one == GROUND else (one, other)
 
 
-def coordinate_row(scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None) -> Row:
+def coordinate_row(
+    scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None
+) -> ConstraintEquation:
     """Turn or travel of a joint; if not said which, the turn of all but slides."""
     joint = scene.joints[name]
     i, j = (bodies.index(link) for link in moving_pair(joint))
@@ -231,7 +236,7 @@ def coordinate_row(scene: Scene, name: str, bodies: tuple[str, ...], turns: bool
     return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), joint_axis(joint))
 
 
-def _gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> Row:
+def _gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
     """Gears: coordinate of the second joint less ratio · that of the first; the greater coefficient is one."""
     gear, where = scene.gears[name], f"gears.{name}"
     first, second = (replace(coordinate_row(scene, each, bodies), joint=where) for each in gear.joints)
@@ -240,12 +245,12 @@ def _gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> Row:
     return coupled(second, (-gear.transmission, first))
 
 
-def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> Row:
+def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> ConstraintEquation:
     """The drive of a joint: its turn or travel has the drive's value."""
     return replace(coordinate_row(scene, name, bodies), drive=number)
 
 
-def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Row]:
+def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
     """Rows of what a joint leaves free."""
     joint = scene.joints[name]
     axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
@@ -263,8 +268,8 @@ def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
     return i, j
 
 
-def drawn_jacobian(rows: list[Row], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
-    """Row derivatives in the drawn position, lengths divided by `size`."""
+def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
+    """Row derivatives in the reference position, lengths divided by `size`."""
     return _jacobian(stacked(rows), bodies, size)
 
 
@@ -274,7 +279,7 @@ def _jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:
-    """How many motions the drive leaves free; they must be of links whose frames follow."""
+    """How many motions the drive leaves free; they must be of links with co-rotational frames."""
     k, drives = int(drawn.J.shape[1]), int(drawn.driven.sum())
     free, mobility = k - rank(drawn.J), k - rank(drawn.J[~drawn.driven])
     driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
@@ -295,17 +300,17 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
         angle = "drive angle 0 deg, " if drives == 1 else ""
         other = listed(_other_drives(scene, drawn), "or")
         raise MotionError(
-            f"{driven}: the linkage locks (dead point) at {angle}the drawn position: "
+            f"{driven}: the linkage locks (dead point) at {angle}the reference position: "
             f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
     motions = free_motions(drawn)
-    if following_links(scene).issuperset(link for each in motions for link in each.links):
+    if corotational_links(scene).issuperset(link for each in motions for link in each.links):
         return free
     words = "; ".join(each.words for each in motions)
     raise MotionError(
         "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
         f"{words}; free motions: {free} (remedy: {'; '.join(held_by(each) for each in motions)}; "
-        'or let these links have frames = "following")'
+        'or let these links have frames = "co-rotational")'
     )
 
 
@@ -321,7 +326,9 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
     return out
 
 
-def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[Row]:
+def _holding(
+    scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int
+) -> list[ConstraintEquation]:
     """Rows that hold, as drawn, as many motions of joints as are free: those that these motions change most."""
     if not free:
         return []

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from kedfem.motion.dead_point import DeadPoint, nearest_dead_point
-from kedfem.motion.freedom import FreeMotion, free_motions, rank
 from kedfem.motion.linkage import Linkage, drawn_linkage, looser_rows
 from kedfem.motion.path import Path
 from kedfem.motion.redundancy import Redundant, redundancy, redundant, remedy
+from kedfem.motion.released_motions import FreeMotion, free_motions, rank
 from kedfem.scene import Scene
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.motion.blocks import Blocks
+from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.rows import Rows
 from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian, residuals
 
 SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MotionError
 from kedfem.motion.batch import independent
+from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import stopped
 from kedfem.motion.newton import (
@@ -27,7 +28,6 @@ from kedfem.motion.newton import (
     orthonormal,
     target,
 )
-from kedfem.motion.rows import ANGLE
 from kedfem.motion.values import Poses, Twists, features, turning
 
 JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
@@ -82,7 +82,7 @@ class Path:
 
 
 def path(link: Linkage, low: float, high: float) -> Path:
-    """Follow the linkage from its drawn position over low ≤ 0 ≤ high of τ; undriven it rests there.
+    """Follow the linkage from its reference position over low ≤ 0 ≤ high of τ; undriven it rests there.
 
     Raises
     ------

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.motion.blocks import Blocks
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.motion.values import features, jacobian
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.motion.freedom import Drawn, directions, listed, null_space, of_joints, rank, span
+from kedfem.motion.released_motions import Drawn, directions, listed, null_space, of_joints, rank, span
 from kedfem.scene import Joint
 
 LOOSER = {

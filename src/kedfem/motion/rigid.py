@@ -8,11 +8,11 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MotionError
 from kedfem.motion.batch import Moving, moving
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import place
 from kedfem.motion.newton import OPEN, cross_matrix
 from kedfem.motion.path import Path, aimed, predicted
-from kedfem.motion.rows import cross
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 
 
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
-    """Nominal motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
+    """Rigid-body motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
     p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
     none = np.zeros((len(t), 0))

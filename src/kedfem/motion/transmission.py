@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import GROUND, Linkage, unit
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.scene import Scene
 
 ENDS = ("revolute", "spherical", "universal")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.motion.rows import Rows
+from kedfem.motion.constraints import Rows
 
 Poses = tuple[Float[np.ndarray, "T B 3 3"], Float[np.ndarray, "T B 3"]]
 Twists = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]

@@ -69,9 +69,9 @@ def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
     span = abs(last - first)
     bottom.xaxis.set_major_locator(_ticks(span))
     if span > 361.0:
-        turns = top.secondary_xaxis("top", functions=(lambda x: x / 360.0, lambda x: x * 360.0))
-        turns.set_xlabel("turns")
-        turns.xaxis.set_major_locator(_turn_ticks(span / 360.0))
+        revolutions = top.secondary_xaxis("top", functions=(lambda x: x / 360.0, lambda x: x * 360.0))
+        revolutions.set_xlabel("revolutions")
+        revolutions.xaxis.set_major_locator(_turn_ticks(span / 360.0))
 
 
 def _ticks(span: float) -> Any:
@@ -81,12 +81,12 @@ def _ticks(span: float) -> Any:
     for step in TICKS:
         if span / step < MOST_TICKS:
             return MultipleLocator(step) if span > TICKS[0] else MaxNLocator()
-    turns = np.ceil(span / 360.0 / MOST_TICKS)
-    return MultipleLocator(360.0 * turns)
+    revolutions = np.ceil(span / 360.0 / MOST_TICKS)
+    return MultipleLocator(360.0 * revolutions)
 
 
-def _turn_ticks(turns: float) -> Any:
+def _turn_ticks(revolutions: float) -> Any:
     """Ticks at half turns where there are few, else at whole ones."""
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-    return MultipleLocator(0.5) if turns < 4 else MaxNLocator(MOST_TICKS, integer=True)
+    return MultipleLocator(0.5) if revolutions < 4 else MaxNLocator(MOST_TICKS, integer=True)

@@ -15,9 +15,9 @@ from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import LinkField, remove_animation, write_points
 from kedfem.output.words import clock, moment, stress_at
 from kedfem.results import Peak, Results, write_csv
-from kedfem.results.doubtful import AWAY, reason
 from kedfem.results.envelope import Envelope
 from kedfem.results.reader import foreign
+from kedfem.results.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
@@ -56,7 +56,7 @@ def fields(
 ) -> list[LinkField]:
     """What a frame shows of each link, deformed as the animation exaggerates it."""
     animation = scene.output.animation
-    return link_fields(model, recoveries, snapshot, animation.exaggeration if animation else 1.0)
+    return link_fields(model, recoveries, snapshot, animation.deformation_scale if animation else 1.0)
 
 
 def refuse_foreign(folder: Path) -> None:
@@ -95,7 +95,7 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
     if clock(scene) != "time":
         title += f", drive {moment(scene, peak.time, peak.angle)}"
     animation = scene.output.animation
-    scale = animation.exaggeration if animation else 1.0
+    scale = animation.deformation_scale if animation else 1.0
     try:
         write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity)
     except OutputError as err:

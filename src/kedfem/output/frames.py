@@ -35,14 +35,14 @@ def _one(parts: Sequence[LinkField]) -> LinkField:
 
 
 def link_fields(
-    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, exaggeration: float
+    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float
 ) -> list[LinkField]:
     """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
 
     Parameters
     ----------
     recoveries : per link, then per carried link
-    exaggeration : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
+    deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
     """
     motion, k = snapshot.motion, snapshot.k
     fields = []
@@ -55,7 +55,7 @@ def link_fields(
         if link.rigid:
             stress = np.full_like(stress, np.nan)
         drawn = recovery.at_points(shown.X)
-        points = motion.p[k, body] + drawn @ motion.R[k, body].T + exaggeration * displacement
+        points = motion.p[k, body] + drawn @ motion.R[k, body].T + deformation_scale * displacement
         fields.append(
             LinkField(
                 link.name,
@@ -75,7 +75,7 @@ def link_fields(
         name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
         section = _section(carried.link)
         fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], section))
-    return _joined(fields) + _blocks(model, snapshot, exaggeration)
+    return _joined(fields) + _blocks(model, snapshot, deformation_scale)
 
 
 def _section(link: Link) -> tuple[float, float, bool] | None:
@@ -86,7 +86,7 @@ def _section(link: Link) -> tuple[float, float, bool] | None:
     return of.height, of.thickness, of.kind in {"round", "tube"}
 
 
-def _blocks(model: Model, snapshot: Snapshot, exaggeration: float) -> list[LinkField]:
+def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[LinkField]:
     """Sliders without a shape: blocks along their guides, at the joints with the links that carry them."""
     if not model.sliders:
         return []
@@ -95,7 +95,7 @@ def _blocks(model: Model, snapshot: Snapshot, exaggeration: float) -> list[LinkF
     for slider in model.sliders:
         link, body = model.links[slider.carrier], model.bodies[slider.carrier]
         moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
-        place = motion.p[k, body] + motion.R[k, body] @ (slider.weights @ link.X) + exaggeration * moved
+        place = motion.p[k, body] + motion.R[k, body] @ (slider.weights @ link.X) + deformation_scale * moved
         z = slider.axis
         x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
         x /= np.linalg.norm(x)

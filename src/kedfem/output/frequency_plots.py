@@ -12,7 +12,7 @@ FASTEST = 2.0  # of the drive's speed: how far a Campbell plot goes
 
 def write_over_turn(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
-    turns: bool,
+    revolutions: bool,
 ) -> None:  # fmt: skip
     """Natural frequencies [Hz] over the drive angle, of a drive that does not go on turning over time.
 
@@ -21,12 +21,12 @@ def write_over_turn(
     OutputError
         The file cannot be written.
     """
-    x = np.degrees(angle) if turns else t
+    x = np.degrees(angle) if revolutions else t
     with figure_saved(path, "Natural frequencies of the linkage frozen at positions") as figure:
         ax = figure.subplots()
         for k, f in enumerate(values.T, 1):
             ax.plot(x, f, marker=".", label=f"{k}")
-        ax.set_xlabel("drive angle (°)" if turns else "time (s)")
+        ax.set_xlabel("drive angle (°)" if revolutions else "time (s)")
         ax.set_ylabel("frequency (Hz)")
         ax.set_ylim(bottom=0.0)
         ax.grid(alpha=0.3)

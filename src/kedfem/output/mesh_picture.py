@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
-from kedfem.links.offers import Offer
+from kedfem.links.part_candidates import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.hexahedra import QUAD9, shape_functions

@@ -17,7 +17,7 @@ def write_picture(
     vtu: Path,
     png: Path,
     title: str,
-    exaggeration: float = 1.0,
+    deformation_scale: float = 1.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> None:
     """Draw the links of a VTU file, deformed as they are there, coloured by von Mises stress.
@@ -55,7 +55,7 @@ def write_picture(
             str(vtu),
             str(part),
             title,
-            str(exaggeration),
+            str(deformation_scale),
             *map(str, gravity),
         ]
         try:

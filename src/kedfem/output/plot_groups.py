@@ -68,7 +68,7 @@ def pictures(results: Results) -> Iterator[Picture]:
         panels = _paired(channel, values, *channels[rigid]) if both else _single(channel, values)
         yield Picture(_file(name), channel.description or name, channel, panels)
     if energies:
-        title = "Energies of all links, and what is left over"
+        title = "Energies of all links, and the residual"
         yield Picture("energies", title, None, [("energy", "J", energies)])
     forces = _joint_forces(results)
     if len(forces) > 1:

@@ -64,12 +64,12 @@ class View:
     cut: Float[np.ndarray, " 3"] | None = None
 
 
-def render(vtu: str, png: str, title: str, exaggeration: str = "1", *gravity: str) -> None:
+def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravity: str) -> None:
     """Draw a frame.
 
     Parameters
     ----------
-    vtu, png, title, exaggeration, gravity
+    vtu, png, title, deformation_scale, gravity
         As in :func:`kedfem.output.write_picture`.
     """
     import pyvista
@@ -81,7 +81,7 @@ def render(vtu: str, png: str, title: str, exaggeration: str = "1", *gravity: st
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     draw_links(plotter, grid, shown)
-    draw_words(plotter, title, float(exaggeration), shown.cut is not None)
+    draw_words(plotter, title, float(deformation_scale), shown.cut is not None)
     aim(plotter, grid, shown)
     mark(plotter, grid)
     plotter.screenshot(png)
@@ -249,7 +249,7 @@ def curved_surface(solids: Any) -> Any:
     return pyvista.wrap(faces.GetOutput())
 
 
-def draw_words(plotter: Any, title: str, exaggeration: float, cut: bool) -> None:
+def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) -> None:
     """Title, scale of the deformation, and axes."""
     import matplotlib as mpl
 
@@ -259,7 +259,7 @@ def draw_words(plotter: Any, title: str, exaggeration: float, cut: bool) -> None
     words = plotter.add_text(text, (0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font)
     words.prop.justification_vertical = "top"
     words.prop.SetLineSpacing(1.2)
-    scale = f"deformation × {exaggeration:g}" + ("; cut at the highest stress" if cut else "")
+    scale = f"deformation × {deformation_scale:g}" + ("; cut at the highest stress" if cut else "")
     plotter.add_text(scale, (0.03, 0.015), viewport=True, font_size=11, color="black", font_file=font)
     wide, high = plotter.window_size
     plotter.add_axes(color="black", line_width=3, viewport=(1 - 210 / wide, 0.0, 1 - 30 / wide, 180 / high))

@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from kedfem.links.record import Link
 from kedfem.links.spatial_recovery import drawn
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.output.vtu import RigidField
 from kedfem.scene import Scene
 

@@ -13,26 +13,26 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.singular import SingularPasses
-from kedfem.dynamics.actions import actions
 from kedfem.dynamics.cost import Cost, estimated_cost, tried_cost
+from kedfem.dynamics.force_elements import actions
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.transient import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
-from kedfem.motion.freedom import of_joints
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
+from kedfem.motion.released_motions import of_joints
 from kedfem.output.derived import fields
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
 from kedfem.report.links import link_table, way_tables
 from kedfem.report.mobility import mobility_table
 from kedfem.report.plan import plan_tables, reduction_table
-from kedfem.results.acting import measured_actions
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.force_elements import measured_actions
 from kedfem.results.recording import recording
 from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
@@ -130,7 +130,7 @@ def _motion(ready: Prepared) -> Table:
         turned = np.degrees(
             np.arccos(np.clip((np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2, -1, 1))
         ).max()
-        table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the drawn position")
+        table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the reference position")
     return table
 
 
@@ -139,10 +139,10 @@ def _over(ready: Prepared) -> str:
     link, along = ready.linkage, ready.path
     if not along.periodic:
         return " to ".join(place(link, float(tau), ".4g") for tau in along.phi[[0, -1]])
-    turns = along.period / (2 * np.pi)
+    revolutions = along.period / (2 * np.pi)
     if len(link.drives) > 1:
         return f"repeats every {with_prefix(along.period, 's')}"
-    return "repeats every turn" if round(turns) == 1 else f"repeats every {turns:.4g} turns"
+    return "repeats every revolution" if round(revolutions) == 1 else f"repeats every {revolutions:.4g} turns"
 
 
 def _actions(ready: Prepared) -> list[Table]:

@@ -143,7 +143,8 @@ def _as_frame(table: str, name: str) -> str:
 def _joints(found: Sequence[Meeting], names: Sequence[str], ground: int | None) -> Iterator[str]:
     """The joints' tables and a drive's, all as comments."""
     if not found:
-        yield "\n# No pin in a bore, no bores in a line, no ball in a seat: joints are yours to write, [joints.NAME].\n"
+        yield "\n# No pin in a bore, no bores in a line, no ball in its socket: joints are yours to write, "
+        "[joints.NAME].\n"
         return
     yield _ROUND
     if ground is None:

@@ -65,7 +65,7 @@ def _kind(parts: Sequence[Link]) -> str:
         kind += ", following"
     if first.full and not first.rigid:
         low, high = min(functions), max(functions)
-        kind += f", {low} functions" if low == high else f", {low} to {high} functions"
+        kind += f", {low} modes" if low == high else f", {low} to {high} modes"
         kind += " each" if len(parts) > 1 else ""
     return kind
 

@@ -6,11 +6,11 @@ import numpy as np
 from rich.table import Table
 
 from kedfem.motion.dead_point import DeadPoint
-from kedfem.motion.freedom import of_joints
-from kedfem.motion.freedom import remedy as held_by
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import Mobility
+from kedfem.motion.released_motions import of_joints
+from kedfem.motion.released_motions import remedy as held_by
 from kedfem.output.words import with_prefix
 from kedfem.scene import Scene
 

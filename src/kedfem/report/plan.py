@@ -33,7 +33,7 @@ def chosen_table(plan: Plan) -> Table:
 
 def _step(scene: Scene) -> str:
     """Step and levels in words."""
-    grid, levels = time_grid(scene), scene.analysis.levels or 1
+    grid, levels = time_grid(scene), scene.analysis.extrapolation_levels or 1
     halved = f", combined with {', '.join(f'1/{2**k}' for k in range(1, levels))} of it" if levels > 1 else ""
     return f"{grid.step:.4g} s, {grid.steps} steps{halved}"
 
@@ -57,5 +57,5 @@ def reduction_table(reduction: Reduction) -> Table:
     table.add_column("of its peak", justify="right")
     for name, error in reduction.estimate.items():
         table.add_row(name, f"{100 * error:.2g} %")
-    table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links in full"
+    table.caption = f"asked for: {100 * reduction.tolerance:.2g} %; against the same links unreduced"
     return table

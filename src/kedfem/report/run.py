@@ -6,7 +6,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.accuracy.budget import Budget, percent
+from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
 from kedfem.report.plan import chosen_table
@@ -76,16 +76,16 @@ def _cell(error: float | None) -> str:
 
 
 def balance_table(found: Balance) -> Table:
-    """What the steps leave over of energy and momentum, and what energy nominal frames make."""
+    """The residual of energy and momentum over the steps, and what energy rigid-body frames make."""
     table = Table(title="Balance", show_header=False)
     for what, share in (
-        ("energy, left over by the steps", found.energy),
+        ("energy, residual of the steps", found.energy),
         ("momentum", found.linear),
         ("angular momentum", found.angular),
     ):
         table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
     if found.neglected:
         table.add_row(
-            "energy made by nominal frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
+            "energy made by rigid-body frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
         )
     return table

@@ -2,14 +2,14 @@
 
 With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], says exactly
 
-    d/dt (T + V) = loads + supports − g'ᵀ C0 g' − Σ ω · Σ δ × K δ − (damping on the nominal motion)
+    d/dt (T + V) = loads + supports − g'ᵀ C0 g' − Σ ω · Σ δ × K δ − (damping on the rigid-body motion)
 
-because T K0 Tᵀ turns with the nominal motion, not with the bent link: its forces have the moment Σ δ × K δ, which a real
-link's inner forces do not have. That is the equation's geometric error, and is kept apart. What is left over is the
+because T K0 Tᵀ turns with the rigid-body motion, not with the bent link: its forces have the moment Σ δ × K δ, which a
+real link's inner forces do not have. That is the equation's geometric error, and is kept apart. The residual is the
 integration's: of second order in the step, and what numerical damping takes (ρ∞ < 1).
 
-Supports do work on the elastic motion too where joints hold by rows whose directions vary in time. Springs in joints,
-bushings and shafts, store energy and dampers take it: that is no work of supports.
+Supports do work on the elastic motion too where joints are enforced by constraint equations whose directions vary in
+time. Springs in joints, bushings and shafts, store energy and dampers take it: that is no work of supports.
 
 Work is the trapezoidal sum of powers; damping's is that of the means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
 """
@@ -26,13 +26,13 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.acting import Measured
 from kedfem.results.balance import Flow, carried_fields, fields_of, flow
+from kedfem.results.constraint_forces import ConstraintForces
+from kedfem.results.constraint_work import row_work
+from kedfem.results.force_elements import Measured
 from kedfem.results.moments import Constants, Nominal, constants, nominal
 from kedfem.results.records import Channel
 from kedfem.results.resistance import Last, last_of, products, resistance
-from kedfem.results.row_forces import RowForces
-from kedfem.results.row_work import row_work
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
@@ -52,7 +52,7 @@ ENERGIES = (
         ("neglected",),
         "work of the elastic forces' moment on bent links, which the equation neglects",
     ),
-    ("residual", ("residual",), "energy that the integration leaves over"),
+    ("residual", ("residual",), "residual energy of the integration"),
 )
 NO_PORTS = Attachment(
     np.zeros(0, int), np.zeros((0, 0)), 3, np.zeros((0, 3)), (), np.zeros(0, int), np.zeros((0, 0))
@@ -61,7 +61,7 @@ NO_PORTS = Attachment(
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """What is left over at worst, of the largest energy or momentum that is exchanged.
+    """The residual at worst, of the largest energy or momentum that is exchanged.
 
     Momentum is judged by that of all links or by what forces pass on in time, whichever is more: a lift that hardly moves
     passes on its weight. Angular momentum is judged by the linear at the linkage's size at least, for it may vanish.
@@ -116,7 +116,7 @@ class Account:
         nodes = np.concatenate([(link.full or link).nodes for link in every])
         self._extent = float(np.ptp(nodes, axis=0).max())  # of the linkage as drawn [m]
         self._block: Block | None = None
-        self._forces = RowForces(model)
+        self._forces = ConstraintForces(model)
         self._begin()
 
     def _begin(self) -> None:
@@ -131,7 +131,7 @@ class Account:
     def rows(self, block: Block) -> dict[str, Rows]:
         """The channels over a block; the same block again is not counted twice.
 
-        Beside them `driven`: work of the drives alone, that of the supports on the nominal motion; all of it where
+        Beside them `driven`: work of the drives alone, that of the supports on the rigid-body motion; all of it where
         constraints go with displaced bodies.
         """
         if block is not self._block:
@@ -251,7 +251,7 @@ class Account:
 
 
 def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
-    """Energies over time, and what the integration leaves over."""
+    """Energies over time, and the residual of the integration."""
 
     def rows(name: str) -> Callable[[Block], Rows]:
         return lambda block: account.rows(block)[name]
@@ -274,7 +274,8 @@ def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
     if not said:
         return ()
     return (
-        f"the balance leaves over {said}: the steps are too long for what moves, or numerical damping takes what they "
+        f"the residual of the balance is {said}: the steps are too long for what moves, or numerical "
+        "damping takes what they "
         "do not resolve; take shorter ones",
     )
 

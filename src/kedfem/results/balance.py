@@ -27,9 +27,9 @@ class Flow:
     loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum, but
         for what directions that vary in time do on the elastic motion
     force, moment : (3, T) of P and the port forces together [N, N m]
-    turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the nominal frame [N m]
+    turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the rigid-body frame [N m]
     neglected : (T,) its power on the nominal rotation [W]
-    led : (T,) power of the port forces on the elastic motion, where joints hold by rows [W]
+    led : (T,) power of the port forces on the elastic motion, where joints are enforced by constraint equations [W]
     """
 
     kinetic: Scalars
@@ -55,9 +55,9 @@ class Fields:
 
     rows : (4, (1 + k) k + 1, S, T) moments and couple of M δ', P − M R0'', port forces and M δ
     arms : (2, k, k, S, T) Σ δ ⊗ M δ', and Σ δ ⊗ y of P − M R0'' and the port forces
-    elastic : (k, k, S, T) Σ g ⊗ K0 g, link frame; None if K turns with no link's nominal motion
-    powers : (3, S, T) δ' · M δ', δ' · (P − M R0'') and, where joints hold by rows, δ' · port forces
-    """
+    elastic : (k, k, S, T) Σ g ⊗ K0 g, link frame; None if K turns with no link's rigid-body motion
+    powers : (3, S, T) δ' · M δ', δ' · (P − M R0'') and, where joints are enforced by constraint equations, δ' · port
+    forces"""
 
     rows: Float[np.ndarray, "4 m S T"]
     arms: Float[np.ndarray, "2 k k S T"]
@@ -73,8 +73,8 @@ def fields_of(
 
     Parameters
     ----------
-    made : K0 g where K turns with the nominal motion, as `turns` says
-    rows_work : whether joints hold by rows, whose forces do work on the elastic motion
+    made : K0 g where K turns with the rigid-body motion, as `turns` says
+    rows_work : whether joints are enforced by constraint equations, whose forces do work on the elastic motion
     """
     S, T, k = len(of), len(histories[0].u), of[0].k
     rows, arms = np.empty((4, len(of[0].fit), S, T)), np.empty((2, k, k, S, T))
@@ -108,7 +108,7 @@ def carried_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
 
 
 def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
-    """All links together, from their fields and their nominal motion."""
+    """All links together, from their fields and their rigid-body motion."""
     gram, spin = np.stack([x.gram for x in of], axis=-1), np.array([x.spin for x in of])
     Mv, F, ports, Mu = found.rows[:, :-1].reshape(4, *at.rates.shape[1:])
     couples, turns = found.rows[:3, -1], np.stack([at.omega[-1], at.alpha[-1]])

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.results.audit import Account
 from kedfem.results.records import Channel
 from kedfem.scene import Scene
@@ -102,7 +102,8 @@ class CrossChecks:
 
     Parameters
     ----------
-    account : of the same run's energy; the drives' work is compared with that of all port forces on the nominal motion.
+    account : of the same run's energy; the drives' work is compared with that of all port forces on the rigid-body
+    motion.
         On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in joints do
     """
 

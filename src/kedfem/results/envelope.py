@@ -60,7 +60,7 @@ class Modes:
         self.gain = 0.0  # highest stress of a mode, so far
 
     def coordinates(self, G: Float[np.ndarray, "T k"], highest: float) -> Float[np.ndarray, "T r"]:
-        """Of steps G (T, dn); new modes are made for what is left over, until its stress is nothing.
+        """Of steps G (T, dn); new modes are made for the residual, until its stress is nothing.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class Modes:
         return float(np.sqrt(((self.parts[:, :5] @ c) ** 2).sum(axis=1).max(initial=0.0)))
 
     def _extend(self, G: Float[np.ndarray, "T k"], allowed: float) -> None:
-        """More modes, the principal directions of what is left over at some steps."""
+        """More modes, the principal directions of the residual at some steps."""
         size = (G**2).sum(axis=1)
         even = np.linspace(0, len(G) - 1, min(SOME, len(G))).astype(int)
         some = G[np.union1d(even, np.argsort(size)[-SOME // 2 :])]

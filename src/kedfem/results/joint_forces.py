@@ -7,19 +7,19 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.dynamics.constraint_joints import ordered
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.model import Carried, Model, Slider
+from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.dynamics.ports import turned_ports
-from kedfem.dynamics.row_joints import ordered
 from kedfem.links.record import Link, in_space
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import joint_axis
-from kedfem.motion.rows import cross
-from kedfem.results.acting import Measured
+from kedfem.results.constraint_forces import ConstraintForces, known, of_joint
+from kedfem.results.force_elements import Measured
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
-from kedfem.results.row_forces import RowForces, known, of_joint
 from kedfem.scene import GROUND, Scene
 
 XYZ = ("x", "y", "z")
@@ -30,7 +30,7 @@ INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint w
 class Forces:
     """What acts beside port forces: forces of constraint equations, and of motors and springs."""
 
-    rows: RowForces
+    rows: ConstraintForces
     actions: Measured
 
 
@@ -65,7 +65,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
 
 
 def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
-    """Of a joint that holds by rows, about its point on the first link, of a slot the pin."""
+    """Of a joint enforced by constraint equations, about its point on the first link, of a slot the pin."""
     first, second = scene.joints[name].links
     on, other = (second, first) if first == GROUND else (first, second)
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
@@ -99,7 +99,7 @@ def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
     )
 
 
-def _hub(scene: Scene, model: Model, carried: Carried, forces: Forces) -> list[Recorded]:
+def _hub(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
     wrench, others = _hub_wrench(scene, model, carried, forces)
     told = [all(_small(_loose(model, *x)[which]) for x in others) for which in (0, 1)]
@@ -113,12 +113,14 @@ def _hub(scene: Scene, model: Model, carried: Carried, forces: Forces) -> list[R
 Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
 
 
-def _row_joints_of(scene: Scene, model: Model, carried: Carried) -> list[str]:
-    """Joints of a carried link that hold by rows."""
+def _row_joints_of(scene: Scene, model: Model, carried: PrescribedBody) -> list[str]:
+    """Joints of a carried link enforced by constraint equations."""
     return [row.name for row in model.rows if carried.link.name in scene.joints[row.name].links]
 
 
-def _hub_wrench(scene: Scene, model: Model, carried: Carried, forces: Forces) -> tuple[Wrench, list[Held]]:
+def _hub_wrench(
+    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces
+) -> tuple[Wrench, list[Held]]:
     """What holds a carried link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
     link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
     held: list[Held] = []
@@ -149,7 +151,7 @@ def _hub_wrench(scene: Scene, model: Model, carried: Carried, forces: Forces) ->
     return wrench, held
 
 
-def _on_carried(carried: Carried, block: Block) -> Float[np.ndarray, "T n d"]:
+def _on_carried(carried: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:
     """P − M R0'' of a carried link."""
     return applied(carried.link, carried.loads, block.motion, carried.body)
 
@@ -188,8 +190,8 @@ def _arms_over_time(
 ) -> Callable[[Block], Float[np.ndarray, "T p 3"]]:
     """From a joint's point on link k to its ports, world components.
 
-    Of nominal frames as these turn. Co-rotational frames know where the ports are: displaced from the nominal motion,
-    the joint's point as it lies among them. So force and moment do the work that the ports' displacements say.
+    Of rigid-body frames as these turn. Co-rotational frames know where the ports are: displaced from the rigid-body
+    motion, the joint's point as it lies among them. So force and moment do the work that the ports' displacements say.
     """
     attachment, link, body = model.joints[k], model.links[k], model.bodies[k]
     here = np.array([name == joint for name in attachment.joints], bool)
@@ -332,7 +334,7 @@ def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:
 
 
 def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recorded:
-    """Torque, of a slide force, of a drive that holds by rows, along its axis in the second link."""
+    """Torque, of a slide force, of a drive enforced by constraint equations, along its axis in the second link."""
     joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
     on = next(link for link in joint.links if link != GROUND)
     sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"

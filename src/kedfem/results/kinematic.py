@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.inertias import Inertias
+from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
 from kedfem.motion.linkage import GROUND, Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.motion.transmission import Transmission, transmissions
 from kedfem.results.records import Channel
 from kedfem.results.rigid import stated_link
@@ -125,7 +125,7 @@ def _turn(
     rates = [lambda motion: motion.omega[:, body], lambda motion: motion.alpha[:, body]]
     if normal is None:
         vector = Channel(
-            f"{key}/rotation", XYZ, "rad", "world", f"rotation vector {text} from the drawn position"
+            f"{key}/rotation", XYZ, "rad", "world", f"rotation vector {text} from the reference position"
         )
         out = [(vector, lambda motion: rotation_vector(motion.R[:, body]))]
         return out + [
@@ -136,7 +136,7 @@ def _turn(
     turn = Coordinate("", "angle", "angle", body, 0, np.zeros(3), normal, mark - (mark @ normal) * normal)
     about = "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(normal, 9)) + ")"
     angle = Channel(
-        f"{key}/rotation", ("angle",), "rad", "", f"turn {text} about {about} from the drawn position"
+        f"{key}/rotation", ("angle",), "rad", "", f"turn {text} about {about} from the reference position"
     )
     return [
         (angle, lambda motion: turn.values(motion)[:, None]),
@@ -156,7 +156,7 @@ def _coordinate(each: Coordinate, linkage: Linkage) -> tuple[Channel, Callable[[
     one, other = linkage.bodies[each.body], linkage.bodies[each.other]
     column, unit = ("angle", "rad") if each.kind == "angle" else ("travel", "m")
     verb = "turn" if each.kind == "angle" else "travel"
-    text = f"{verb} of joint {each.joint}: link {one} against {other}, from the drawn position"
+    text = f"{verb} of joint {each.joint}: link {one} against {other}, from the reference position"
     channel = Channel(f"joints/{each.joint}/{each.name}", (column,), unit, "", text)
     return channel, lambda motion: each.values(motion)[:, None]
 

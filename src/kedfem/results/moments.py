@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.state import Rayleigh
 from kedfem.links.record import Link, Matrix
+from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
 SMALL = 100  # up to here one product with all of M beats one per component

@@ -12,8 +12,8 @@ from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import point_rows, von_mises
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, linkage
-from kedfem.motion.rows import cross
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
@@ -104,7 +104,7 @@ def _words(linked: Linkage, probe: Probe) -> str:
         case "position":
             return "position"
         case "travel":
-            return "displacement from the drawn position"
+            return "displacement from the reference position"
         case "total_velocity" | "total_acceleration":
             return f"{probe.quantity.removeprefix('total_')}, rigid and elastic,"
         case quantity if linked.mobility:

@@ -7,13 +7,13 @@ from kedfem.dynamics.inertias import inertias_of_model
 from kedfem.dynamics.model import Model
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path
-from kedfem.results.acting import acting, measured_actions
 from kedfem.results.audit import Account, energy_channels
+from kedfem.results.constraint_forces import ConstraintForces
+from kedfem.results.force_elements import acting, measured_actions
 from kedfem.results.joint_forces import Forces, drive_channels, gear_channel, joint_channels
 from kedfem.results.probes import probe_channels
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.rigid import rigid_forces
-from kedfem.results.row_forces import RowForces
 from kedfem.scene import Scene
 
 
@@ -36,7 +36,7 @@ def recording(
     """
     probes = probe_channels(scene, model, linked)
     actions = account.actions if account else None
-    forces = Forces(RowForces(model), actions or measured_actions(scene, model))
+    forces = Forces(ConstraintForces(model), actions or measured_actions(scene, model))
     account = account or Account(model, forces.actions)
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
     drive = [

@@ -36,8 +36,8 @@ class Channel:
 
 
 TIME = Channel("time", (), "s", "", "time")
-ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the drawn position")
-TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the drawn position")
+ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference position")
+TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class Results:
     time : (n,) [s]
         Moments of the rows, read-only.
     angle : (n,) [rad], or [m] where the drive slides
-        Drive angle or travel from the drawn position, as `drive` says, read-only.
+        Drive angle or travel from the reference position, as `drive` says, read-only.
     channels
         Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
     status

@@ -1,4 +1,4 @@
-"""What damping takes: of energy, and where its forces turn with the nominal motion, of momentum."""
+"""What damping takes: of energy, and where its forces turn with the rigid-body motion, of momentum."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Resistance:
     """What damping takes of all links in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
-    drag : (T,) work of the damping forces against the nominal motion, where these turn with it [J]
+    drag : (T,) work of the damping forces against the rigid-body motion, where these turn with it [J]
     impulse, angular : (3, T) of the damping forces, about the world's origin [N s, N m s]
     """
 
@@ -41,7 +41,7 @@ class Resistance:
 
 @dataclass(frozen=True, slots=True)
 class Last:
-    """The time point before a block: t, nominal motion, each link's g, K0 g, C0 g and `held`; T is one."""
+    """The time point before a block: t, rigid-body motion, each link's g, K0 g, C0 g and `held`; T is one."""
 
     t: Scalars
     at: Nominal
@@ -56,8 +56,8 @@ def resistance(
 
     Parameters
     ----------
-    turns : whether K, and so the damping forces, turn with the nominal motion
-    now : times, and nominal motion of all bodies
+    turns : whether K, and so the damping forces, turn with the rigid-body motion
+    now : times, and rigid-body motion of all bodies
     """
     t, at = now
     h = np.diff(t, prepend=before.t)
@@ -89,7 +89,7 @@ def resistance(
 def _turning(
     rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: Nominal
 ) -> tuple[Scalars, Vectors, Vectors]:
-    """Drag, impulse and angular impulse of damping forces that turn with the nominal motion."""
+    """Drag, impulse and angular impulse of damping forces that turn with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
     moment = turned(y[1:] + arms)
     moment[-1] += rows[-1]
@@ -100,7 +100,7 @@ def _turning(
 
 
 def held(of: Constants, history: LinkHistory, at: Nominal) -> Field | None:
-    """Of a link whose frames follow it, the deflection in the nominal frame, where α acts; None without."""
+    """Of a link with co-rotational frames, the deflection in the rigid-body frame, where α acts; None without."""
     if of.link.fit is None or not of.damping.alpha:
         return None
     d = of.link.d
@@ -128,7 +128,7 @@ def last_of(
 
 
 def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
-    """M δ', and K0 g if K turns with the nominal motion, made here if the solver did not hand them on."""
+    """M δ', and K0 g if K turns with the rigid-body motion, made here if the solver did not hand them on."""
     if history.products is not None:
         return history.products
     Kg = flat_times(of.K0, history.g) if turns else np.zeros((len(history.g), 0, 0))
@@ -138,7 +138,7 @@ def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
 def _changes(
     of: Constants, now: Field, made: Products, before: Field, Kg: Field, last: Field | None
 ) -> tuple[Field, Field]:
-    """g and C0 g in each step; of a link whose frames follow it without α, which acts elsewhere, see `held`."""
+    """g and C0 g in each step; of a link with co-rotational frames without α, which acts elsewhere, see `held`."""
     g = _change(now, before)
     if made.Cg is not None and last is not None:
         return g, _change(made.Cg, last)

@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.action import kernel_table
-from kedfem.dynamics.actions import rigid_actions
+from kedfem.dynamics.force_element import kernel_table
+from kedfem.dynamics.force_elements import rigid_actions
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.places import slider_axis
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
-from kedfem.results.acting import Measured
+from kedfem.results.force_elements import Measured
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 

@@ -5,7 +5,7 @@ from kedfem.scene.damping import Damping, rayleigh
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, Gear, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.faces import ChosenFace
 from kedfem.scene.files import part_geometry
-from kedfem.scene.frames import following, following_links, link_frames
+from kedfem.scene.frames import corotational, corotational_links, link_frames
 from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, factor_table, load_factor, path_parameter
 from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing
@@ -25,7 +25,7 @@ from kedfem.scene.loads import (
 )
 from kedfem.scene.materials import Material
 from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
-from kedfem.scene.moving import holds_by_rows
+from kedfem.scene.moving_joints import by_constraint_equations
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import link_from, read_scene, scene_from
@@ -94,11 +94,11 @@ __all__ = [
     "TorqueLoad",
     "TorsionSpring",
     "TubeSection",
+    "by_constraint_equations",
+    "corotational",
+    "corotational_links",
     "drive_angle",
     "factor_table",
-    "following",
-    "following_links",
-    "holds_by_rows",
     "inertia_tensor",
     "link_frames",
     "link_from",

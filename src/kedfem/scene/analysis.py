@@ -39,15 +39,15 @@ def accuracy_or_quick(value: object) -> float | str:
 class Analysis(Record):
     """How long, in which steps, from which state."""
 
-    turns: Positive | None = None
-    """turns of the drive; for drives that turn at a constant speed, or speed up to one"""
+    revolutions: Positive | None = None
+    """revolutions of the drive; for drives that turn at a constant speed, or speed up to one"""
     end_time: PositiveTime | None = None
-    """end of the analysis, instead of `turns`"""
-    steps_per_turn: Annotated[StrictInt, Field(ge=4, le=10**9)] | None = None
-    """time steps in a turn (at the final speed); 720 if neither this nor `step` is given"""
+    """end of the analysis, instead of `revolutions`"""
+    steps_per_revolution: Annotated[StrictInt, Field(ge=4, le=10**9)] | None = None
+    """time steps in a revolution (at the final speed); 720 if neither this nor `step` is given"""
     step: PositiveTime | None = None
-    """time step, instead of `steps_per_turn`; shortened so that a whole number reaches the end"""
-    levels: Annotated[StrictInt, Field(ge=1, le=3)] | None = None
+    """time step, instead of `steps_per_revolution`; shortened so that a whole number reaches the end"""
+    extrapolation_levels: Annotated[StrictInt, Field(ge=1, le=3)] | None = None
     """levels in time: 2: the motion is solved in whole and in half steps, 3: in quarters too, and combined: of order 4 or
     6 in the step instead of 2, and its error is known; 1 if not given, or what `accuracy` chooses"""
     rho_inf: Annotated[float, Quantity("1", least=0.0, most=1.0)] = 0.95
@@ -68,27 +68,27 @@ class Analysis(Record):
     with one beside the deflection of `initial = "quasi-static"`"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
-    it by short trial runs: frames, elements, mesh sizes, segments, functions, step and levels in time, and fidelities
+    it by short trial runs: frames, elements, mesh sizes, segments, modes, step and levels in time, and fidelities
     that are `"auto"`. Without a drive elements of beams and the step are. `"quick"`: plain defaults are taken
     instead, which `kedfem run --quick` means too"""
-    reduction: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
+    reduction_tolerance: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3
     """relative error that reduced links may cause there"""
     stiffening: StrictBool = False
-    """whether stresses of the nominal motion stiffen the links: tension, as in fast rotors, makes them stiffer across it,
-    compression softer"""
-    solver: Literal["condensed", "literal"] = "condensed"
-    """condensed: one factorisation per link; literal: assembles and factors at every step"""
+    """whether stresses of the rigid-body motion stiffen the links: tension, as in fast rotors, makes them stiffer across
+    it, compression softer"""
+    solver: Literal["condensed", "monolithic"] = "condensed"
+    """condensed: one factorisation per link; monolithic: assembles and factors at every step"""
 
 
 class Animation(Record):
     """Frames for ParaView."""
 
-    frames_per_turn: Count = 36
-    """frames in a turn; in the whole analysis if the drive has no turns, or there is none"""
-    exaggeration: Positive = 1.0
+    frames_per_revolution: Count = 36
+    """frames in a revolution; in the whole analysis if the drive makes no revolutions, or there is none"""
+    deformation_scale: Positive = 1.0
     """factor on the elastic displacement; 1 in a scene without a drive"""
-    last_turns: Positive | None = None
-    """only so many turns, the last ones; all if not given"""
+    last_revolutions: Positive | None = None
+    """only so many revolutions, the last ones; all if not given"""
 
 
 ELASTIC = ("displacement", "velocity", "acceleration")
@@ -101,13 +101,13 @@ class Probe(Record):
     link: str
     """the link; a rigid one for motions only"""
     at: Point
-    """where, in the drawn position; of a rigid link anywhere"""
+    """where, in the reference position; of a rigid link anywhere"""
     quantity: Literal[
         "displacement", "velocity", "acceleration", "deflection", "position", "travel", "total_velocity",
         "total_acceleration", "stress",
     ]  # fmt: skip
     """displacement, velocity and acceleration: of the elastic motion, against the rigid mechanism, which a drive moves.
-    position, travel (from the drawn position), total_velocity and total_acceleration: of rigid and elastic motion
+    position, travel (from the reference position), total_velocity and total_acceleration: of rigid and elastic motion
     together, with a drive or without. deflection: of the link against a frame of its own, which goes with its chord"""
     chord: tuple[Point, Point] | None = None
     """of a deflection: two points of the link, between which the chord is; if not given its two joints farthest apart. A

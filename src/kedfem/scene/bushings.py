@@ -32,25 +32,25 @@ class Bushing(Record):
     """What a joint holds, held by springs and dampers; what it leaves free stays free.
 
     One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right angles to
-    z and to that world axis which is farthest from it as drawn (of equals the first), y at right angles to both. Without
-    an `axis` they are the world's as drawn. They are fixed in the joint's second link, or the ground if that is one.
-    """
+    z and to that world axis which is farthest from it in the reference position (of equals the first), y at right angles
+    to both. Without an `axis` they are the world's in the reference position. They are fixed in the joint's second link,
+    or the ground if that is one."""
 
     stiffness: Rates | None = None
     """of displacements; held rigidly if not given"""
     damping: Dampers = (0.0, 0.0, 0.0)
     """of displacements"""
-    turning_stiffness: TurningRates | None = None
+    rotational_stiffness: TurningRates | None = None
     """of turns; held rigidly if not given. Of a universal joint, whose one turn held is about the normal of its cross,
     the third"""
-    turning_damping: TurningDampers = (0.0, 0.0, 0.0)
+    rotational_damping: TurningDampers = (0.0, 0.0, 0.0)
     """of turns"""
 
     @model_validator(mode="after")
     def _springs(self) -> Self:
-        if self.stiffness is None and self.turning_stiffness is None:
-            refuse([(("stiffness",), "is required [N/m], or turning_stiffness [N m/rad], got neither")])
-        for stiffness, damping in (("stiffness", "damping"), ("turning_stiffness", "turning_damping")):
+        if self.stiffness is None and self.rotational_stiffness is None:
+            refuse([(("stiffness",), "is required [N/m], or rotational_stiffness [N m/rad], got neither")])
+        for stiffness, damping in (("stiffness", "damping"), ("rotational_stiffness", "rotational_damping")):
             if getattr(self, stiffness) is None and any(getattr(self, damping)):
-                refuse([((damping,), f"must stand with {stiffness}, got it alone")])
+                refuse([((damping,), f"must be combined with {stiffness}, got it alone")])
         return self

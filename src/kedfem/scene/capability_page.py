@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 
 from kedfem.scene.capabilities import CONSTRAINED, KINDS, REFUSALS, SHARED, Facts, Refusal, refusals
-from kedfem.scene.moving import SHARED as SHARED_KINDS
+from kedfem.scene.moving_joints import SHARED as SHARED_KINDS
 
 INTRODUCTION = """\
 # Capabilities
@@ -23,7 +23,7 @@ links in one plane) is in [scene.md](scene.md) and [meshing.md](meshing.md).
 It is executed (`python -m tests.cells`). Of {all} cells, each kind of joint with all frames, with and without a drive, on
 13 pairs of kinds of links, and each pair of these with one of 17 loads and laws, {ran} ran three steps from a loaded,
 moving start: as by the oracle, which assembles all tangents anew, to 1e-8 of the peak, 1e-7 with co-rotational frames,
-5e-7 with nominal ones and beams in space, where rounding beside the stiff rigid parts at their ends is 2e-7. {refused}
+5e-7 with rigid-body ones and beams in space, where rounding beside the stiff rigid parts at their ends is 2e-7. {refused}
 were refused by lines of the table.
 
 The page is made by `python -m kedfem.scene.capability_page > docs/capabilities.md`.
@@ -31,10 +31,10 @@ The page is made by `python -m kedfem.scene.capability_page > docs/capabilities.
 CELLS = (322, 430)
 """Of `tests.cells`: those that ran, and those that were refused."""
 COLUMNS: dict[str, Facts] = {
-    "nominal, driven": {"frames": "nominal", "drive": "given", "stiffening": "off"},
-    "nominal with stiffening, driven": {"frames": "nominal", "drive": "given", "stiffening": "on"},
-    "following, driven": {"frames": "following", "drive": "given", "stiffening": "off"},
-    "following, no drive": {"frames": "following", "drive": "none", "stiffening": "off"},
+    "rigid-body, driven": {"frames": "rigid-body", "drive": "given", "stiffening": "off"},
+    "rigid-body with stiffening, driven": {"frames": "rigid-body", "drive": "given", "stiffening": "on"},
+    "co-rotational, driven": {"frames": "co-rotational", "drive": "given", "stiffening": "off"},
+    "co-rotational, no drive": {"frames": "co-rotational", "drive": "none", "stiffening": "off"},
 }
 """Frames of a scene, with a drive and without one."""
 JOINTS: dict[str, Facts] = {

@@ -103,7 +103,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
             if link.has(key):
                 got = link.word(key) or "one"
                 yield link.fault(key, f"must not be given for a rigid link without a shape, got {got!r}")
-    for key in ("reduced", "functions"):
+    for key in ("reduced", "modes"):
         if link.has(key) and link.raw[key] is not False:
             yield link.fault(key, f"must be left out for a rigid link, got {shown(link.raw[key])}")
 
@@ -126,8 +126,8 @@ def elastic_faults(link: Entry) -> Iterator[str]:
     every_element = {name for names in ELEMENTS.values() for name in names}
     if element in every_element and element not in ELEMENTS[kind]:
         yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
-    if link.has("functions") and not (link.raw.get("reduced") is True or link.word("fidelity") == "reduced"):
-        yield link.fault("functions", f"must stand with reduced = true, got {shown(link.raw['functions'])}")
+    if link.has("modes") and not (link.raw.get("reduced") is True or link.word("fidelity") == "reduced"):
+        yield link.fault("modes", f"must be combined with reduced = true, got {shown(link.raw['modes'])}")
     if link.record is not None and link.record.mass:
         yield link.fault(
             "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {noun}"
@@ -162,7 +162,7 @@ def meshing_faults(link: Entry) -> Iterator[str]:
             ("unknowns", "elements_across"),
         ):
             if link.has("mesh", key) and link.has("mesh", other):
-                yield link.fault("mesh", f"must stand without {other}, got both", key)
+                yield link.fault("mesh", f"cannot be combined with {other}, got both", key)
 
 
 def count_faults(link: Entry, counted: str) -> Iterator[str]:
@@ -212,7 +212,7 @@ def direction_faults(joint: Entry) -> Iterator[str]:
             "universal",
             "is required for a universal joint: two axes, of the first link and of the second",
         ),
-        ("lead", "screw", "is required for a screw [m], travel in one turn"),
+        ("lead", "screw", "is required for a screw [m], travel in one revolution"),
     ):
         if kind == owner and not joint.has(key):
             yield joint.fault(key, f"{wanted}, got nothing")
@@ -231,7 +231,7 @@ def direction_faults(joint: Entry) -> Iterator[str]:
 def seat_faults(joint: Entry, parts: Parts) -> Iterator[str]:
     """Ports and faces of links that the joint does not join, and faces of links that have none."""
     names = link_names(joint)
-    for key in ("port", "faces"):
+    for key in ("coupling", "faces"):
         given = joint.raw.get(key)
         for name in given if isinstance(given, Mapping) else ():
             link = parts.links.get(name)
@@ -254,7 +254,7 @@ def connected(start: str, pairs: list[list[str]]) -> set[str]:
 def drive_faults(parts: Parts) -> Iterator[str]:
     """Drives on joints that cannot be driven, or twice, or with a law for another kind of joint."""
     if parts.drive.where and parts.drives:
-        yield line(("drives",), "must stand without drive, got both")
+        yield line(("drives",), "cannot be combined with drive, got both")
     met: dict[str, Entry] = {}
     for drive in parts.all_drives:
         joint = parts.joints.get(drive.word("joint") or "")

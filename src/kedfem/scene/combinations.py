@@ -10,7 +10,7 @@ from kedfem.scene.damping import rayleigh
 from kedfem.scene.faults import place
 from kedfem.scene.frames import default_frames
 from kedfem.scene.links import GROUND
-from kedfem.scene.moving import moving_joints
+from kedfem.scene.moving_joints import moving_joints
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import rigid_in_space
 from kedfem.scene.wording import shown
@@ -34,16 +34,16 @@ def frames_of(parts: Parts, link: Entry | None = None) -> str:
     return own or parts.analysis.word("frames") or default_frames(parts.driven)
 
 
-def any_following(parts: Parts) -> bool:
-    """Whether any link has frames that follow it."""
-    return any(frames_of(parts, link) == "following" for link in parts.links.values())
+def any_corotational(parts: Parts) -> bool:
+    """Whether any link has co-rotational frames."""
+    return any(frames_of(parts, link) == "co-rotational" for link in parts.links.values())
 
 
 def common_facts(parts: Parts) -> dict[str, str]:
     """What the whole scene says."""
     record = parts.analysis.record
     return {
-        "frames": "following" if any_following(parts) else "nominal",
+        "frames": "co-rotational" if any_corotational(parts) else "rigid-body",
         "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
         "drive": "given" if parts.driven else "none",
         "rho_inf": "1" if record is not None and record.rho_inf == 1.0 else "below 1",
@@ -66,8 +66,8 @@ def joints(parts: Parts) -> Iterator[Told]:
         words["noun"] = f"a {driven}{kind} joint"
         if joint.record.bushing is not None:
             words |= {"key": "bushing", "noun": "one"}
-            turns = joint.record.bushing.turning_stiffness is not None
-            facts["bushing"] = "against turns" if turns else "given"
+            turns = joint.record.bushing.rotational_stiffness is not None
+            facts["bushing"] = "against rotations" if turns else "given"
         yield "joints", facts, words
 
 
@@ -140,7 +140,7 @@ def analysis(parts: Parts) -> Iterator[Told]:
         yield "analysis", only(frames=str(entry.word("frames"))), words
     if entry.word("initial"):
         yield "analysis", only(start=str(entry.word("initial"))), words
-    for key in ("turns", "steps_per_turn"):
+    for key in ("revolutions", "steps_per_revolution"):
         if entry.has(key):
             yield "analysis", only(time=key), words
     for key in ("initial_speeds", "initial_motions"):

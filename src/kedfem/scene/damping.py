@@ -49,7 +49,7 @@ def damping_faults(damping: Damping) -> list[Fault]:
             [] if damping.frequencies is None else [(("ratio",), "is required with frequencies, got nothing")]
         )
     if damping.alpha or damping.beta:
-        return [(("ratio",), "must stand without alpha and beta, got both")]
+        return [(("ratio",), "cannot be combined with alpha and beta, got both")]
     if damping.frequencies is None:
         return [(("frequencies",), "is required with ratio [Hz], got nothing")]
     first, second = damping.frequencies

@@ -65,7 +65,7 @@ class Table(Record):
     time: tuple[Time, ...] = ()
     """times, increasing, from 0 or before"""
     angle: tuple[Angle, ...] = ()
-    """angle at these times, from the drawn position"""
+    """angle at these times, from the reference position"""
     travel: tuple[Length, ...] = ()
     """of a prismatic joint: travel at these times, instead of angles"""
     file: FileName | None = None
@@ -80,9 +80,9 @@ class Table(Record):
         if self.file is None:
             refuse(table_faults(self.time, key, self.values, at_least=2))
         elif self.time or self.values:
-            refuse([(("file",), f"must stand without time and {key}, got both")])
+            refuse([(("file",), f"cannot be combined with time and {key}, got both")])
         if self.travel and self.angle:
-            refuse([(("travel",), "must stand without angle, got both")])
+            refuse([(("travel",), "cannot be combined with angle, got both")])
         if self.smooth is None:
             return self
         try:
@@ -108,7 +108,7 @@ class _Rise(Record):
         if self.angle is None and self.travel is None:
             refuse([(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
         if self.angle is not None and self.travel is not None:
-            refuse([(("travel",), "must stand without angle, got both")])
+            refuse([(("travel",), "cannot be combined with angle, got both")])
         return self
 
     @property
@@ -168,7 +168,7 @@ class Drive(Record):
     joint: str
     """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
-    """how it turns or slides, from the drawn position"""
+    """how it turns or slides, from the reference position"""
     shaft_stiffness: ShaftStiffness | None = None
     """of a hinge: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
     given"""
@@ -178,7 +178,7 @@ class Drive(Record):
     @model_validator(mode="after")
     def _damped_shaft(self) -> Drive:
         if self.shaft_damping and self.shaft_stiffness is None:
-            refuse([(("shaft_damping",), "must stand with shaft_stiffness, got it alone")])
+            refuse([(("shaft_damping",), "must be combined with shaft_stiffness, got it alone")])
         return self
 
 
@@ -205,7 +205,7 @@ class Gear(Record):
         if not given:
             refuse([(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
         if len(given) > 1:
-            refuse([((given[1],), f"must stand without {given[0]}, got both")])
+            refuse([((given[1],), f"cannot be combined with {given[0]}, got both")])
         if self.internal and self.teeth is None:
             refuse([(("internal",), "must be given with teeth only, got it without")])
         for key in given:

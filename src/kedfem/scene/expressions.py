@@ -1,4 +1,4 @@
-"""Expressions such as ``"=2*r + 5 mm"``: numbers with units, parameters, a few functions; nothing else is worked out.
+"""Expressions such as ``"=2*r + 5 mm"``: numbers with units, parameters, a few modes; nothing else is worked out.
 
 The text becomes Python's syntax tree, of which only arithmetic is walked; pint multiplies and compares units.
 """
@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from kedfem.scene.units import crossed, turns, unit_of, unit_registry
+from kedfem.scene.units import crossed, revolutions, unit_of, unit_registry
 from kedfem.scene.wording import shown, unknown_name
 
 LONGEST_EXPRESSION = 200  # letters
@@ -67,7 +67,7 @@ def evaluated(text: str, known: Mapping[str, Any]) -> Any:
 
 def plain_number(quantity: Any) -> float | int | None:
     """The number of a quantity without a unit, whole numbers as such; None if it has a unit."""
-    if not quantity.dimensionless or turns(quantity._units):
+    if not quantity.dimensionless or revolutions(quantity._units):
         return None
     number = float(quantity.m_as(""))
     return int(number) if number.is_integer() and abs(number) < 2**53 else number
@@ -189,9 +189,9 @@ def alike(*each: Any) -> None:
         if first.dimensionality != other.dimensionality:
             raise ValueError(f"it mixes units: {named(first)} and {named(other)}")
         for one, two in ((first, other), (other, first)):
-            if crossed(one._units, "rad/s") and turns(two._units):
+            if crossed(one._units, "rad/s") and revolutions(two._units):
                 raise ValueError(f"it mixes cycles and turns or radians: {named(one)} and {named(two)}")
-            if not one._units and turns(two._units):
+            if not one._units and revolutions(two._units):
                 raise ValueError(f"it mixes units: {named(one)} and {named(two)}")
 
 

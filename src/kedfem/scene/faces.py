@@ -37,7 +37,7 @@ class ChosenFace(Record):
             got = " and ".join(given) or "none of them"
             refuse([((), f"must say what the face is by one of {', '.join(FORMS)}, got {got}")])
         if self.axis is not None and self.cylinder is None:
-            refuse([(("axis",), f"must stand with cylinder, got it with {given[0]}")])
+            refuse([(("axis",), f"must be combined with cylinder, got it with {given[0]}")])
         return self
 
     @property

@@ -1,4 +1,4 @@
-"""Which links have frames that follow their own motion, and which the nominal one."""
+"""Which links have co-rotational frames, and which the nominal one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
 
-Frames = Literal["nominal", "following"]
+Frames = Literal["rigid-body", "co-rotational"]
 
 
 def link_frames(scene: Scene, name: str) -> Frames:
@@ -17,14 +17,14 @@ def link_frames(scene: Scene, name: str) -> Frames:
 
 def default_frames(driven: bool) -> Frames:
     """Frames where none are asked for: nominal with a drive; without one nothing prescribes them."""
-    return "nominal" if driven else "following"
+    return "rigid-body" if driven else "co-rotational"
 
 
-def following_links(scene: Scene) -> frozenset[str]:
-    """Names of the links with frames that follow their own motion."""
-    return frozenset(name for name in scene.links if link_frames(scene, name) == "following")
+def corotational_links(scene: Scene) -> frozenset[str]:
+    """Names of the links with co-rotational frames."""
+    return frozenset(name for name in scene.links if link_frames(scene, name) == "co-rotational")
 
 
-def following(scene: Scene) -> bool:
+def corotational(scene: Scene) -> bool:
     """Whether any link's frames follow its own motion: the equation is then not linear."""
-    return bool(following_links(scene))
+    return bool(corotational_links(scene))

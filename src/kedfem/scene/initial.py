@@ -15,7 +15,7 @@ from kedfem.scene.units import Quantity, Speed, fault
 
 Velocity = Annotated[float, Quantity("m/s")]
 VelocityVector = Annotated[tuple[Velocity, Velocity, Velocity], BeforeValidator(as_vector)]
-SpinVector = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vector)]
+AngularVelocity = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vector)]
 
 
 def joint_speed(value: object) -> float:
@@ -34,7 +34,7 @@ class InitialForce(Record):
     link: str
     """the link it acts on, an elastic one"""
     at: Point
-    """where, in the drawn position"""
+    """where, in the reference position"""
     force: ForceVector
     """the force, in the world"""
 
@@ -46,14 +46,14 @@ class InitialMotion(Record):
     """How a link moves at the start."""
 
     at: Point
-    """a point of the link, in the drawn position"""
+    """a point of the link, in the reference position"""
     velocity: VelocityVector | None = None
     """velocity of this point; left open if not given"""
-    spin: SpinVector | None = None
+    angular_velocity: AngularVelocity | None = None
     """rotational speed of the link, a vector; left open if not given"""
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
-        given = self.velocity is not None or self.spin is not None
+        given = self.velocity is not None or self.angular_velocity is not None
         refuse([] if given else [(("velocity",), "is required [m/s], or spin [rad/s], got neither")])
         return self

@@ -30,7 +30,7 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
     Returns
     -------
     phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²; of a slide m, m/s, m/s²]
-        Relative to the drawn position; right-hand derivatives where a law has a jump.
+        Relative to the reference position; right-hand derivatives where a law has a jump.
 
     Raises
     ------

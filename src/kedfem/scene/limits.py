@@ -68,15 +68,17 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
     analysis = parts.analysis
     if not analysis.raw and analysis.record is None:
         return
-    if analysis.has("turns") and analysis.has("end_time"):
-        yield analysis.fault("turns", "must stand without end_time, got both")
-    if not analysis.has("turns") and not analysis.has("end_time"):
+    if analysis.has("revolutions") and analysis.has("end_time"):
+        yield analysis.fault("revolutions", "cannot be combined with end_time, got both")
+    if not analysis.has("revolutions") and not analysis.has("end_time"):
         key, wanted = (
-            ("turns", "is required, or end_time [s]") if parts.driven else ("end_time", "is required [s]")
+            ("revolutions", "is required, or end_time [s]")
+            if parts.driven
+            else ("end_time", "is required [s]")
         )
         yield analysis.fault(key, f"{wanted}, got {'neither' if parts.driven else 'nothing'}")
-    if analysis.has("step") and analysis.has("steps_per_turn"):
-        yield analysis.fault("step", "must stand without steps_per_turn, got both")
+    if analysis.has("step") and analysis.has("steps_per_revolution"):
+        yield analysis.fault("step", "cannot be combined with steps_per_revolution, got both")
     if parts.driven:
         yield from open_fidelity_faults(parts)
     drives = [drive for drive in parts.all_drives if drive.record is not None]
@@ -113,10 +115,10 @@ def steps_faults(
 ) -> Iterator[str]:  # fmt: skip
     """Turns that are asked for where there are none, and a step that is not given."""
     analysis = parts.analysis
-    for key, instead in (("turns", "end_time"), ("steps_per_turn", "step")):
+    for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step")):
         if analysis.has(key):
             yield analysis.fault(key, f"needs {wanted} (else {instead} [s]), got {got}")
-    stated = any(analysis.has(key) for key in ("step", "steps_per_turn"))
+    stated = any(analysis.has(key) for key in ("step", "steps_per_revolution"))
     if not stated and analysis.word("accuracy") == "quick":
         yield analysis.fault("step", f"is required with {doing} [s], got {got}")
 
@@ -126,7 +128,7 @@ def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[str]:
     motion = drive.record.motion
     stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
     if stays and motion.dwell_after > 0.0:
-        yield drive.fault("motion", "must stand with return_time, got no return", "dwell_after")
+        yield drive.fault("motion", "must be combined with return_time, got no return", "dwell_after")
     if not isinstance(motion, Table) or not motion.time:
         return
     if motion.time[0] > 0.0:

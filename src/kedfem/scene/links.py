@@ -31,8 +31,8 @@ JointKind = Literal[
 DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
 ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
 SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
-PORTS = ("averaged", "stiff")
-Port = Literal["averaged", "stiff"]
+COUPLINGS = ("distributing", "rigid")
+Coupling = Literal["distributing", "rigid"]
 
 
 def counts(value: object) -> object:
@@ -60,7 +60,7 @@ class Meshing(Record):
     """other shapes, solid: number through the thickness; of a part from CAD the least through each of its layers"""
     unknowns: Annotated[StrictInt, Field(ge=100)] | None = None
     """a part from CAD: about so many unknowns, instead of `size` or `elements_across`"""
-    ignore: PositiveLength | None = None
+    defeature_size: PositiveLength | None = None
     """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
     then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""
     kind: Literal["hexahedra"] | None = None
@@ -81,10 +81,10 @@ class LinkScene(Record):
     """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
     `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
     reduced: StrictBool = False
-    """whether an elastic link moves in the span of a few functions only: as many as `analysis.reduction` asks for; with
-    frames that follow each segment does, and beams stay in full"""
-    functions: Count | None = None
-    """number of these functions, instead of `analysis.reduction`; with frames that follow of each segment"""
+    """whether an elastic link moves in the span of a few modes only: as many as `analysis.reduction_tolerance` asks for;
+    with co-rotational frames each segment does, and beams stay unreduced"""
+    modes: Count | None = None
+    """number of these modes, instead of `analysis.reduction_tolerance`; with co-rotational frames of each segment"""
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
@@ -108,9 +108,9 @@ class LinkScene(Record):
     frames: Frames | None = None
     """frames of this link, if other than those of the analysis"""
     segments: Count | None = None
-    """number of segments, each with a frame of its own, of a solid or plane link with frames that follow: 6 if not given,
-    fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a beam are
-    its elements"""
+    """number of segments, each with a frame of its own, of a solid or plane link with co-rotational frames: 6 if not
+    given, fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a
+    beam are its elements"""
 
     @model_validator(mode="before")
     @classmethod
@@ -120,7 +120,7 @@ class LinkScene(Record):
     @model_validator(mode="after")
     def _defaults(self) -> Self:
         if self.step is not None and not (isinstance(self.shape, Cad) and self.shape.file == self.step):
-            refuse([(("step",), "must stand without shape, got both")])
+            refuse([(("step",), "cannot be combined with shape, got both")])
         if self.fidelity == "reduced":
             self.fill(fidelity=self.family, reduced=True)
         element = self.element or self._usual_element()
@@ -164,12 +164,12 @@ def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
     return {name: what(each) for name, each in value.items()}
 
 
-def ports(value: object) -> object:
-    """How a joint holds its seats: one word, or one for each link."""
+def couplings(value: object) -> object:
+    """How a joint holds its coupling surfaces: one word, or one for each link."""
     if isinstance(value, Mapping):
-        return of_links(value, ports)
-    if value not in PORTS:
-        raise fault(one_of(list(PORTS), value))
+        return of_links(value, couplings)
+    if value not in COUPLINGS:
+        raise fault(one_of(list(COUPLINGS), value))
     return value
 
 
@@ -198,10 +198,10 @@ class Joint(Record):
     axes: tuple[Axis, Axis] | None = None
     """of a universal joint: the axis in the first link and that in the second, at right angles"""
     lead: Annotated[float, Quantity("m")] | None = None
-    """of a screw: travel in one turn, positive if right-handed"""
-    port: Annotated[Port | dict[str, Port], BeforeValidator(ports)] = "averaged"
-    """how it holds bores and faces of solids and plane links: by their mean displacement and turn, or so that they keep
-    their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "stiff" }`"""
+    """of a screw: travel in one revolution, positive if right-handed"""
+    coupling: Annotated[Coupling | dict[str, Coupling], BeforeValidator(couplings)] = "distributing"
+    """how it holds bores and faces of solids and plane links: by their mean displacement and rotation, or so that they
+    keep their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
     faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
     """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
     groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
@@ -211,8 +211,8 @@ class Joint(Record):
     """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
 
     def stiff(self, link: str) -> bool:
-        """Whether the seat on a link keeps its shape."""
-        return (self.port.get(link) if isinstance(self.port, dict) else self.port) == "stiff"
+        """Whether the coupling surface on a link keeps its shape."""
+        return (self.coupling.get(link) if isinstance(self.coupling, dict) else self.coupling) == "rigid"
 
     def face_names(self, link: str) -> tuple[str, ...]:
         """What the faces of a link that hold it are called: their names, or what was said of them."""

@@ -35,7 +35,7 @@ class Factor(Record):
     """What a load is multiplied by: linear between the points of a table, held outside or repeated."""
 
     over: Literal["time", "angle"] = "time"
-    """what it depends on; angle: that of the drive, from the drawn position"""
+    """what it depends on; angle: that of the drive, from the reference position"""
     time: tuple[Time, ...] = ()
     """times, increasing: short for `over = "time"` and `at`"""
     at: tuple[Abscissa, ...] = ()
@@ -52,7 +52,9 @@ class Factor(Record):
     def _one_value_per_point(self) -> Self:
         if self.file is not None:
             refuse(
-                [(("file",), "must stand without at and value, got both")] if self.at or self.value else []
+                [(("file",), "cannot be combined with at and value, got both")]
+                if self.at or self.value
+                else []
             )
             return self
         if self.time:
@@ -67,7 +69,7 @@ class Factor(Record):
         if self.over != "time":
             return [(("time",), "must be left out over an angle (it has at), got times")]
         if self.at and self.at != self.time:
-            return [(("at",), "must stand without time, got both")]
+            return [(("at",), "cannot be combined with time, got both")]
         return table_faults(self.time, "value", self.value)
 
     def _repeats(self) -> float | None:
@@ -126,11 +128,11 @@ class ForceLoad(Record):
     link: str
     """the link it acts on"""
     at: Point
-    """where, in the drawn position"""
+    """where, in the reference position"""
     vector: ForceVector
     """the force"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
+    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
     factor: FactorOver = ONE
     """a number, or a table over time or the drive's angle: `{ over = "angle", at = [...], value = [...] }`"""
 
@@ -144,7 +146,7 @@ class BodyLoad(Record):
     vector: BodyVector
     """the force per volume"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
+    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
     factor: FactorOver = ONE
     """a number, or a table over time or the drive's angle: `{ over = "angle", at = [...], value = [...] }`"""
 
@@ -156,11 +158,11 @@ class SurfaceLoad(Record):
     link: str
     """the link it acts on"""
     at: Point
-    """a point of the flat or cylindrical face, in the drawn position"""
+    """a point of the flat or cylindrical face, in the reference position"""
     vector: SurfaceVector
     """the force per area"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
+    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
     factor: FactorOver = ONE
     """a number, or a table over time or the drive's angle: `{ over = "angle", at = [...], value = [...] }`"""
 
@@ -172,7 +174,7 @@ class PressureLoad(Record):
     link: str
     """the link it acts on"""
     at: Point
-    """a point of the flat or curved face, in the drawn position"""
+    """a point of the flat or curved face, in the reference position"""
     pressure: Pressure
     """force per area, positive pushing on the face"""
     factor: FactorOver = ONE
@@ -180,20 +182,20 @@ class PressureLoad(Record):
 
 
 class TorqueLoad(Record):
-    """A torque on a bore, face or section of a link: on the mean turn of it."""
+    """A torque on a bore, face or section of a link: on the mean rotation of it."""
 
     kind: Literal["torque"] = "torque"
     link: str
     """the link it acts on"""
     at: Point | None = None
     """a point on the axis of a bore or journal, or of a face; of a beam a point of its axis, of one in space one where it
-    has a node; in the drawn position"""
+    has a node; in the reference position"""
     joint: str | None = None
     """a joint of the link, on whose bore or face it acts, instead of `at`"""
     vector: TorqueVector
     """the torque"""
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the drawn position, turns with the link from there"""
+    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
     factor: FactorOver = ONE
     """a number, or a table over time or the drive's angle: `{ over = "angle", at = [...], value = [...] }`"""
 
@@ -202,7 +204,7 @@ class TorqueLoad(Record):
         if self.at is None and self.joint is None:
             refuse([(("at",), "is required [m], or a joint of the link, got neither")])
         if self.at is not None and self.joint is not None:
-            refuse([(("at",), "must stand without joint, got both")])
+            refuse([(("at",), "cannot be combined with joint, got both")])
         return self
 
 
@@ -246,9 +248,9 @@ class RigidBody(Record):
     mass: Annotated[float, Quantity("kg", above=0.0)]
     """its mass"""
     inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
-    """tensor about its centre, as drawn: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm and so on"""
+    """tensor about its centre in the reference position: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm and so on"""
     centre: Point
-    """its centre of mass in the drawn position"""
+    """its centre of mass in the reference position"""
 
     @model_validator(mode="after")
     def _possible_inertia(self) -> Self:

@@ -38,7 +38,7 @@ class TorqueCurve(Curve):
 
     units: ClassVar[dict[str, str]] = {"time": "s", "speed": "rad/s", "angle": "rad"}
     over: Literal["time", "speed", "angle"]
-    """what it depends on; speed and angle are those of the joint, the angle from the drawn position"""
+    """what it depends on; speed and angle are those of the joint, the angle from the reference position"""
     at: tuple[Abscissa, ...]
     """times, speeds or angles, increasing"""
     value: tuple[Torque, ...]
@@ -50,7 +50,7 @@ class ForceCurve(Curve):
 
     units: ClassVar[dict[str, str]] = {"time": "s", "speed": "m/s", "travel": "m"}
     over: Literal["time", "speed", "travel"]
-    """what it depends on; speed and travel are those of the joint, the travel from the drawn position"""
+    """what it depends on; speed and travel are those of the joint, the travel from the reference position"""
     at: tuple[Abscissa, ...]
     """times, speeds or travels, increasing"""
     value: tuple[Force, ...]
@@ -74,7 +74,7 @@ class Motor(Record):
 
     joint: str
     """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force; between links that
-    both move a force needs frames that follow"""
+    both move a force needs co-rotational frames"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
     force: ForceOver | None = None
@@ -85,7 +85,7 @@ class Motor(Record):
         if self.torque is None and self.force is None:
             refuse([(("torque",), "is required [N*m], or force [N] of a slider, got neither")])
         if self.torque is not None and self.force is not None:
-            refuse([(("torque",), "must stand without force, got both")])
+            refuse([(("torque",), "cannot be combined with force, got both")])
         return self
 
     @property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kedfem.scene.apart import Apart
 from kedfem.scene.checks import NOUNS, fidelity, link_names
-from kedfem.scene.moving import moving_joints
+from kedfem.scene.moving_joints import moving_joints
 from kedfem.scene.parts import NONE, Entry, Parts
 from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import Bar, Polyline

@@ -111,8 +111,10 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     (
         "bushing of a joint",
         "One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right "
-        "angles to z and to\nthat world axis which is farthest from it as drawn (of equals the first), y at right angles "
-        "to both. Without an `axis` they are\nthe world's as drawn. They are fixed in the joint's second link, or the "
+        "angles to z and to\nthat world axis which is farthest from it in the reference position (of equals "
+        "the first), y at right angles "
+        "to both. Without an `axis` they are\nthe world's in the reference position. They are fixed in the "
+        "joint's second link, or the "
         "ground if that is one.",
         [bushings.Bushing],
     ),
@@ -163,7 +165,7 @@ NAMED = {
     bushings.TurningDampers: ("number or 3 × number ≥ 0", "N·m·s/rad"),
     initial.JointSpeed: ("number", "rad/s or m/s"),
     initial.VelocityVector: ("vector", "m/s"),
-    initial.SpinVector: ("vector", "rad/s"),
+    initial.AngularVelocity: ("vector", "rad/s"),
 }
 
 

@@ -28,12 +28,10 @@ from kedfem.scene.checks import (
 )
 from kedfem.scene.combinations import combination_faults
 from kedfem.scene.damping import Damping
-from kedfem.scene.doubts import bare_numbers
 from kedfem.scene.drives import Drive, Gear, MotionLaw
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_factor_tables, with_motion_tables
 from kedfem.scene.frames import default_frames
-from kedfem.scene.free import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
 from kedfem.scene.limits import analysis_faults, file_faults, planar_faults
 from kedfem.scene.links import Joint, LinkScene, spelt_out
 from kedfem.scene.loads import Body, Load
@@ -46,6 +44,8 @@ from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
 from kedfem.scene.springs import Spring
 from kedfem.scene.timing import time_grid
+from kedfem.scene.undriven import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
+from kedfem.scene.unit_plausibility import bare_numbers
 
 MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than a disk holds
 GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
@@ -82,7 +82,7 @@ class Scene(Record):
     """joints whose motions are in proportion: gears, belts, racks"""
     drive: Drive | None = None
     """what moves the mechanism; without one it moves by itself: under motors, springs, gravity and other loads, from its
-    initial speeds, with frames that follow"""
+    initial speeds, with co-rotational frames"""
     drives: dict[Name, Drive] = Field(default_factory=dict)
     """several drives, by name, instead of `drive`"""
     motors: dict[Name, Motor] = Field(default_factory=dict)

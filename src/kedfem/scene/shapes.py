@@ -151,7 +151,7 @@ class Polyline(Record):
         given = [key for key in ("width", "thickness") if getattr(self, key) is not None]
         faults: list[Fault] = []
         if self.section is not None and given:
-            faults.append((("section",), f"must stand without {' and '.join(given)}, got both"))
+            faults.append((("section",), f"cannot be combined with {' and '.join(given)}, got both"))
         elif self.section is None:
             other = "a section instead of width and thickness"
             faults += [

@@ -25,7 +25,7 @@ class SpringEnd(Record):
     link: str
     """the link, or `"ground"`"""
     at: Point
-    """where, in the drawn position"""
+    """where, in the reference position"""
 
 
 class _Elastic(Record):
@@ -43,9 +43,9 @@ class _Elastic(Record):
             return self
         for key in ("free_length", "free_travel", "free_angle"):
             if getattr(self, key, None) is not None:
-                refuse([(("preload",), f"must stand without {key}, got both")])
+                refuse([(("preload",), f"cannot be combined with {key}, got both")])
         if not getattr(self, "stiffness", 1.0):
-            refuse([(("preload",), "must stand with a stiffness, got none")])
+            refuse([(("preload",), "must be combined with a stiffness, got none")])
         return self
 
 
@@ -61,17 +61,17 @@ class LineSpring(_Elastic):
     """its two ends, each `{ link = "...", at = point }`"""
     joint: str | None = None
     """a prismatic or cylindrical joint that it lies along, instead of two ends; between links that both move it needs
-    frames that follow"""
+    co-rotational frames"""
     stiffness: Stiffness = 0.0
     """k"""
     damping: Damper = 0.0
     """c"""
     free_length: FreeLength | None = None
-    """l0 between two points, at which it does not pull; as long as drawn if not given"""
+    """l0 between two points, at which it does not pull; as long in the reference position if not given"""
     free_travel: Length | None = None
-    """l0 along a slide, at which it does not pull; 0, the drawn position, if not given"""
+    """l0 along a slide, at which it does not pull; 0, the reference position, if not given"""
     preload: Force | None = None
-    """with what it pulls in the drawn position, instead of l0; negative: it pushes"""
+    """with what it pulls in the reference position, instead of l0; negative: it pushes"""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
@@ -82,7 +82,7 @@ class LineSpring(_Elastic):
                 refuse([(("free_length",), "must be free_travel [m] along a joint, got a length")])
             return self
         if self.joint is not None:
-            refuse([(("between",), "must stand without joint, got both")])
+            refuse([(("between",), "cannot be combined with joint, got both")])
         if self.free_travel is not None:
             refuse([(("free_travel",), "must be free_length [m] between two points, got a travel")])
         a, b = self.between
@@ -113,10 +113,10 @@ class TorsionSpring(_Elastic):
     damping: TorsionDamper = 0.0
     """c"""
     free_angle: Angle | None = None
-    """φ0, at which it does not turn, from the drawn position; 0 if not given: the turn of the joint's first link that is
-    not the ground against the other, about the joint's axis"""
+    """φ0, at which it does not turn, from the reference position; 0 if not given: the rotation of the joint's first link
+    that is not the ground against the other, about the joint's axis"""
     preload: Torque | None = None
-    """with what it turns back in the drawn position, −k φ0, instead of φ0"""
+    """with what it turns back in the reference position, −k φ0, instead of φ0"""
 
     @property
     def free(self) -> float:

@@ -14,7 +14,7 @@ from kedfem.scene.laws import drive_angle
 if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
 
-STEPS_PER_TURN = 720
+STEPS_PER_REVOLUTION = 720
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,9 @@ def scene_speed(scene: Scene) -> float:
     return 0.0 if slides else turning_speed(scene.motion)
 
 
-def time_of_turns(motion: MotionLaw, turns: float) -> float:
+def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
     """Time [s] at which a drive that goes on turning has made so many turns."""
-    angle, speed = 2.0 * math.pi * turns, turning_speed(motion)
+    angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
     if isinstance(motion, ConstantSpeed):
         return angle / speed
     if not isinstance(motion, Ramp):
@@ -67,13 +67,13 @@ def time_of_turns(motion: MotionLaw, turns: float) -> float:
 def time_grid(scene: Scene) -> TimeGrid:
     """Step and number of steps of a scene's analysis.
 
-    With ``steps_per_turn`` the step is the turn at the drive's final speed, divided, and the last step may
+    With ``steps_per_revolution`` the step is the turn at the drive's final speed, divided, and the last step may
     pass the end; ``step`` is shortened so that a whole number reaches the end.
     """
     analysis, motion = scene.analysis, scene.motion
     end = analysis.end_time
-    if motion is not None and analysis.turns is not None:
-        end = time_of_turns(motion, analysis.turns)
+    if motion is not None and analysis.revolutions is not None:
+        end = time_of_revolutions(motion, analysis.revolutions)
     if end is None:
         raise ValueError("an analysis needs turns or an end time")
     if analysis.step is not None:
@@ -81,8 +81,8 @@ def time_grid(scene: Scene) -> TimeGrid:
         return TimeGrid(end / steps, steps)
     speed = scene_speed(scene)
     if not speed:
-        return TimeGrid(end / STEPS_PER_TURN, STEPS_PER_TURN)
-    step = 2.0 * math.pi / (speed * (analysis.steps_per_turn or STEPS_PER_TURN))
+        return TimeGrid(end / STEPS_PER_REVOLUTION, STEPS_PER_REVOLUTION)
+    step = 2.0 * math.pi / (speed * (analysis.steps_per_revolution or STEPS_PER_REVOLUTION))
     return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
 
 

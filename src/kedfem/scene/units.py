@@ -163,7 +163,7 @@ def unit_of(given: str, wanted: str = "") -> Any:
         raise ValueError(f"{given!r} is not a unit") from None
 
 
-def turns(unit: Mapping[str, float]) -> float:
+def revolutions(unit: Mapping[str, float]) -> float:
     """The power of an angle in a unit, given as powers of names: 1 of rpm or rad/s, 0 of Hz."""
     return float(sum(power for name, power in unit.items() if name in TURNING))
 
@@ -171,8 +171,8 @@ def turns(unit: Mapping[str, float]) -> float:
 def crossed(given: Mapping[str, float], unit: str) -> bool:
     """Whether a unit counts cycles where rad/s is wanted, or turns where Hz is: the factor 2π would be a guess."""
     if unit == "Hz":
-        return turns(given) != 0.0
-    return unit == "rad/s" and not CYCLES.isdisjoint(given) and turns(given) == 0.0
+        return revolutions(given) != 0.0
+    return unit == "rad/s" and not CYCLES.isdisjoint(given) and revolutions(given) == 0.0
 
 
 def meant(given: str, unit: str) -> str:

@@ -6,10 +6,15 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
+from kedfem.scene.old_words import KEYS, VALUES
+
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that looks most like ``word``, or None."""
+    """The known word that ``word`` was renamed to, or that looks most like it; None if there is none."""
     lower = {name.lower(): name for name in known}
+    for renamed in (KEYS, VALUES):
+        if renamed.get(word) in lower:
+            return renamed[word]
     close = get_close_matches(word.lower(), lower, n=1, cutoff=0.65)
     return lower[close[0]] if close else None
 

@@ -94,7 +94,7 @@ def rigid_motions(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "N m"]:
 
 
 def _position(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "n d"]:
-    """Rows of body k against the origin that its nominal motion turns, world components; of ψ those of u."""
+    """Rows of body k against the origin that its rigid-body motion turns, world components; of ψ those of u."""
     link = now.of.system.model.links[k]
     out = drawn(link) @ now.R[k][: link.d, : link.d].T + rows(now.of, k, u[own(now.of, k)])
     if link.kind == "beam":

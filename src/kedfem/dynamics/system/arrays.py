@@ -192,7 +192,7 @@ class State(NamedTuple):
     time : (1,) [s]
     u, v, a : (N,) δ, δ', δ'' in coordinates, world components
     F, f : (N,) applied and internal force, world components
-    damped : (3N,) per body (3, N): damping force without its rate, and its rates, in the nominal frame
+    damped : (3N,) per body (3, N): damping force without its rate, and its rates, in the rigid-body frame
     momentum : (3N,) per sparse body (3, N): M δ, M δ', M δ'' in world components
     seen : (3N,) per co-rotational body (3, N): deformation g and its rates
     Q, angle : (bodies, 3, 3), (bodies,) the frames' rotation in the nominal one; of planar bodies its angle, with turns
@@ -241,7 +241,8 @@ class History(NamedTuple):
     """What a march records at each of T times; as in `State`, and R (T, bodies, 3, 3) the frames, link to world.
 
     g : (T, N) deformation; strain : (T, beams, 3, points) of planar beams; energy : (T, bodies) ½ gᵀ K0 g [J]
-    Kg : (T, N) K0 g of bodies with nominal frames; Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones among
+    Kg : (T, N) K0 g of bodies with rigid-body frames; Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones
+    among
         them, (0, N) without any
     """
 
@@ -264,7 +265,7 @@ class History(NamedTuple):
 
 
 class Driving(NamedTuple):
-    """The nominal motion and loads over T times.
+    """The rigid-body motion and loads over T times.
 
     t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
     drives : (T, D)
@@ -292,7 +293,7 @@ class Trial(NamedTuple):
     mixing : room of `mixing_kernel`
     C, CH : (r, k) gradients, and these after the first half of a solution with H; G : (r, r); target, compliance, beside,
         m, left : (r,); right, dz, part : (k,); change : what a pass asks for
-    fixed, moving : places of all ends in the nominal motion, and at z
+    fixed, moving : places of all ends in the rigid-body motion, and at z
     base, resisted, strained : of planar beams, see `beams_kernel`
     """
 

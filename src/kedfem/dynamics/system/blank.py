@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from kedfem.dynamics.anderson import DEPTH
 from kedfem.dynamics.metric import room_for
-from kedfem.dynamics.mixing import DEPTH
 from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends, History, State, Trial, Work
 
 

@@ -16,7 +16,7 @@ from kedfem.dynamics.system.turning_kernel import turned_loads
 
 @inner
 def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-untyped-def]
-    """History + applied force of a body with the nominal frame, link frame at the end of the step."""
+    """History + applied force of a body with the rigid-body frame, link frame at the end of the step."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     c_m, c_f = 1 - c.alpha_m, 1 - c.alpha_f
     n0, n1, n2 = c_m * c.acceleration[0], c_m * c.acceleration[1], c_m * c.acceleration[2] - c.alpha_m
@@ -38,7 +38,7 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
 
 @inner
 def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
-    """End of the step of a body with the nominal frame, from g and its balance K g = r + Wᵀ λ = A g."""
+    """End of the step of a body with the rigid-body frame, from g and its balance K g = r + Wᵀ λ = A g."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
     n0, n1, n2 = c.acceleration
@@ -202,7 +202,7 @@ def stiffness_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
 
 @inner
 def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-untyped-def]
-    """Add to trial.f the rate of α M δ in the nominal frame."""
+    """Add to trial.f the rate of α M δ in the rigid-body frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
     if bodies.dense[i]:
@@ -243,7 +243,7 @@ def orientation(bodies, i, R, u, trial, out):  # type: ignore[no-untyped-def]
 
 @inner
 def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
-    """Q becomes the mean rotation of a planar beam in the nominal frame, that of Σ y_a ⊗ fit_a."""
+    """Q becomes the mean rotation of a planar beam in the rigid-body frame, that of Σ y_a ⊗ fit_a."""
     first, n, c, s = bodies.at[i], bodies.functions[i], 0.0, 0.0
     X, fit = bodies.X, bodies.fit
     for j in range(first, first + n):

@@ -1,7 +1,7 @@
 """From a scene and its elastic model to a system: what each joint constrains and releases, force elements on coordinates.
 
-One table says what a kind of joint constrains (`motion.rows.CONSTRAINED`); bushings, gears, drives, springs and motors
-are laws on the same coordinates.
+One table says what a kind of joint constrains (`motion.constraints.CONSTRAINED`); bushings, gears, drives, springs and
+motors are laws on the same coordinates.
 """
 
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_joints import ConstraintJoint, bore_axis, in_plane, joint_frame, ordered
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.row_joints import RowJoint, bore_axis, in_plane, joint_frame, ordered
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (
     ANGLE,
@@ -34,9 +34,9 @@ from kedfem.dynamics.system.record import (
 )
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
+from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
-from kedfem.motion.rows import CONSTRAINED, perpendiculars
 from kedfem.scene import LineSpring, Motor, Scene
 from kedfem.scene.capabilities import SLOTS
 
@@ -88,7 +88,7 @@ class _Builder:
     ends: list[End] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
 
-    def joint(self, joint: RowJoint) -> None:
+    def joint(self, joint: ConstraintJoint) -> None:
         """What a joint constrains, a pair of gears couples, a spring or motor acts on."""
         scene, (kind, _, name) = self.scene, joint.name.rpartition(".")
         if kind == "rigid":
@@ -106,7 +106,7 @@ class _Builder:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)
 
-    def bars(self, joint: RowJoint) -> None:
+    def bars(self, joint: ConstraintJoint) -> None:
         """A rigid link: all distances between four of its points are as drawn."""
         side = joint.sides[0]
         if side is None:
@@ -131,7 +131,7 @@ class _Builder:
                 i, j = (self.linkage.bodies.index(link) for link in links)
                 none, zero = np.zeros((0, 3)), np.zeros(3)
                 self.element(
-                    RowJoint(
+                    ConstraintJoint(
                         f"{kind}.{name}",
                         zero,
                         (i, j),
@@ -146,7 +146,7 @@ class _Builder:
                     element,
                 )
 
-    def element(self, joint: RowJoint, element: object) -> None:
+    def element(self, joint: ConstraintJoint, element: object) -> None:
         """The law of a spring or motor on its coordinate, which its links' own motion tells."""
         law: Law
         if isinstance(element, Motor):
@@ -163,13 +163,13 @@ class _Builder:
             terms = self.coordinate(str(element.joint), joint, 1.0, turns)  # type: ignore[attr-defined]
         self.constraints.append(Constraint(joint.name, terms, law, linear=False))
 
-    def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: RowJoint) -> None:
+    def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: ConstraintJoint) -> None:
         """A constraint, linear where the frames of all its links are nominal."""
         numbers = {n for joint in joints for n in joint.bodies}
         self.constraints.append(Constraint(name, terms, law, linear=not numbers & self.own))
 
     def coordinate(
-        self, name: str, joint: RowJoint, factor: float, turns: bool | None = None
+        self, name: str, joint: ConstraintJoint, factor: float, turns: bool | None = None
     ) -> tuple[Term, ...]:
         """Turn or travel of a joint; if not said which, the turn of all but slides."""
         axis, at = joint_axis(self.scene.joints[name]), np.asarray(self.scene.joints[name].at)
@@ -179,7 +179,7 @@ class _Builder:
             return (Term(ANGLE, i, j, across, across, axis, factor),)
         return (Term(GAP, i, j, at, at, axis, factor),)
 
-    def constrained(self, joint: RowJoint) -> Iterator[tuple[Term, Law]]:
+    def constrained(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
         """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
         made, frame = self.scene.joints[joint.name], joint_frame(self.scene.joints[joint.name])
         at = np.asarray(made.at)
@@ -200,7 +200,7 @@ class _Builder:
         yield from self.threaded(joint, i, j, at)
         yield from self.driven(joint)
 
-    def tells(self, joint: RowJoint, gap: Vector, turn: Vector) -> bool:
+    def tells(self, joint: ConstraintJoint, gap: Vector, turn: Vector) -> bool:
         """Whether a direction says something of a joint's links: of planar ones only what is in their plane."""
         here = [x for x, n in zip(self.model.links, self.model.bodies, strict=True) if n in joint.bodies]
         return not all(link.planar for link in here) or bool(in_plane(gap[None], turn[None])[0])
@@ -208,12 +208,12 @@ class _Builder:
     def bushing(self, name: str, axis: int, turning: bool) -> Law:
         """The law of a constraint along or about an axis of its joint."""
         of = self.scene.joints[name].bushing
-        stiffness = None if of is None else (of.turning_stiffness if turning else of.stiffness)
+        stiffness = None if of is None else (of.rotational_stiffness if turning else of.stiffness)
         if of is None or stiffness is None:
             return Held()
-        return Spring(stiffness[axis], (of.turning_damping if turning else of.damping)[axis])
+        return Spring(stiffness[axis], (of.rotational_damping if turning else of.damping)[axis])
 
-    def threaded(self, joint: RowJoint, i: int, j: int, at: Vector) -> Iterator[tuple[Term, Law]]:
+    def threaded(self, joint: ConstraintJoint, i: int, j: int, at: Vector) -> Iterator[tuple[Term, Law]]:
         """The thread of a screw, a constraint of two terms."""
         made = self.scene.joints[joint.name]
         if made.kind != "screw":
@@ -224,7 +224,7 @@ class _Builder:
         self.add(joint.name, (Term(GAP, i, j, at, at, axis), turn), Held(), joint)
         yield from ()
 
-    def driven(self, joint: RowJoint) -> Iterator[tuple[Term, Law]]:
+    def driven(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
         """The coordinate that a drive prescribes, or turns over a shaft that gives."""
         drives = self.scene.driven_joints
         if joint.name not in drives:
@@ -236,7 +236,7 @@ class _Builder:
         else:
             yield term, Spring(drive.shaft_stiffness, drive.shaft_damping, drive=number)
 
-    def end(self, joint: RowJoint, side: int, at: Vector) -> int:
+    def end(self, joint: ConstraintJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
         end = rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found, joint)

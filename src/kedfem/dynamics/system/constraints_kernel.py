@@ -12,7 +12,7 @@ from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RA
 
 @inner
 def coordinate(ends, of, r, nominal, place, turned, row, y, w):  # type: ignore[no-untyped-def]
-    """Value of coordinate r, its gradient added to a row on z; and its rate in the nominal motion, z constant.
+    """Value of coordinate r, its gradient added to a row on z; and its rate in the rigid-body motion, z constant.
 
     Parameters
     ----------

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_ports import Ways
 from kedfem.dynamics.coupling import joined
 from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.ports import port_columns, turned_ports
-from kedfem.dynamics.row_ports import Ways
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.start import initial_rates
 from kedfem.dynamics.system.accelerations import accelerated_in_a_step
@@ -45,7 +45,7 @@ def corotational_system(scene: Scene, model: Model) -> tuple[System, Linkage]:
     Raises
     ------
     MeshError
-        If the seat of a force element does not tell how it turns as a whole.
+        If the coupling surface of a force element does not tell how it turns as a whole.
     """
     rigid = linkage(scene)
     if scene.springs or scene.motors:
@@ -92,7 +92,7 @@ class CorotationalSteps:
 
         Parameters
         ----------
-        motion_at : nominal motion at given times
+        motion_at : rigid-body motion at given times
 
         Raises
         ------

@@ -1,8 +1,8 @@
 """Where a march begins deflected: quasi-static, so that nothing vibrates; in static balance; or plucked.
 
-With a drive the deflection turns with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own nominal motion:
-the matrix has that inertia in it, so that no frequency is too near. Its rate is a difference of fourth order over one
-step. Without a drive links accelerate as rigid bodies where they are, and K δ = P − M a carries that.
+With a drive the deflection turns with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own rigid-body
+motion: the matrix has that inertia in it, so that no frequency is too near. Its rate is a difference of fourth order over
+one step. Without a drive links accelerate as rigid bodies where they are, and K δ = P − M a carries that.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.dense import work_on
-from kedfem.dynamics.mixing import Mixing
 from kedfem.dynamics.system.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.balance import Asked, Balance, HeldBody, held_body
@@ -28,7 +28,7 @@ from kedfem.motion.newton import cross_matrix
 SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 KRYLOV = 60
-CONVERGED = 1e-10  # change of a sweep, of the deflection
+CONVERGED = 1e-10  # change of a iteration, of the deflection
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
@@ -45,7 +45,7 @@ def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: 
 
     Parameters
     ----------
-    motion_at : nominal motion at given times; of a system with a drive over a step from `time` on
+    motion_at : rigid-body motion at given times; of a system with a drive over a step from `time` on
     rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
 
     Raises
@@ -98,7 +98,7 @@ def as_work(of: Ready, forces: Rows) -> Flat:
 
 
 def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
-    """Deflection and rate with the nominal motion, from five instants within a step."""
+    """Deflection and rate with the rigid-body motion, from five instants within a step."""
     of, h = first.of, first.of.c.h / 4
     instants = [first, *(Instant(of, motion_at, first.time + k * h, first) for k in range(1, 5))]
     u, v, change = np.zeros((5, int(of.bodies.at[-1]))), np.zeros((5, 0)), np.inf
@@ -206,7 +206,7 @@ class _Held:
         self.sparse = [isinstance(part, SparsePart) for part in now.of.parts]
 
     def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
-        """All bodies, the inertia of those that turn as their frames first were: sweeps take out the rest."""
+        """All bodies, the inertia of those that turn as their frames first were: iterations take out the rest."""
         for k in range(len(self._made), len(R)):
             link = self.now.of.system.model.links[k]
             if self.sparse[k]:

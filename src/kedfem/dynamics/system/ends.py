@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.joint_rows import seen_from
-from kedfem.dynamics.row_joints import RowJoint, Side
+from kedfem.dynamics.constraint_joints import ConstraintJoint, Side
+from kedfem.dynamics.constraint_matrices import seen_from
 from kedfem.dynamics.system.record import FACE, LINE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End, Line
 from kedfem.motion.rigid import RigidMotion
 
@@ -31,7 +31,7 @@ def rigid_end(body: int, at: Vector, k: int) -> End:
     return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
 
 
-def end_of(side: Side, joint: RowJoint) -> End:
+def end_of(side: Side, joint: ConstraintJoint) -> End:
     """An end on a body, on a slider that rides on one, or on a line along which the joint's pin slides."""
     onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
     p, d, _ = onto.shape
@@ -53,7 +53,7 @@ def end_of(side: Side, joint: RowJoint) -> End:
 
 
 def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
-    """Weights of the stations of a line where its pin is, in the nominal motion."""
+    """Weights of the stations of a line where its pin is, in the rigid-body motion."""
     line = end.line
     if line is None:
         raise ValueError("an end must be on a line to have stations, got one that is not")

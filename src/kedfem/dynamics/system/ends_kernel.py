@@ -185,7 +185,7 @@ def borne(ends, e, force, moment, factor, nominal, place, row, y, w):  # type: i
 
     Returns
     -------
-    Their power in the nominal motion, z constant
+    Their power in the rigid-body motion, z constant
     """
     _, Q, D, U = place
     R, v, omega = nominal
@@ -217,7 +217,8 @@ def borne(ends, e, force, moment, factor, nominal, place, row, y, w):  # type: i
 
 @inner
 def turning(ends, e, moment, R, omega, Q, D, U, y, w):  # type: ignore[no-untyped-def]
-    """Add to forces y at an end's points those that a moment on its orientation is; its power in the nominal motion."""
+    """Add to forces y at an end's points those that a moment on its orientation is; its power in the rigid-body
+    motion."""
     form, d, known = ends.form[e], ends.components[e], ends.known[e]
     times_transposed(Q, moment, w[0])
     turn_of(U, w[0])

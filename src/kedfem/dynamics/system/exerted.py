@@ -8,19 +8,19 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Exerted
-from kedfem.dynamics.row_joints import RowJoint, Side
 from kedfem.dynamics.system.ends import end_of, same_end
 from kedfem.dynamics.system.record import Constraint, Driven, End, Spring
 from kedfem.dynamics.system.supports import Supports, Vectors
-from kedfem.motion.rows import cross
+from kedfem.motion.constraints import cross
 
 ELEMENTS = ("motors.", "springs.")
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def joints_of(forces: Supports) -> list[RowJoint]:
+def joints_of(forces: Supports) -> list[ConstraintJoint]:
     """Joints by constraint equations, and gears."""
     return [row for row in forces.of.system.model.rows if not row.name.startswith((*ELEMENTS, "rigid."))]
 
@@ -56,7 +56,7 @@ def _stacked(each: Sequence[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
     return np.stack(each, axis=1) if each else np.zeros(empty)
 
 
-def wrench(forces: Supports, joint: RowJoint) -> Float[np.ndarray, "T 3 3"]:
+def wrench(forces: Supports, joint: ConstraintJoint) -> Float[np.ndarray, "T 3 3"]:
     """Force of a joint on its link i, moment about its point there, and that point; of gears nothing."""
     out = np.zeros((len(forces.z), 3, 3))
     every = enumerate(forces.of.system.constraints)
@@ -96,7 +96,7 @@ def at_ends(forces: Supports, each: Constraint, n: int) -> Float[np.ndarray, "T 
     return out
 
 
-def _on_ports(forces: Supports, joints: Sequence[RowJoint]) -> Float[np.ndarray, "T m"]:
+def _on_ports(forces: Supports, joints: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
     """Forces on the interface points of joints by constraint equations, side by side, if joint forces need them."""
     if not any(joint.from_rows.any() for joint in forces.of.system.model.joints):
         return np.zeros((len(forces.z), 0))

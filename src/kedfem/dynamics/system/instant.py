@@ -1,4 +1,4 @@
-"""A system at one time of its nominal motion: all that starts ask of bodies, coordinates and laws there."""
+"""A system at one time of its rigid-body motion: all that starts ask of bodies, coordinates and laws there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ class Always:
 
 
 class Instant:
-    """A system at one time of its nominal motion.
+    """A system at one time of its rigid-body motion.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ is put into the matrix, as in `dynamics.interface`. Constraints that repeat othe
 """
 
 from kedfem.compiled import inner
-from kedfem.dynamics.mixing_kernel import factored, partly_factored
+from kedfem.dynamics.anderson_kernel import factored, partly_factored
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
@@ -41,7 +41,7 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
 
 @inner
 def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
-    """trial.w becomes w₀ = Rᵀ B z − W Rᵀ u of a body; of one with the nominal frame without the second part.
+    """trial.w becomes w₀ = Rᵀ B z − W Rᵀ u of a body; of one with the rigid-body frame without the second part.
 
     Parameters
     ----------

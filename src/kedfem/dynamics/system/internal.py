@@ -49,7 +49,7 @@ class Still:
 
         Parameters
         ----------
-        R : of all bodies of the linkage in the nominal motion
+        R : of all bodies of the linkage in the rigid-body motion
         amounts : of loads that turn with bodies
         """
         from kedfem.dynamics.system.still_kernel import still_forces
@@ -72,8 +72,8 @@ class Still:
 class Inside:
     """A body at one time: internal force f (N,) on its coordinates, world components; R (3, 3) its mean orientation.
 
-    g : (n, d) its displacement in the nominal frame [m]; energy : ½ gᵀ K0 g, as its frames see it [J]
-    frames : what its frames see; damped : (3, n, d) damping force without its rate, and its rates, nominal frame
+    g : (n, d) its displacement in the rigid-body frame [m]; energy : ½ gᵀ K0 g, as its frames see it [J]
+    frames : what its frames see; damped : (3, n, d) damping force without its rate, and its rates, rigid-body frame
     """
 
     f: Flat
@@ -113,7 +113,7 @@ def inside(
 
     Parameters
     ----------
-    R, spin : of the nominal motion, and its [ω]×
+    R, spin : of the rigid-body motion, and its [ω]×
     """
     link, damping = of.system.model.links[k], of.system.model.damping
     d = link.d

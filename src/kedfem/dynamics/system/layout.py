@@ -268,7 +268,7 @@ def factored(
 def is_large(link: Link) -> bool:
     """Whether a body keeps a sparse factor and nodal coordinates: elements with frames of their own never do.
 
-    Beams in space with nominal frames do, however small: in coordinates in which mass is one their stiff hubs, which
+    Beams in space with rigid-body frames do, however small: in coordinates in which mass is one their stiff hubs, which
     have next to none, would be 1e11 times as stiff as they bend.
     """
     if frame_of(link) == TANGENTIAL or link.element is not None:

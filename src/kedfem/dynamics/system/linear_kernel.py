@@ -1,4 +1,4 @@
-"""Steps of a linear system, compiled by numba: all bodies have nominal frames, one solution of the interface a step.
+"""Steps of a linear system, compiled by numba: all bodies have rigid-body frames, one solution of the interface a step.
 
 Apart from `step_kernel`, whose passes a linear scene has no use for and need not wait to be compiled.
 """

@@ -157,7 +157,7 @@ class Literal:
                 self.kept = used
                 return self._ended(now, old, at, m, lam)
         raise SolveError(
-            f"analysis.solver: the iterations of the literal solver must converge to a balance, got none at "
+            f"analysis.solver: the iterations of the monolithic solver must converge to a balance, got none at "
             f'{float(at.t[0]):.6g} s: take solver = "condensed", or a smaller step'
         )
 

@@ -30,7 +30,7 @@ from kedfem.dynamics.system.record import (
 )
 from kedfem.dynamics.system.turning_loads import shown_by
 from kedfem.links.record import Link
-from kedfem.motion.rows import Row, stacked
+from kedfem.motion.constraints import ConstraintEquation, stacked
 from kedfem.motion.values import features, jacobian
 
 Column = Float[np.ndarray, " _"]
@@ -148,7 +148,7 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
         by = [n @ pose.by_x + np.cross(arm, n) @ pose.by_Q for pose, arm in zip(poses, arms, strict=True)]
         return size, by[0] - by[1], near
     origin = [x.x - x.Q @ system.ends[n].origin for x, n in zip(poses, (term.i, term.j), strict=True)]
-    rows = stacked([Row(term.kind, 1, 2, term.a, term.b, "", term.a_j)])
+    rows = stacked([ConstraintEquation(term.kind, 1, 2, term.a, term.b, "", term.a_j)])
     at = (np.stack([np.eye(3), one.Q, other.Q])[None], np.stack([np.zeros(3), *origin])[None])
     f = features(rows, at, np.full((1, len(rows.angles)), near))
     J = jacobian(rows, f, 3)[0, 0]

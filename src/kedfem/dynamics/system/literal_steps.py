@@ -1,4 +1,4 @@
-"""Steps of a system by the oracle, as a march hands them on: what `solver = "literal"` takes with force elements."""
+"""Steps of a system by the oracle, as a march hands them on: what `solver = "monolithic"` takes with force elements."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ MOST = 600  # unknowns of all links: a step solves with a dense matrix of all of
 
 
 def oracle(of: Ready) -> Literal:
-    """The oracle of a system whose links have nominal frames.
+    """The oracle of a system whose links have rigid-body frames.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def oracle(of: Ready) -> Literal:
     count = sum(link.unknowns for link in of.system.model.links)
     if count > MOST:
         raise SolveError(
-            f"analysis.solver: the literal solver with springs, motors or damped bushings must have links of at most "
+            f"analysis.solver: the monolithic solver with springs, motors or damped bushings must have links of at most "
             f'{MOST} unknowns in all, since it solves with dense tangents, got {count}: take solver = "condensed"'
         )
     return Literal(of.system, of.scheme)

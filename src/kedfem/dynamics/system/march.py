@@ -1,4 +1,4 @@
-"""The public march of a system: from any state, over any stretch of its nominal motion, to the state at its end."""
+"""The public march of a system: from any state, over any stretch of its rigid-body motion, to the state at its end."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,7 +31,7 @@ from kedfem.motion.rigid import RigidMotion
 
 HALVINGS = 6  # a step is taken in up to 2⁶ parts
 Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
-"""Nominal motion at given times."""
+"""Rigid-body motion at given times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ Loads = Sequence[Float[np.ndarray, "T _ _"]]
 
 
 def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Driving:
-    """The nominal motion and loads on all coordinates over the times of a motion.
+    """The rigid-body motion and loads on all coordinates over the times of a motion.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def march(
     Parameters
     ----------
     motion : at the ends of the steps
-    between : nominal motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts
+    between : rigid-body motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts
     loads : see `driving`
 
     Raises

@@ -1,4 +1,4 @@
-"""Coordinates of constraints with their rates, exact: the nominal motion and the interface as series in time.
+"""Coordinates of constraints with their rates, exact: the rigid-body motion and the interface as series in time.
 
 A series is an array (3, …): a value, its rate, and the rate of that. Of a coupling surface, A = Σ D_k ⊗ e_k = Q U:
 with B = Q₀ᵀ A and Q = Q₀ exp [w t + b t²/2]×, the skew parts of exp(−[…]×) B vanish at each order,
@@ -47,7 +47,7 @@ class Places:
 
 
 def places(motion: RigidMotion, k: int = 0) -> Places:
-    """The nominal motion at time point k."""
+    """The rigid-body motion at time point k."""
     R = motion.R[k]
     return Places(
         np.stack([R, cross_matrix(motion.omega[k]) @ R, motion.R2[k]]),
@@ -73,7 +73,7 @@ def coordinates(system: System, at: Places, z: Float[np.ndarray, "3 k"]) -> Floa
 
 
 def travels(system: System, at: Places) -> Float[np.ndarray, "3 r"]:
-    """All coordinates in the nominal motion: of a drive its travel, but for turns."""
+    """All coordinates in the rigid-body motion: of a drive its travel, but for turns."""
     poses = _Poses(system, at, np.zeros((3, system.unknowns)))
     return np.array([_summed(system, each, poses) for each in system.constraints]).reshape(-1, 3).T
 
@@ -159,7 +159,8 @@ def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
 
 
 def _at_pin(end: End, line: Line, at: Places, u: Series) -> Series:
-    """Displacement (3, 1, d) where a pin is on a line, from those of its stations; nominal motion tells where that is."""
+    """Displacement (3, 1, d) where a pin is on a line, from those of its stations; rigid-body motion tells where that
+    is."""
     apart = at.p[:, line.pin] + at.R[:, line.pin] @ line.at - at.p[:, end.body]
     s = product(np.dot, apart, at.R[:, end.body] @ line.axis)
     N, first, second = (line.stations.at(s[:1] - line.at @ line.axis, k)[0] for k in range(3))

@@ -85,9 +85,9 @@ class End:
     """What a constraint or force law has on one body: a point, and the orientation of the surface there.
 
     body : number in the linkage
-    form : RIGID: moves with the nominal motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
+    form : RIGID: moves with the rigid-body motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
         PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are
-        known; LINE: the place of a pin among the stations of a line, in the nominal motion
+        known; LINE: the place of a pin among the stations of a line, in the rigid-body motion
     origin : (3,) its point as drawn [m]
     directions : (3, 3) rows e_k as drawn, of which the first `known` are followed by interface points
     lengths : (3,) how far off the origin these points are [m]
@@ -127,7 +127,7 @@ class Constraint:
     """A coordinate, the sum of its terms, and the law that it obeys.
 
     name : of the joint or force element
-    linear : whether the nominal motion tells its directions, so that it is linear in z; else the bodies themselves do
+    linear : whether the rigid-body motion tells its directions, so that it is linear in z; else the bodies themselves do
     """
 
     name: str

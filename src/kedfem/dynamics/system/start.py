@@ -31,7 +31,7 @@ def rest(
 
     Parameters
     ----------
-    motion_at : nominal motion at given times
+    motion_at : rigid-body motion at given times
     rates : per body (n, d) δ', world components; none if not given. They are changed as little as can be, in kinetic
         energy, to keep all constraints
     accelerated : accelerations under given forces, `accelerated_in_a_step` where springs or motors pull at once

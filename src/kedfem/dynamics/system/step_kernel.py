@@ -9,8 +9,8 @@ again. A linear system is done after one: `linear_kernel`.
 import numpy as np
 
 from kedfem.compiled import compiled, inner
+from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
-from kedfem.dynamics.mixing_kernel import mixed
 from kedfem.dynamics.system.algebra_kernel import (
     add_transposed,
     copied,
@@ -76,7 +76,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
 
 @inner
 def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
-    """The predictor, right-hand sides of bodies with nominal frames, the common matrix of z."""
+    """The predictor, right-hand sides of bodies with rigid-body frames, the common matrix of z."""
     R, h = driving.R[t], c.h
     copied(state.turned, trial.turned)
     for m in range(len(trial.z)):

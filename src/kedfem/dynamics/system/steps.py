@@ -1,4 +1,4 @@
-"""Steps of links with nominal frames, taken by the system, as histories of links.
+"""Steps of links with rigid-body frames, taken by the system, as histories of links.
 
 What a force element exerts on its links is part of their forces F there, and forces at ports are those of joints alone.
 """
@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.dynamics.constraint_joints import ConstraintJoint
+from kedfem.dynamics.constraint_ports import Ways
 from kedfem.dynamics.coupling import Attachment, joined
 from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import port_columns, turned_ports
-from kedfem.dynamics.row_joints import RowJoint
-from kedfem.dynamics.row_ports import Ways
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
@@ -37,12 +37,12 @@ Rows = Float[np.ndarray, "T _ _"]
 
 
 def nominal_system(scene: Scene, model: Model) -> System:
-    """The system of a scene whose links have nominal frames.
+    """The system of a scene whose links have rigid-body frames.
 
     Raises
     ------
     MeshError
-        If a force element finds no seat on its link that tells how it turns.
+        If a force element finds no coupling surface on its link that tells how it turns.
     """
     names, rigid = [link.name for link in model.links], linkage(scene)
     ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
@@ -222,7 +222,11 @@ def _bearings(
 
 
 def _bearing(
-    row: RowJoint, side: int, bodies: Sequence[str], model: Model, inverse: Sequence[Float[np.ndarray, "_ _"]]
+    row: ConstraintJoint,
+    side: int,
+    bodies: Sequence[str],
+    model: Model,
+    inverse: Sequence[Float[np.ndarray, "_ _"]],
 ) -> Bearing:
     """What an end of a force element has on a link, or on the link that its slider rides on."""
     on = row.sides[side]

@@ -14,7 +14,7 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     Parameters
     ----------
     c : with Newmark's numbers and damping zero
-    R : (M, 3, 3) of the nominal motion; amounts : (w,) of loads that turn with bodies
+    R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of loads that turn with bodies
     state : as drawn
     """
     c, bodies, state, trial, work = (

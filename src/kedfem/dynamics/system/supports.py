@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.model import Carried
+from kedfem.dynamics.model import PrescribedBody
 from kedfem.dynamics.system.arrays import History
 from kedfem.dynamics.system.ends import corners, end_of, line_weights, same_end
 from kedfem.dynamics.system.instant import renumbered
@@ -32,9 +32,9 @@ from kedfem.dynamics.system.record import (
     Term,
 )
 from kedfem.links.record import Link
+from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import joint_axis
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.rows import cross
 from kedfem.scene import GROUND, Scene
 
 Vectors = Float[np.ndarray, "T 3"]
@@ -44,7 +44,7 @@ Wrench = tuple[Vectors, Vectors]
 
 @dataclass(frozen=True, slots=True)
 class Supports:
-    """A march over T times: its history, the nominal motion at these, and what follows for forces.
+    """A march over T times: its history, the rigid-body motion at these, and what follows for forces.
 
     Parameters
     ----------
@@ -92,7 +92,8 @@ class Supports:
         return np.asarray(x + Q @ (at - end.origin))
 
     def of_joint(self, k: int, joint: str, about: Vectors) -> Wrench:
-        """What a joint of shared interface points exerts on body k of the model; these where the nominal motion has them.
+        """What a joint of shared interface points exerts on body k of the model; these where the rigid-body motion has
+        them.
 
         From all λ and what laws exert on interface points that depend on the joint's, see `Attachment`.
         """
@@ -140,10 +141,10 @@ class Supports:
         return y
 
     def place(self, body: int, at: Float[np.ndarray, "3"]) -> Vectors:
-        """Where a point of a body as drawn is in the nominal motion."""
+        """Where a point of a body as drawn is in the rigid-body motion."""
         return np.asarray(self.motion.p[:, body] + self.motion.R[:, body] @ at)
 
-    def hub(self, carried: Carried) -> Wrench:
+    def hub(self, carried: PrescribedBody) -> Wrench:
         """What the driven joint exerts on a body that it carries, with the moment about the joint's point."""
         centre = self.place(carried.body, np.asarray(self.scene.joints[carried.hub].at))
         force, moment = (-x for x in self.on(carried.body, centre))

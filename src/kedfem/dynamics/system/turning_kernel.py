@@ -11,7 +11,7 @@ def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-de
 
     Parameters
     ----------
-    R : (M, 3, 3) of the nominal motion
+    R : (M, 3, 3) of the rigid-body motion
     frame : (3, 3) room
     """
     loads = bodies.turning

@@ -61,7 +61,7 @@ def turned(
 
     Parameters
     ----------
-    R : of the nominal motion of its body; u : displacement
+    R : of the rigid-body motion of its body; u : displacement
     factor : of `Pattern.factor`
     """
     e, weights = shown_by(link, load.forces)

@@ -8,14 +8,15 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.mesh.apart import LONGEST, PART, apart
 from kedfem.mesh.cad.faces import one_surface
 from kedfem.mesh.cad.file import cad_file
 from kedfem.mesh.cad.model import all_solids
 from kedfem.mesh.cad.solids import CadFace, Solid
+from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.session import gmsh_model
 
-CLOSED = 0.75  # of a cylinder's full turn: a joint finds no less of it by itself (links/rounds.py); keyways are less
+# of a cylinder's full turn: a joint finds no less of it by itself (links/round_surfaces.py); keyways are less
+CLOSED = 0.75
 BALL = 0.2  # of a ball's area: the rounded corner between three walls has an eighth
 
 

@@ -1,4 +1,4 @@
-"""What the ways of meshing know of a solid from CAD, and what they are asked for."""
+"""What the meshing methods know of a solid from CAD, and what they are asked for."""
 
 from dataclasses import dataclass
 from typing import Literal

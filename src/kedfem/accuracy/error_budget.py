@@ -1,0 +1,167 @@
+"""The error of a run, part by part and kind of channel by kind: one record for table, results file and warnings."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from kedfem.results import Channel
+from kedfem.results.audit import Balance
+
+KINDS = ("displacement", "stress", "joint forces", "drive")
+SOURCES = ("mesh", "step", "reduction", "frames")
+WARNED = 0.05  # an error that no run leaves without a warning
+TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
+MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
+UNACCOUNTED = 0.5  # of energy or momentum
+LEAST = 0.005  # what no run warns of
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One part of the error.
+
+    source : mesh, step, reduction or frames
+    errors : kind of channel → estimated error, of the channel's largest value, at the worst instant of the worst channel
+    how : what the estimate was made from, in words
+    remedy : what would lower it, in words; what usually does if not given
+    """
+
+    source: str
+    errors: Mapping[str, float]
+    how: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """Estimated errors of a run.
+
+    shares : by source; one that is not there does not err so
+    limits : where no estimate is claimed, in words
+    links : link → its mesh's error in the energy norm [-], of meshed links
+    step : channel → error of the step
+    """
+
+    shares: tuple[Share, ...]
+    limits: tuple[str, ...] = ()
+    links: Mapping[str, float] = field(default_factory=dict)
+    step: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of channels of which something is known."""
+        return tuple(kind for kind in KINDS if any(kind in share.errors for share in self.shares))
+
+    @property
+    def together(self) -> dict[str, float]:
+        """Kind → sum of all shares: they may add up."""
+        return {kind: sum(share.errors.get(kind, 0.0) for share in self.shares) for kind in self.kinds}
+
+    @property
+    def worst(self) -> float:
+        """The largest of these sums."""
+        return max(self.together.values(), default=0.0)
+
+    @property
+    def limiting(self) -> Share | None:
+        """The share that is largest where the error is worst."""
+        if not self.kinds:
+            return None
+        kind = max(self.together, key=lambda kind: self.together[kind])
+        return max(self.shares, key=lambda share: share.errors.get(kind, 0.0))
+
+    def of(self, source: str) -> Share | None:
+        """The share of a source."""
+        return next((share for share in self.shares if share.source == source), None)
+
+
+def kind_of(channel: Channel) -> str | None:
+    """The kind of a channel whose accuracy counts; None of others."""
+    return kind_of_name(channel.name)
+
+
+def kind_of_name(name: str) -> str | None:
+    """The same by its name.
+
+    >>> kind_of_name("probes/tip/velocity"), kind_of_name("joints/A/force"), kind_of_name("drive/rigid_torque")
+    ('displacement', 'joint forces', None)
+    """
+    if name.startswith("probes/"):
+        return "stress" if name.endswith("/stress") else "displacement"
+    if name.startswith("joints/") and name.endswith("/force"):
+        return "joint forces"
+    if name.startswith("drive/") and name.rsplit("/", 1)[-1] in {"torque", "force"}:
+        return "drive"
+    return None
+
+
+def by_kind(errors: Mapping[str, float]) -> dict[str, float]:
+    """Errors of channels as those of kinds: the worst of each."""
+    out: dict[str, float] = {}
+    for name, error in errors.items():
+        kind = kind_of_name(name)
+        if kind is not None:
+            out[kind] = max(out.get(kind, 0.0), error)
+    return out
+
+
+def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...]:
+    """A warning where a run is worse than WARNED, or clearly worse than what was asked for, with what limits it."""
+    limit = WARNED if asked is None else min(WARNED, max(TWICE * asked, LEAST))
+    over = {kind: error for kind, error in budget.together.items() if error > limit}
+    share = budget.limiting
+    if not over or share is None:
+        return ()
+    said = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
+    remedy = share.remedy or REMEDIES[share.source]
+    return (f"estimated error: {said}; most of it from the {share.source}: {remedy}",)
+
+
+def meaningless(budget: Budget, balance: Balance, unworked: float, stiffened: bool = False) -> str:
+    """Why a run means nothing by its own account, in words; empty for one that may.
+
+    Parameters
+    ----------
+    unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
+    stiffened : the run has geometric stiffening, whose work is in the energy's residual too
+    """
+    worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
+    left = {"momentum": balance.linear, "angular momentum": balance.angular, "the drive's work": unworked}
+    if not stiffened:
+        left["energy"] = balance.energy
+    said = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
+    said += [
+        f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
+    ]
+    return "; ".join(said)
+
+
+REMEDIES = {
+    "mesh": "take finer elements, or leave mesh and element out so that analysis.accuracy chooses them",
+    "step": "take a shorter step, or leave it out so that analysis.accuracy chooses it; a sudden start or load that "
+    "excites vibration beyond any step needs a smoother one, or damping",
+    "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",
+    "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
+}  # fmt: skip
+
+
+def percent(error: float) -> str:
+    """An error as a reader takes it: nobody believes the third digit of an estimate."""
+    return "over 100 %" if error > 1 else f"{float(f'{100 * error:.2g}'):g} %"
+
+
+def attributes(budget: Budget) -> dict[str, float | str]:
+    """The budget as notes of a results file."""
+    notes: dict[str, float | str] = {
+        f"error of {share.source}, {kind}": error
+        for share in budget.shares
+        for kind, error in share.errors.items()
+    }
+    notes |= {f"error together, {kind}": error for kind, error in budget.together.items()}
+    notes |= {f"mesh error of {link}, energy norm": error for link, error in budget.links.items()}
+    notes |= {f"no estimate {k}": text for k, text in enumerate(budget.limits, start=1)}
+    return notes
+
+
+def joined(shares: Sequence[Share | None]) -> tuple[Share, ...]:
+    """The shares that are there, in the order of SOURCES."""
+    return tuple(sorted((x for x in shares if x is not None), key=lambda share: SOURCES.index(share.source)))

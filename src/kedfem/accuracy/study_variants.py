@@ -1,0 +1,162 @@
+"""What a study of speed against error tries: fidelities, finenesses of the mesh, tolerances of modes, steps."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from kedfem.accuracy.variants import (
+    Family,
+    families,
+    of_family,
+    refined,
+    with_analysis,
+    with_links,
+    with_steps,
+)
+from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, time_grid
+
+FINENESS, STEPS, TOLERANCES = (1.0, 1.5, 2.0, 3.0), (1, 2, 4), (1e-2, 1e-3, 1e-4)
+TIGHT = 3e-5  # tolerance of a reduced reference
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity:
+    """How the links of a variant are modelled.
+
+    family : of all links that have a shape and are not rigid in the scene
+    reduced : whether they move in the span of a few modes
+    rigid : the link that is rigid besides
+    """
+
+    family: Family
+    reduced: bool = False
+    rigid: str | None = None
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{'reduced ' if self.reduced else ''}{self.family}{', rigid crank' if self.rigid else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One way to run a scene.
+
+    fineness : elements are smaller by this factor than the scene's (or the usual ones)
+    steps : so many times the scene's
+    tolerance : of the reduction, if there is one
+    """
+
+    fidelity: Fidelity
+    fineness: float = 1.0
+    steps: int = 1
+    tolerance: float | None = None
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        functions = "" if self.tolerance is None else f", reduction {self.tolerance:.0e}"
+        return f"{self.fidelity.name}, mesh × {self.fineness:g}, steps × {self.steps}{functions}"
+
+
+def fidelities(scene: Scene) -> list[Fidelity]:
+    """Those that all links' shapes allow, cheapest family first; the best one also with the driven link rigid."""
+    each = [families(link) for link in _shaped(scene)]
+    kinds: tuple[Family, ...] = ("beam", "plane", "solid")
+    common = [family for family in kinds if each and all(family in f for f in each)]
+    out = [
+        Fidelity(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]
+    ]
+    pair = scene.joints[scene.driven].links if scene.driven else ()
+    driven = next((name for name in pair if name in scene.links), None)
+    if driven and len(each) > 1 and scene.links[driven] in _shaped(scene):
+        out += [replace(found, rigid=driven) for found in out[-1:]]
+    return out
+
+
+def _shaped(scene: Scene) -> list[LinkScene]:
+    return [link for link in scene.links.values() if link.shape is not None and link.fidelity != "rigid"]
+
+
+def varied(scene: Scene, variant: Variant) -> Scene:
+    """The scene as a variant has it, checked like any other.
+
+    Raises
+    ------
+    SceneError
+        If it cannot be so.
+    """
+    fidelity = variant.fidelity
+    links = {
+        name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)
+        for name, link in scene.links.items() if link.shape is not None and link.fidelity != "rigid"
+    }  # fmt: skip
+    keys = {
+        "accuracy": "quick",
+        "reduction_tolerance": variant.tolerance or scene.analysis.reduction_tolerance,
+    }
+    changed = with_analysis(with_links(scene, links), **keys)
+    if variant.steps != 1:
+        changed = with_steps(changed, variant.steps * time_grid(scene).steps)
+    return scene_from(changed.model_dump(exclude_unset=True), scene.folder)
+
+
+def _modelled(link: LinkScene, variant: Variant) -> LinkScene:
+    """A link of a family, with its own mesh where it is of that family already."""
+    family, reduced = variant.fidelity.family, variant.fidelity.reduced
+    if link.fidelity != family:
+        link = of_family(link, family, reduced)
+    link = link.model_copy(update={"reduced": reduced, "modes": None})
+    return refined(link, variant.fineness)
+
+
+def first_variants(scene: Scene) -> list[Variant]:
+    """Every fidelity with the scene's own mesh, step and tolerance."""
+    return [_with_tolerance(Variant(each), scene.analysis.reduction_tolerance) for each in fidelities(scene)]
+
+
+def reference_variant(scene: Scene, fineness: float, steps: int) -> Variant:
+    """The best that is run: the last family; reduced very closely where that helps."""
+    best = [each for each in fidelities(scene) if each.rigid is None][-1]
+    return _with_tolerance(Variant(best, fineness, steps), TIGHT)
+
+
+def _with_tolerance(variant: Variant, tolerance: float) -> Variant:
+    return replace(variant, tolerance=tolerance if variant.fidelity.reduced else None)
+
+
+def coarser(variant: Variant) -> Iterator[tuple[str, float, Variant]]:
+    """The next coarser one in each direction: (direction, factor, variant)."""
+    mesh = [f for f in FINENESS if f < variant.fineness]
+    if mesh:
+        yield "mesh", variant.fineness / mesh[-1], replace(variant, fineness=mesh[-1])
+    if variant.steps > 1:
+        yield "step", 2.0, replace(variant, steps=variant.steps // 2)
+
+
+def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
+    """One thing changed at a time, from the scene's own and from the reference, and all together (the diagonal)."""
+    out: list[Variant] = []
+    more = [s for s in STEPS if 1 < s <= reference.steps]
+    for first in first_variants(scene):
+        if first.fidelity.rigid is not None:  # its error is not that of mesh, step or modes
+            continue
+        finest = reference.fineness if first.fidelity.family == reference.fidelity.family else FINENESS[-1]
+        finer = [f for f in FINENESS if 1.0 < f <= finest]
+        out += [replace(first, fineness=f) for f in finer]
+        out += [replace(first, steps=s) for s in more]
+        out += [replace(first, fineness=f, steps=s) for f, s in zip(finer, more, strict=False)]
+        if first.tolerance is not None:
+            out += [replace(first, tolerance=tolerance) for tolerance in TOLERANCES]
+            out += [
+                replace(first, fineness=f, steps=s, tolerance=TOLERANCES[-1])
+                for f, s in zip(finer, more, strict=False)
+            ]
+    out += [replace(reference, fineness=f) for f in FINENESS if f <= reference.fineness]
+    out += [replace(reference, steps=s) for s in (1, *more)]
+    return list(dict.fromkeys(out))
+
+
+def exponent(scene: Scene, fidelity: Fidelity) -> float:
+    """How the unknowns of a variant grow with the fineness of its mesh."""
+    fixed = all(isinstance(link.shape, MeshFile) for link in _shaped(scene))
+    return 0.0 if fixed else {"beam": 1.0, "plane": 2.0, "solid": 3.0}.get(fidelity.family, 0.0)

@@ -1,0 +1,118 @@
+"""Anderson acceleration of iterations and the small dense solves of a step, compiled by numba.
+
+pairs (2, m, N) : where steps taken led, and how the change asked for changed in them
+products (m, m) : of the latter with each other
+last (2, N) : step taken and change asked for, of the iteration before
+room (m + 1, m) : for the small system; nothing is allocated in a step
+"""
+
+import numpy as np
+
+from kedfem.compiled import compiled
+
+DEPENDENT = 1e-11  # what is left of a constraint's own compliance where others constrain the same
+RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
+
+
+@compiled
+def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
+    """Anderson acceleration, see `dynamics.anderson.Mixing`: the change asked for becomes the step to take."""
+    pairs, products, last, room = memory
+    depth, N = pairs.shape[1:]
+    known, slot = int(counts[2]), int(counts[3])
+    if sweep > 0:
+        known = min(depth, known + 1)
+        for x in range(N):
+            d = change[x] - last[1, x]
+            pairs[0, slot, x], pairs[1, slot, x] = last[0, x] + d, d
+        for p in range(known):
+            total = 0.0
+            for x in range(N):
+                total += pairs[1, p, x] * pairs[1, slot, x]
+            products[p, slot] = products[slot, p] = total
+        counts[2], counts[3] = known, (slot + 1) % depth
+    for x in range(N):
+        last[1, x] = change[x]
+    if known > 0:
+        A, b = room[:known, :known], room[depth, :known]
+        for p in range(known):
+            size = np.sqrt(products[p, p]) + 1e-300
+            for q in range(p):
+                A[p, q] = products[p, q] / (size * (np.sqrt(products[q, q]) + 1e-300))
+            A[p, p] = 1 + RIDGE
+            total = 0.0
+            for x in range(N):
+                total += pairs[1, p, x] * change[x]
+            b[p] = total / size
+        definite_solved(A, b)
+        for p in range(known):
+            gamma = b[p] / (np.sqrt(products[p, p]) + 1e-300)
+            for x in range(N):
+                change[x] -= gamma * pairs[0, p, x]
+    for x in range(N):
+        last[0, x] = change[x]
+
+
+@compiled
+def definite_solved(A, x):  # type: ignore[no-untyped-def]
+    """x becomes A⁻¹ x, A symmetric, positive definite and used up."""
+    k = len(x)
+    for i in range(k):
+        for j in range(i + 1):
+            total = A[i, j]
+            for m in range(j):
+                total -= A[i, m] * A[j, m]
+            A[i, j] = np.sqrt(total) if i == j else total / A[j, j]
+        for m in range(i):
+            x[i] -= A[i, m] * x[m]
+        x[i] /= A[i, i]
+    for i in range(k - 1, -1, -1):
+        for j in range(i + 1, k):
+            x[i] -= A[j, i] * x[j]
+        x[i] /= A[i, i]
+
+
+@compiled
+def factored(H, first):  # type: ignore[no-untyped-def]
+    """Cholesky factor in place, entries of each row from its first column on."""
+    for i in range(len(H)):
+        for j in range(first[i], i + 1):
+            total = H[i, j]
+            for m in range(max(first[i], first[j]), j):
+                total -= H[i, m] * H[j, m]
+            H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
+
+
+@compiled
+def partly_factored(G, pivots):  # type: ignore[no-untyped-def]
+    """Cholesky factor in place, of rows whose pivot is not zero; a row that depends on those above gets pivot zero."""
+    for a in range(len(G)):
+        if pivots[a] == 0.0:
+            continue
+        own = G[a, a]
+        for b in range(a):
+            if pivots[b] == 0.0:
+                G[a, b] = 0.0
+                continue
+            for m in range(b):
+                G[a, b] -= G[a, m] * G[b, m]
+            G[a, b] /= G[b, b]
+        for b in range(a):
+            G[a, a] -= G[a, b] ** 2
+        pivots[a] = 1.0 if G[a, a] > DEPENDENT * own else 0.0
+        if pivots[a] != 0.0:
+            G[a, a] = np.sqrt(G[a, a])
+
+
+@compiled
+def solved(H, first, x):  # type: ignore[no-untyped-def]
+    """x becomes the solution, by the factor."""
+    k = len(x)
+    for i in range(k):
+        for j in range(first[i], i):
+            x[i] -= H[i, j] * x[j]
+        x[i] /= H[i, i]
+    for i in range(k - 1, -1, -1):
+        x[i] /= H[i, i]
+        for j in range(first[i], i):
+            x[j] -= H[i, j] * x[i]

@@ -1,0 +1,229 @@
+"""Joints enforced by constraint equations whose directions vary in time: C(t) z = 0, where others share port points for
+good.
+
+What slides or turns relative to both its links cannot be said of fixed points by constant weights. Such a joint's links
+have port points of their own, fixed in them, whose displacements are interface unknowns; rows over them say what the
+joint holds. A coupling surface is seen as a rigid piece: the mean displacement u₀ of its surface and its mean rotation θ,
+both linear in the port points, so that the point of the coupling surface's frame at X moves by u₀ + θ × (X − X₀).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.errors import MeshError
+from kedfem.links.coupling_surfaces import CouplingSurface
+from kedfem.links.record import Link
+from kedfem.links.stations import Stations
+from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.linkage import unit
+from kedfem.motion.newton import cross_matrix
+from kedfem.scene import GROUND, Joint, Scene, by_constraint_equations
+
+Ports = Float[np.ndarray, "p 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """What a joint has on one of its links; all in the link frame, as drawn.
+
+    body : number in the linkage
+    origin : (3,) X₀ of the coupling surface [m]
+    coupling surface : (p, 6, d) u₀ and θ from the displacements at its ports
+    stations : of the link along which a slot's pin slides; its ports are these
+    onto : (p, d, k) displacements at the ports, world components, from the interface unknowns z
+    shared : whether the ports are the link's; not of a rigid slider, which rides on another link
+    points : (p, 3) the ports as drawn [m]
+    """
+
+    body: int
+    origin: Float[np.ndarray, "3"]
+    seat: Float[np.ndarray, "p 6 d"]
+    onto: Float[np.ndarray, "p d k"]
+    stations: Stations | None = None
+    shared: bool = True
+    points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: np.zeros((1, 3)))
+
+
+@dataclass(frozen=True, slots=True)
+class ConstraintJoint:
+    """A joint enforced by constraint equations: row r is gap_r · (u_i − u_j) + turn_r · (θ_i − θ_j) at the joint's point
+    of link i.
+
+    name, at : of the joint, (3,) [m] as drawn
+    bodies : numbers of links i and j in the linkage; directions are fixed in j
+    sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
+    gap, turn : (r, 3) directions as drawn [-, m]
+    cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
+    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
+    axis : (3,) of the joint, as drawn
+    plus : rows of other joints that these are combined with, each with its coefficient: gears
+    """
+
+    name: str
+    at: Float[np.ndarray, "3"]
+    bodies: tuple[int, int]
+    sides: tuple[Side | None, Side | None]
+    gap: Float[np.ndarray, "r 3"]
+    turn: Float[np.ndarray, "r 3"]
+    cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None
+    stiffness: Float[np.ndarray, " r"]
+    damping: Float[np.ndarray, " r"]
+    axis: Float[np.ndarray, "3"]
+    plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
+
+
+def needs_rows(scene: Scene, name: str) -> bool:
+    """Whether a joint is enforced by constraint equations: where shared port points cannot say what it holds."""
+    return by_constraint_equations(scene.joints[name], scene.driven_joints.get(name))
+
+
+def ordered(joint: Joint) -> tuple[str, str]:
+    """The links i and j of a joint enforced by constraint equations: j is the second, or the ground."""
+    first, second = joint.links
+    return (second, first) if first == GROUND and joint.kind != "slot" else (first, second)
+
+
+def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
+    """Direction of the bore or journal that a joint looks for on a link; None where its seat may be any face."""
+    if joint.axes is not None:
+        return unit(joint.axes[joint.links.index(link)])
+    if joint.axis is None or joint.kind in {"prismatic", "planar", "slot"}:
+        return None
+    return unit(joint.axis)
+
+
+def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
+    """Directions of what a joint holds, as drawn: gap and turn of each row."""
+    zero, frame = np.zeros(3), joint_frame(joint)
+    if joint.kind in {"spherical", "weld", "universal"}:
+        turns = {"spherical": [], "weld": list(frame), "universal": [zero]}[joint.kind]  # of a cross later
+        return _stacked(list(frame), turns)
+    *across, axis = frame
+    match joint.kind:
+        case "planar":
+            return _stacked([axis], across)
+        case "slot":
+            return _stacked(across, [])
+        case "prismatic":
+            return _stacked([*across, axis] if driven else across, [*across, axis])
+        case "revolute":
+            return _stacked([*across, axis], [*across, axis] if driven else across)
+    gap, turn = _stacked(across, across)
+    if joint.kind == "screw":
+        gap, turn = np.vstack([gap, axis]), np.vstack([turn, -(joint.lead or 0.0) / (2 * np.pi) * axis])
+        if driven:
+            gap, turn = np.vstack([gap, zero]), np.vstack([turn, axis])
+    return gap, turn
+
+
+def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
+    """Axes x, y, z of a joint as rows, as drawn: z its axis; those of the world without one."""
+    if joint.axis is None:
+        return np.eye(3)
+    axis = unit(joint.axis)
+    return np.stack([*perpendiculars(axis), axis])
+
+
+def springs(
+    scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]
+) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+    """Stiffness and damping of a joint's rows: of its bushing, its drive's shaft; infinite and zero where they hold."""
+    joint, drive = scene.joints[name], scene.driven_joints.get(name)
+    k, c = np.full(len(gap), np.inf), np.zeros(len(gap))
+    frame, of = joint_frame(joint), joint.bushing
+    for r in range(len(gap)):
+        if gap[r].any() and turn[r].any():
+            continue  # a screw's thread
+        along = (
+            2
+            if joint.kind == "universal" and turn[r].any()
+            else int(np.abs(frame @ (gap[r] + turn[r])).argmax())
+        )
+        if of is not None and gap[r].any() and of.stiffness is not None:
+            k[r], c[r] = of.stiffness[along], of.damping[along]
+        if of is not None and turn[r].any() and of.rotational_stiffness is not None:
+            k[r], c[r] = of.rotational_stiffness[along], of.rotational_damping[along]
+        if drive is not None and drive.shaft_stiffness is not None and turn[r].any() and along == 2:
+            k[r], c[r] = drive.shaft_stiffness, drive.shaft_damping
+    return k, c
+
+
+def _stacked(
+    gaps: list[np.ndarray], turns: list[np.ndarray]
+) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
+    gap = np.zeros((len(gaps) + len(turns), 3))
+    turn = np.zeros_like(gap)
+    gap[: len(gaps)] = np.reshape(gaps, (-1, 3))
+    turn[len(gaps) :] = np.reshape(turns, (-1, 3))
+    return gap, turn
+
+
+def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> Bool[np.ndarray, " r"]:
+    """Which rows say something of links that move in a plane z = constant."""
+    return np.asarray((np.abs(gap[:, :2]).max(axis=1) > 1e-9) | (np.abs(turn[:, 2]) > 1e-9))
+
+
+def seat_ports(seat: CouplingSurface, link: Link, where: str) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
+    """Port points of a coupling surface: its middle, and one off it in each direction that it knows; u₀ and θ from them.
+
+    With ∂_k u the rate of change along direction e_k,
+
+        θ = ½ Σ e_k × ∂_k u                                                  a coupling surface that knows all three,
+        θ = e_1 (n · ∂_2 u) − e_2 (n · ∂_1 u) + ½ n (e_2 · ∂_1 u − e_1 · ∂_2 u)    a flat one with normal n,
+
+    each the turn of the coupling surface where it moves rigidly.
+
+    Raises
+    ------
+    MeshError
+        If the coupling surface is a point or a line that does not know its turn.
+    """
+    d = link.d
+    if link.kind == "beam":
+        one = np.zeros((1, 6, 3))
+        one[0, [0, 1, 5], [0, 1, 2]] = 1.0
+        return seat.origin[None], one
+    known = [k for k in range(link.d) if seat.spread[k] > 0]
+    turning = _turning(link, [seat.directions[k] for k in known])
+    if turning is None:
+        raise MeshError(
+            f"{where}: must sit on a bore or a face of link '{link.name}', got a coupling surface that knows no turn"
+        )
+    points = [seat.origin]
+    out = np.zeros((1 + len(known), 6, d))
+    out[0, :d] = np.eye(d)
+    for p, k in enumerate(known, start=1):
+        length = 2 * seat.spread[k]
+        points.append(seat.origin + length * seat.directions[k])
+        theta = turning[p - 1][:, :d] / length
+        out[p, 3:] += theta
+        out[0, 3:] -= theta
+    return np.array(points), out
+
+
+def _turning(link: Link, directions: list[np.ndarray]) -> list[Float[np.ndarray, "3 3"]] | None:
+    """θ = Σ turning_k ∂_k u."""
+    if link.d == 2:
+        z = np.array([0.0, 0.0, 1.0])
+        share = 1.0 if len(directions) == 1 else 0.5
+        return [share * np.outer(z, np.cross(z, e)) for e in directions] or None
+    if len(directions) == 3:
+        return [0.5 * cross_matrix(e) for e in directions]
+    if len(directions) < 2:
+        return None
+    e1, e2 = directions
+    n = np.cross(e1, e2)
+    return [
+        -np.outer(e2, n) + 0.5 * np.outer(n, e2),
+        np.outer(e1, n) - 0.5 * np.outer(n, e1),
+    ]
+
+
+def station_ports(found: Stations, link: Link) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
+    """Port points of a line on which a pin slides; u₀ at each."""
+    out = np.zeros((len(found.s), 6, link.d))
+    k = np.arange(2 if link.planar else 3)
+    out[:, k, k] = 1.0
+    return found.points, out

@@ -1,0 +1,148 @@
+"""The record of an action: a force that depends on how the mechanism moves; where its ends are, and how they move.
+
+An action has two ends. An end is up to two vectors of a link, linear in its state: a point, or directions across a hinge.
+`actions_kernel` makes forces on these vectors from their positions and velocities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.history import Block
+from kedfem.motion.constraints import cross, perpendiculars
+from kedfem.motion.rigid import RigidMotion
+
+TURN, SLIDE, DISTANCE = 0, 1, 2
+POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
+TIME, SPEED, POSITION = 0, 1, 2
+OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION}
+IN_SPACE = (1.0, 1.0, 1.0)
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """One end of an action: vectors x_i = nominal_i + mask * Σ_a w_ia u_a, u the link's state in world components.
+
+    k : number of the link in the model; -1: nothing but the rigid-body motion moves it (the ground, what the drive
+    carries)
+    body : whose rigid-body motion it has, by number in the linkage
+    form : POINT: one point; PAIR: two directions across a hinge, e1 × e2 its axis; SINGLE: one direction across, and the
+        axis; ANGLE: (0, 0, ψ) of a planar beam
+    weights : (m, n) on the rows of the state; (m, 0) for k = -1
+    X : (m, 3) the vectors as drawn [m; -]
+    mask : (3,) which components of the state's rows the vectors are made of; forces on them likewise
+    offset : (3,) from the point of the link, to which X belongs, to the end itself; does not turn [m]
+    link : name of the link in the scene, where that is not the model's: a slider, what the drive carries
+    """
+
+    k: int
+    body: int
+    form: int
+    weights: Float[np.ndarray, "m n"]
+    X: Float[np.ndarray, "m 3"]
+    mask: tuple[float, float, float] = IN_SPACE
+    offset: Vector = field(default_factory=lambda: np.zeros(3))
+    link: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ForceElement:
+    """A force law on one coordinate: the turn of a hinge, the travel of a slide, the distance of two points.
+
+    name : ``motors/NAME``, ``springs/NAME`` or ``joints/NAME``
+    kind : TURN, SLIDE, DISTANCE
+    ends : the coordinate is that of the first against the second
+    stiffness, damping, free : of a spring, free where it has no force
+    axis : of a hinge or slide, as drawn
+    over, at, value : of a motor, its curve; none: no points
+    """
+
+    name: str
+    kind: int
+    ends: tuple[End, End]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    free: float = 0.0
+    axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    over: int = 0
+    at: tuple[float, ...] = ()
+    value: tuple[float, ...] = ()
+
+
+Table = tuple[np.ndarray, ...]
+
+
+def kernel_table(every: Sequence[ForceElement]) -> Table:
+    """What the kernel takes of actions: kinds, forms, numbers, over, first, at, height."""
+    numbers = np.zeros((len(every), 14))
+    for row, action in zip(numbers, every, strict=True):
+        row[:3] = action.stiffness, action.damping, action.free
+        e1, e2 = perpendiculars(action.axis)
+        row[3:12] = np.concatenate([action.axis, e1, e2])
+        if action.kind == TURN:
+            row[12:] = _drawn_angles(action, e1, e2)
+    return (
+        np.array([action.kind for action in every], int),
+        np.array([[end.form for end in action.ends] for action in every], int).reshape(-1, 2),
+        numbers,
+        np.array([action.over for action in every], int),
+        np.concatenate([[0], np.cumsum([len(action.at) for action in every], dtype=int)]),
+        np.array([x for action in every for x in action.at], float),
+        np.array([x for action in every for x in action.value], float),
+    )
+
+
+def _drawn_angles(action: ForceElement, e1: Vector, e2: Vector) -> list[float]:
+    """Angles from the second end's directions to the first's, as drawn."""
+    drawn = []
+    for k in range(2):
+        a, b = (
+            {PAIR: end.X[k % len(end.X)], SINGLE: end.X[0], ANGLE: (e1, e2)[k]}[end.form]
+            for end in action.ends
+        )
+        drawn.append(float(np.arctan2(action.axis @ np.cross(b, a), a @ b)))
+    return drawn
+
+
+Vectors = tuple[Float[np.ndarray, "T 2 3"], Float[np.ndarray, "T 2 3"]]
+"""Two vectors of an end over time, and their rates; the second is zero where there is none."""
+
+
+def nominal_vectors(end: End, motion: RigidMotion) -> Vectors:
+    """What an end's vectors and their rates would be if its link did not deform or leave the rigid-body motion."""
+    R, omega, m = motion.R[:, end.body], motion.omega[:, end.body], len(end.X)
+    x, v = np.zeros((2, len(motion.t), 2, 3))
+    if end.form == ANGLE:
+        x[:, 0, 2], v[:, 0, 2] = np.arctan2(R[:, 1, 0], R[:, 0, 0]), omega[:, 2]
+        return x, v
+    x[:, :m] = end.X @ R.transpose(0, 2, 1)
+    v[:, :m] = cross(omega[:, None], x[:, :m])
+    if end.form == POINT:
+        x[:, 0] += motion.p[:, end.body] + end.offset
+        v[:, 0] += motion.v[:, end.body]
+    return x, v
+
+
+def vectors(every: Sequence[ForceElement], block: Block) -> tuple[Float[np.ndarray, "T A 2 2 3"], ...]:
+    """Positions and velocities of all ends over a block of time points, as the kernel takes them."""
+    x, v = np.zeros((2, len(block), len(every), 2, 2, 3))
+    for i, action in enumerate(every):
+        for e, end in enumerate(action.ends):
+            x[:, i, e], v[:, i, e] = nominal_vectors(end, block.motion)
+            if end.k >= 0:
+                history = block.links[end.k]
+                x[:, i, e] += elastic_vectors(end, history.u)
+                v[:, i, e] += elastic_vectors(end, history.v)
+    return x, v
+
+
+def elastic_vectors(end: End, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T 2 3"]:
+    """What an end's vectors have of the displacement of its link, or of its rate."""
+    moved = end.weights @ u
+    out = np.zeros((len(u), 2, 3))
+    out[:, : moved.shape[1], : u.shape[2]] = moved
+    return np.asarray(out * end.mask)

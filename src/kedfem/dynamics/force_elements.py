@@ -1,0 +1,203 @@
+"""Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from kedfem.dynamics.force_element import (
+    ANGLE,
+    DISTANCE,
+    IN_SPACE,
+    OVER,
+    PAIR,
+    POINT,
+    SINGLE,
+    SLIDE,
+    TURN,
+    End,
+    ForceElement,
+    Vector,
+)
+from kedfem.dynamics.model import Model, Slider, on_segment
+from kedfem.dynamics.places import seat_of, slider_axis
+from kedfem.errors import MeshError, SceneError
+from kedfem.links.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
+from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows
+from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.linkage import joint_axis
+from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
+
+
+def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
+    """All motors and springs of a scene.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a point or joint is not on its link.
+    """
+    return _all(_Ends(scene, model))
+
+
+def rigid_actions(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, ...]:
+    """The same on links that do not deform, moving as given.
+
+    Parameters
+    ----------
+    bodies : their names by number in the linkage
+    """
+    return _all(_RigidEnds(scene, bodies))
+
+
+def _all(find: "_Ends | _RigidEnds") -> tuple[ForceElement, ...]:
+    motors = [_motor(find, name, motor) for name, motor in find.scene.motors.items()]
+    springs = [_spring(find, name, spring) for name, spring in find.scene.springs.items()]
+    return (*motors, *springs)
+
+
+def hinges(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
+    """An action without a force for each revolute joint: its turn is looked at."""
+    find = _Ends(scene, model)
+    names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
+    return tuple(_hinge(find, f"joints/{name}", name) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """Where ends are on the links of a model."""
+
+    scene: Scene
+    model: Model
+
+    def body(self, name: str) -> int | None:
+        """The body that a link without unknowns moves with; None of others."""
+        if name == GROUND or slider_axis(self.scene, name) is not None:
+            return 0
+        return next((x.body for x in self.model.carried if x.link.name == name), None)
+
+    def point(self, where: str, name: str, at: Vector) -> End:
+        """A point of a link, the ground or a slider."""
+        slider = next((x for x in self.model.sliders if x.name == name), None)
+        if slider is not None:
+            return self.on_slider(slider, at)
+        body = self.body(name)
+        if body is not None:
+            return End(-1, body, POINT, np.zeros((1, 0)), at[None], link=name)
+        k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
+        link = self.model.links[k]
+        beside = float(np.linalg.norm(rows.X - at))
+        if link.kind == "beam" and beside > 1e-6 * link.size:
+            raise SceneError(f"{where}: must lie on the axis of beam '{name}', got {beside:.3g} m beside it")
+        return End(k, self.model.bodies[k], POINT, rows.value[None], rows.X[None], _plane(link))
+
+    def on_slider(self, slider: Slider, at: Vector) -> End:
+        """A point of a slider, which rides on its carrier and never turns."""
+        port = np.asarray(self.scene.joints[slider.joint].at)
+        k, link = slider.carrier, self.model.links[slider.carrier]
+        return End(
+            k, self.model.bodies[k], POINT, slider.weights[None], port[None], _plane(link), at - port, slider.name
+        )  # fmt: skip
+
+    def across(self, joint: str, name: str) -> End:
+        """Directions of a link across the axis of a hinge."""
+        axis, at = joint_axis(self.scene.joints[joint]), np.asarray(self.scene.joints[joint].at)
+        both = np.array(perpendiculars(axis))
+        body = self.body(name)
+        if body is not None:
+            return End(-1, body, PAIR, np.zeros((2, 0)), both, link=name)
+        k, seat = on_segment(self.model, name, at, lambda link: seat_of(self.scene, joint, link))
+        link, here = self.model.links[k], self.model.bodies[k]
+        if link.kind == "beam":
+            return End(k, here, ANGLE, seat.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
+        if all(holds(seat, e) for e in both):
+            return End(k, here, PAIR, both @ seat.fit[1:], both, _plane(link))
+        known = np.array([_in_face(f"joints.{joint}", link, seat, axis), axis])
+        return End(k, here, SINGLE, known @ seat.fit[1:], known, _plane(link))
+
+
+@dataclass(frozen=True, slots=True)
+class _RigidEnds:
+    """Where ends are on links that only move as given."""
+
+    scene: Scene
+    bodies: Sequence[str]
+
+    def body(self, name: str) -> int:
+        """The number of a link."""
+        return list(self.bodies).index(name)
+
+    def point(self, where: str, name: str, at: Vector) -> End:
+        """A point of a link or the ground."""
+        return End(-1, self.body(name), POINT, np.zeros((1, 0)), at[None], link=name)
+
+    def across(self, joint: str, name: str) -> End:
+        """Directions of a link across the axis of a hinge."""
+        both = np.array(perpendiculars(joint_axis(self.scene.joints[joint])))
+        return End(-1, self.body(name), PAIR, np.zeros((2, 0)), both, link=name)
+
+
+def _plane(link: Link) -> tuple[float, float, float]:
+    """The components of a state's rows that are displacements."""
+    return (1.0, 1.0, 0.0) if link.planar else IN_SPACE
+
+
+def _in_face(where: str, link: Link, seat: CouplingSurface, axis: Vector) -> Vector:
+    """The direction within a flat coupling surface across an axis."""
+    t = np.cross(face_normal(seat), axis)
+    if np.linalg.norm(t) < 1e-6 or not holds(seat, t):
+        raise MeshError(
+            f"{where}: must sit on a bore of link '{link.name}' to be turned, got a face across its axis"
+        )
+    return np.asarray(t / np.linalg.norm(t))
+
+
+def _ordered(links: tuple[str, str]) -> tuple[str, str]:
+    """The links of a joint: the first that is not the ground, and the other."""
+    return (links[1], links[0]) if links[0] == GROUND else links
+
+
+def _hinge(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
+    """An action on the turn of a hinge, without a force yet."""
+    one, other = _ordered(find.scene.joints[joint].links)
+    ends = (find.across(joint, one), find.across(joint, other))
+    return ForceElement(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
+
+
+def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
+    """An action on the travel of a slide, without a force yet: the port of its link against the other."""
+    at = np.asarray(find.scene.joints[joint].at)
+    one, other = _ordered(find.scene.joints[joint].links)
+    axis, end = joint_axis(find.scene.joints[joint]), find.point(f"joints.{joint}", other, at)
+    if end.k < 0 and other != GROUND:  # it turns with what it is on
+        end = replace(end, X=np.array([at, axis]), weights=np.zeros((2, 0)))
+    return ForceElement(name, SLIDE, (_port(find, joint, one, at), end), axis=axis)
+
+
+def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:
+    """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
+    if isinstance(find, _RigidEnds) or find.body(name) is not None:
+        return find.point(f"joints.{joint}", name, at)
+    k, seat = on_segment(find.model, name, at, lambda link: seat_of(find.scene, joint, link))
+    link, weights = find.model.links[k], port_weights(seat, at[None])
+    return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
+
+
+def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> ForceElement:
+    curve = motor.curve
+    made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
+    return replace(made, over=OVER[curve.over], at=curve.at, value=curve.value)
+
+
+def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement:
+    law: dict[str, Any] = {"stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free}
+    if not isinstance(spring, LineSpring) or spring.between is None:
+        made = _slide if isinstance(spring, LineSpring) else _hinge
+        return replace(made(find, f"springs/{name}", str(spring.joint)), **law)
+    one, other = (
+        find.point(f"springs.{name}.between[{i}].at", end.link, np.asarray(end.at))
+        for i, end in enumerate(spring.between)
+    )
+    return ForceElement(f"springs/{name}", DISTANCE, (one, other), **law)

@@ -1,0 +1,277 @@
+"""Where joints sit: the affine field that best fits a bore or a face, with scalar, rotation-invariant weights."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.linalg import qr
+
+from kedfem.errors import MeshError
+from kedfem.links.facet_selection import named_facets, picked
+from kedfem.links.missing import in_its_plane, not_touching
+from kedfem.links.record import Link
+from kedfem.links.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface
+
+
+@dataclass(frozen=True, slots=True)
+class CouplingSurface:
+    """The surface of a link that a joint holds, seen through its affine fit.
+
+    u(x) = fit[0] @ u + (x − origin) · (fit[1:] @ u): value and gradient of the affine field closest, area-weighted,
+    to the displacement u of the surface. The weights are scalars, so they commute with every rotation.
+
+    fit : (4, n) [-; 1/m]
+    origin : (3,) area centroid, or the node of a beam [m]
+    directions : (3, 3) rows, principal directions, widest spread first
+    spread : (3,) standard deviations along them [m]; along z of a plane link 0, directions[2] being z
+    facets : boundary facets of a solid or plane link (for surface loads)
+    dimensions : of the link that it is on: 2 for a plane link
+    """
+
+    fit: Float[np.ndarray, "4 n"]
+    origin: Float[np.ndarray, "3"]
+    directions: Float[np.ndarray, "3 3"]
+    spread: Float[np.ndarray, "3"]
+    facets: Int[np.ndarray, " f"] | None = None
+    dimensions: int = 3
+
+
+def port_weights(seat: CouplingSurface, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p n"]:
+    """Scalar weights W of port points: u(points) = W u.
+
+    Parameters
+    ----------
+    points : (p, 3) reference positions [m]; each row of the result sums to one.
+    """
+    return np.asarray(seat.fit[0] + (points - seat.origin) @ seat.fit[1:])
+
+
+def holds(seat: CouplingSurface, direction: Float[np.ndarray, "3"]) -> bool:
+    """Whether the affine fit knows how the displacement changes along a direction (a flat face: not its normal)."""
+    known = seat.spread > PLANE_TOLERANCE * max(seat.spread[0], 1e-300)
+    return bool(np.linalg.norm(seat.directions[~known] @ direction) < 1e-6)
+
+
+def is_flat(seat: CouplingSurface) -> bool:
+    """Whether the coupling surface is a plane face, of a plane link a straight edge, of a spatial beam a section between
+    its hubs."""
+    return bool(seat.spread[0] > 0 and seat.spread[seat.dimensions - 1] == 0)
+
+
+def face_normal(seat: CouplingSurface) -> Float[np.ndarray, "3"]:
+    """Direction across a flat coupling surface, along which its affine fit knows nothing."""
+    return np.asarray(seat.directions[seat.dimensions - 1])
+
+
+def joint_seat(
+    link: Link,
+    where: str,
+    point: Float[np.ndarray, "3"],
+    axis: Float[np.ndarray, "3"] | None,
+    faces: Sequence[str] = (),
+) -> CouplingSurface:
+    """The coupling surface that a link offers to a joint: a beam's node; else a bore or journal about the axis, else the
+    face there.
+
+    Parameters
+    ----------
+    where : how messages name the joint, e.g. ``joints.B``
+    point : reference position of the joint [m]
+    axis : unit vector of a bore to look for, or None
+    faces : names of the faces that make the coupling surface, if they are given
+
+    Raises
+    ------
+    MeshError
+        If the link has no node, bore or face there, or several between which nothing tells.
+    """
+    if link.full is not None and link.Q is not None:
+        seat = joint_seat(link.full, where, point, axis, faces)
+        return replace(seat, fit=seat.fit @ link.Q)
+    if link.kind == "beam":
+        return _node_seat(link, where, point)
+    if link.kind == "spatial_beam":
+        return _section_seat(link, where, point)
+    return facet_seat(link, named_facets(link, where, faces) if faces else picked(link, where, point, axis))
+
+
+def rigid_seat(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
+    """The coupling surface that a rigid solid offers at any point: its affine field, told by four of its nodes.
+
+    Parameters
+    ----------
+    at : reference position, in the link or outside it [m]
+    """
+    known = np.column_stack([link.one, (link.X - np.outer(link.one, at)) / link.size])
+    order = qr(known.T, mode="r", pivoting=True)[1]
+    four = order[:4]
+    fit = np.zeros((4, link.n))
+    fit[:, four] = np.linalg.inv(known[four]) / np.array([1.0, *[link.size] * 3])[:, None]
+    return CouplingSurface(fit, np.asarray(at, float), np.eye(3), np.full(3, link.size))
+
+
+def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+    """The flat or cylindrical face of a link that passes through a point, e.g. to carry a surface force.
+
+    Raises
+    ------
+    MeshError
+        If no face does.
+    """
+    if link.full is not None and link.Q is not None:
+        seat = face_seat(link.full, where, point)
+        return replace(seat, fit=seat.fit @ link.Q)
+    seen = in_its_plane(link, point)
+    facets = flat_face(link, seen)
+    if not len(facets):
+        facets = smooth_face(link, seen)
+    if not len(facets):
+        raise MeshError(not_touching(link, where, point))
+    return facet_seat(link, facets)
+
+
+def same_face(link: Link, seat: CouplingSurface) -> CouplingSurface | None:
+    """What another segment of a link has of a plane face, None if it has none of it.
+
+    Parameters
+    ----------
+    coupling surface : the face on the segment where it was found
+    """
+    if link.full is not None and link.Q is not None:
+        found = same_face(link.full, seat)
+        return None if found is None else replace(found, fit=found.fit @ link.Q)
+    _, corners, normals = boundary(link)
+    height = np.abs((corners - seat.origin) @ face_normal(seat)).max(axis=1)
+    along = np.abs(normals @ face_normal(seat)) > 1 - 1e-6
+    for point in corners.mean(axis=1)[(height <= PLANE_TOLERANCE * link.size) & along]:
+        if len(facets := flat_face(link, point)):
+            return facet_seat(link, facets)
+    return None
+
+
+def surface_weights(link: Link, seat: CouplingSurface) -> Float[np.ndarray, " n"]:
+    """Area integrals ∫ N_a dΓ of a coupling surface's surface, [KED, eqs. (15)(16)]: a force φ per area gives weights ⊗
+    φ.
+
+    Returns
+    -------
+    (n,) [m²]
+    """
+    if seat.facets is None:
+        return np.zeros(link.n)
+    if link.full is not None and link.Q is not None:
+        return np.asarray(surface_weights(link.full, seat) @ link.Q)
+    on = surface(link, seat.facets)
+    local = np.einsum("fqm,fq->fm", on.N, on.dA)
+    return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
+
+
+def face_normals(link: Link, seat: CouplingSurface) -> Float[np.ndarray, "n d"]:
+    """Area integrals ∫ N_a n dΓ of a coupling surface's surface, n its outward normal: a pressure p gives forces −p times
+    them.
+
+    Returns
+    -------
+    (n, d) [m²]
+    """
+    if seat.facets is None:
+        return np.zeros((link.n, link.d))
+    if link.full is not None and link.Q is not None:
+        return np.asarray(link.Q.T @ face_normals(link.full, seat))
+    on = surface(link, seat.facets)
+    local = np.einsum("fqm,fq,fqk->kfm", on.N, on.dA, on.normals)
+    rows = [np.bincount(on.dofs.ravel(), weights=x.ravel(), minlength=link.n) for x in local[: link.d]]
+    return np.stack(rows, axis=1)
+
+
+def seat_couples(link: Link, seat: CouplingSurface, where: str) -> Float[np.ndarray, "3 n d"]:
+    """Forces of unit couples about x, y, z that work on the turn of a coupling surface's affine fit; they have no
+    resultant force.
+
+    The turn in the plane of two principal directions i, j is ½ (∂_i u_j − ∂_j u_i), or where the fit does not know ∂_j
+    (j across a flat coupling surface) ∂_i u_j.
+
+    Parameters
+    ----------
+    where : how messages name the load
+    """
+    D, known = seat.directions, seat.spread > 0
+    if link.d == 2:
+        known = known & [True, True, False]
+    couples = np.zeros((3, link.n, 3))
+    for k in [2] if link.d == 2 else range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        if not (known[i] or known[j]):
+            raise MeshError(f"{where}.at: must be a bore or a face of link '{link.name}', got a single point")
+        both = 0.5 if known[i] and known[j] else 1.0
+        turn = both * (np.outer(D[i], D[j]) * known[i] - np.outer(D[j], D[i]) * known[j])
+        about = np.linalg.det(D) * D[k]
+        couples += about[:, None, None] * (seat.fit[1:].T @ turn)
+    return couples[:, :, : link.d]
+
+
+def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
+    """The function whose node is at a point."""
+    distance = np.where(link.one != 0, np.linalg.norm(link.X - point, axis=1), np.inf)
+    node = int(distance.argmin())
+    if distance[node] > PLANE_TOLERANCE * link.size:
+        raise MeshError(not_touching(link, where, point))
+    return node
+
+
+def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+    node = _node_at(link, where, point)
+    fit = np.zeros((4, link.n))
+    fit[0, node] = 1.0
+    return CouplingSurface(fit, link.X[node], np.eye(3), np.zeros(3))
+
+
+def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+    """The section at a node of a spatial beam: between its hubs it does not know how a field changes along the axis.
+
+    Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
+    could be told of the section's turn from their difference.
+    """
+    node = _node_at(link, where, point)
+    following = np.flatnonzero(link.one[node + 1 :])
+    slopes = np.arange(node + 1, node + 1 + following[0] if len(following) else link.n)
+    fit = np.zeros((4, link.n))
+    fit[0, node] = 1.0
+    fit[1:, slopes] = link.X[slopes].T
+    y, z = link.X[slopes[-2:]]
+    known = np.array([1.0, 1.0, len(slopes) - 2.0])
+    return CouplingSurface(
+        fit, link.X[node], np.stack([y, z, np.cross(y, z)]), known * link.size / np.sqrt(12)
+    )
+
+
+def facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> CouplingSurface:
+    """The coupling surface that some boundary facets of a meshed link make."""
+    on = surface(link, facets)
+    x, dA = on.x.transpose(2, 0, 1), on.dA  # (3, f, q), (f, q)
+    area = dA.sum()
+    origin = np.einsum("kfq,fq->k", x, dA) / area
+    r = x - origin[:, None, None]
+    spread, directions = _principal(np.einsum("ifq,jfq,fq->ij", r, r, dA) / area, link.d)
+    phi = np.concatenate([np.ones((1, *dA.shape)), np.einsum("ij,jfq->ifq", directions, r)])
+    moments = np.zeros((4, link.n))
+    local = np.einsum("cfq,fqm,fq->cfm", phi, on.N, dA, optimize=True)
+    for c in range(4):
+        moments[c] = np.bincount(on.dofs.ravel(), weights=local[c].ravel(), minlength=link.n)
+    known = np.concatenate([[True], spread > 0])
+    scale = np.where(known, area * np.concatenate([[1.0], np.maximum(spread, 1e-300) ** 2]), np.inf)
+    local_fit = moments / scale[:, None]
+    fit = np.concatenate([local_fit[:1], directions.T @ local_fit[1:]])
+    return CouplingSurface(fit, origin, directions, spread, facets, link.d)
+
+
+def _principal(
+    covariance: Float[np.ndarray, "3 3"], d: int
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+    """Standard deviations, widest first, and their directions as rows; in a plane the third is z."""
+    variance, vectors = np.linalg.eigh(covariance[:d, :d])
+    spread, directions = np.zeros(3), np.eye(3)
+    spread[:d], directions[:d, :d] = np.sqrt(np.abs(variance[::-1])), vectors[:, ::-1].T
+    spread[spread < PLANE_TOLERANCE * spread[0]] = 0.0
+    return spread, directions

@@ -1,0 +1,100 @@
+"""Which facets of a meshed link a joint sits on: faces by name, else what lies about its point and axis."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import MeshError
+from kedfem.links.candidates import round_candidates
+from kedfem.links.missing import ambiguous, in_its_plane, not_touching
+from kedfem.links.record import Link
+from kedfem.links.round_surfaces import Round, ball, rounds, seated
+from kedfem.links.surface import CYLINDER_TOLERANCE, flat_face
+
+Facets = Int[np.ndarray, " f"]
+
+
+def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
+    """Facets of faces by their names.
+
+    Raises
+    ------
+    MeshError
+        If the link has no face of such a name, or has none of it as the segment of another.
+    """
+    known = {each.face.name: each.facets for each in link.faces}
+    for name in faces:
+        if name not in known:
+            own = [each.face.name for each in link.faces if not each.face.chosen]
+            there = (
+                ", ".join(map(repr, own)) or "none (a part from CAD, or a mesh file with groups, has some)"
+            )
+            raise MeshError(
+                f"{where}.faces: must name faces of link '{link.name}', got {name!r}; it has {there}"
+            )
+    facets = np.unique(np.concatenate([known[name] for name in faces]))
+    if not len(facets):
+        names = ", ".join(map(repr, faces))
+        raise MeshError(
+            f"{where}.faces: must name faces of link '{link.name}' that have elements, got {names}"
+        )
+    return facets
+
+
+def picked(
+    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
+) -> Facets:
+    """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.
+
+    Raises
+    ------
+    MeshError
+        If there is nothing of that, or if it cannot be told which.
+    """
+    seen = in_its_plane(link, point)
+    if axis is None and link.d == 3 and len(found := ball(link, point)):
+        return found
+    axes = np.eye(3)[2:] if link.kind == "plane" else link.axes.T if axis is None else (axis,)
+    about = [rounds(link, seen, each) for each in axes]
+    if axis is None and link.d == 3 and not any(each.inward for found in about for each in found):
+        about += [rounds(link, seen, each) for each in _own_axes(link, seen)]
+    if bores := _first([[each for each in found if each.inward] for found in about]):
+        return _told(link, where, seen, bores)
+    journals = _first([[each for each in found if not each.inward] for found in about])
+    if any(each.gap < -each.level or link.d == 2 for each in journals):
+        return _told(link, where, seen, journals)
+    if len(face := flat_face(link, seen)):
+        return face
+    if journals:
+        return _told(link, where, seen, journals)
+    raise MeshError(not_touching(link, where, point, axis))
+
+
+def _first(several: Iterable[list[Round]]) -> list[Round]:
+    """The first that are any."""
+    return next((found for found in several if found), [])
+
+
+def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[Round]) -> Facets:
+    """The facets of the one that a joint sits on, or of several that one pin fits.
+
+    Raises
+    ------
+    MeshError
+        If there are several of different radius.
+    """
+    chosen = seated(found, link.d == 2)
+    size = [each.radius for each in chosen]
+    if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):
+        raise MeshError(ambiguous(link, where, point, chosen))
+    return np.concatenate([each.facets for each in chosen])
+
+
+def _own_axes(link: Link, point: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
+    """Directions of the link's own bores and journals whose axes pass through a point."""
+    return [
+        each.direction
+        for each in round_candidates(link)
+        if each.cylindrical and each.beside(point) <= CYLINDER_TOLERANCE * each.radius
+    ]

@@ -1,0 +1,127 @@
+"""What a part on its own offers to joints: bores, journals, balls, plane faces, and what a joint finds at each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.errors import MeshError
+from kedfem.links.facet_selection import picked
+from kedfem.links.record import Link, LinkFace
+from kedfem.links.round_surfaces import CLOSED
+from kedfem.links.solid import link_faces, solid_basis, vtk_cells
+from kedfem.links.surface import flat_face, surface
+from kedfem.mesh import SolidMesh
+from kedfem.mesh.hexahedra import CELL_TYPES, Face
+
+KINDS = ("bore", "journal", "ball seat", "ball", "part of a bore", "part of a journal", "plane")
+BLENDS = ("fillet", "rounded")  # words of faces that no joint sits on
+MOST = 40  # of a part with hundreds of plane faces the largest
+MOSTLY = 0.5  # of a face's sides: so many found are the face
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A face that a joint can sit on, by its number in the table and the picture.
+
+    kind : one of KINDS
+    at : (3,) on its axis half way, its centre, of a plane a point on it next to its centroid [m]
+    found : numbers of all faces that a joint at `at` finds by itself, about the axis of a round one
+    area : [m²]
+    """
+
+    number: int
+    face: Face
+    kind: str
+    at: Float[np.ndarray, "3"]
+    found: tuple[int, ...]
+    area: float
+
+    @property
+    def finds(self) -> str:
+        """What a joint there finds, in words: it, it and others, others instead, or nothing."""
+        others = ", ".join(str(each) for each in self.found if each != self.number)
+        if self.number in self.found:
+            return f"it with {others}" if others else "it"
+        return f"{others} instead" if others else "by faces only"
+
+
+def offers(mesh: SolidMesh) -> list[Offer]:
+    """The faces of a meshed part that a joint can sit on, round ones first, those of a kind by area."""
+    link = _surface_of(mesh)
+    rows = []
+    for each in link.faces:
+        kind = face_kind(mesh, each.face)
+        if kind in KINDS and len(each.facets):
+            rows.append((KINDS.index(kind), -float(surface(link, each.facets).dA.sum()), each))
+    rows = sorted(rows, key=lambda row: row[:2])[:MOST]
+    listed = [each for _, _, each in rows]
+    return [
+        Offer(
+            number,
+            each.face,
+            KINDS[kind],
+            _point(link, each),
+            _found(link, KINDS[kind], each, listed),
+            -area,
+        )
+        for number, (kind, area, each) in enumerate(rows, start=1)
+    ]
+
+
+def face_kind(mesh: SolidMesh, face: Face) -> str:
+    """What a joint can take a face for: cylinders only where they are closed; of blends what they are called."""
+    if face.words.startswith(BLENDS) or face.kind == "other":
+        return face.words or "other"
+    if face.kind != "cylinder":
+        return ("ball seat" if face.inward else "ball") if face.kind == "sphere" else "plane"
+    r = mesh.points[face.sides].mean(axis=1) - face.centre
+    r -= np.outer(r @ face.direction, face.direction)
+    part = "part of a " if np.linalg.norm(r.mean(axis=0)) > CLOSED * face.radius else ""
+    return part + ("bore" if face.inward else "journal")
+
+
+def _surface_of(mesh: SolidMesh) -> Link:
+    """A link of a mesh without mass and stiffness: what faces are looked for on."""
+    basis = solid_basis(mesh)
+    X = np.ascontiguousarray(basis.doflocs.T)
+    nothing = np.zeros(len(X))
+    return Link(
+        name="part", kind="solid", X=X, one=nothing + 1, cells=vtk_cells(basis), axes=np.eye(3),
+        cell_type=CELL_TYPES[len(basis.element_dofs)], mass=(None,) * 3, K0=None, m1=np.zeros_like(X),
+        mX=np.zeros_like(X), volume=nothing, E=0.0, lame=(0.0, 0.0), basis=basis, faces=link_faces(basis, mesh),
+    )  # fmt: skip
+
+
+def _point(link: Link, each: LinkFace) -> Float[np.ndarray, "3"]:
+    """Where one would put a joint on a face [m]."""
+    if each.face.kind != "plane":
+        return each.face.centre
+    middles = link.X[link.basis.mesh.facets[:, each.facets]].mean(axis=0)
+    return np.asarray(middles[np.linalg.norm(middles - each.face.centre, axis=1).argmin()])
+
+
+def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) -> tuple[int, ...]:
+    """Numbers of the faces that a joint on a face finds."""
+    point = _point(link, each)
+    axis = each.face.direction if each.face.kind == "cylinder" else None
+    facets: Int[np.ndarray, " f"]
+    try:
+        facets = flat_face(link, point) if kind == "plane" else picked(link, "part", point, axis)
+    except MeshError:
+        return ()
+    return tuple(
+        number
+        for number, other in enumerate(listed, start=1)
+        if np.isin(other.facets, facets).mean() > MOSTLY
+    )
+
+
+def axis_in_words(face: Face) -> str:
+    """A face's axis or normal: a letter where it is along one, else its components."""
+    for axis, name in zip(np.eye(3), "xyz", strict=True):
+        along = float(face.direction @ axis)
+        if abs(along) > 1 - 1e-9:
+            return name if along > 0 or face.kind == "cylinder" else f"-{name}"
+    return "({:g}, {:g}, {:g})".format(*(np.round(face.direction, 3) + 0.0))

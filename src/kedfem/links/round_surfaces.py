@@ -1,0 +1,139 @@
+"""Round coupling surfaces by their geometry: bores, journals and balls about a joint's point, in any mesh of
+hexahedra."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from kedfem.links.record import Link
+from kedfem.links.surface import (
+    CYLINDER_TOLERANCE,
+    PLANE_TOLERANCE,
+    boundary,
+    components,
+    neighbours,
+    surface,
+)
+
+FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
+AROUND = 0.1  # of a bore's radius: how near the middle of one of its facets may be to the axis
+CLOSED = (
+    0.3  # of the radius: how far from the axis the mean of a cylinder's corners is that goes all round it
+)
+LEVEL = 1e-3  # of a cylinder's length and radius: places along the axis that are the same
+MANY = 12  # facets at one distance from a point are not so by chance
+SUNK = 0.1  # of a cylinder's radius: how far within it its facets may sink; those of a prism of six sides sink by 0.13
+DOMED = (
+    0.1  # of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """Facets on a closed cylinder about an axis: of all bores of one radius, which one pin goes through, or of a journal.
+
+    low, high : where it begins and ends along the axis, from the joint's point [m]
+    """
+
+    facets: Int[np.ndarray, " f"]
+    radius: float
+    inward: bool
+    low: float
+    high: float
+
+    @property
+    def gap(self) -> float:
+        """How far the joint's point is off along the axis; negative by how far it is inside [m]."""
+        return max(self.low, -self.high)
+
+    @property
+    def level(self) -> float:
+        """What is no distance along the axis [m]."""
+        return LEVEL * (self.high - self.low + self.radius)
+
+
+def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]) -> list[Round]:
+    """All closed cylinders about an axis through a point, as far as they are near it along the axis.
+
+    Facets may be flat, seven or more of them around; a prism of fewer sides is none.
+    """
+    facets, corners, normals = boundary(link)
+    along = (corners - point) @ axis
+    r = corners - point - along[..., None] * axis
+    radii = np.linalg.norm(r, axis=2)
+    mean, middle = radii.mean(axis=1), r.mean(axis=1)
+    out = np.linalg.norm(middle, axis=1)
+    # a facet around the axis, whose corners are as far from it too, is no part of a bore
+    round_ = (np.ptp(radii, axis=1) <= CYLINDER_TOLERANCE * mean) & (out > AROUND * mean)
+    round_ &= mean > PLANE_TOLERANCE * np.ptp(link.X, axis=0).max()
+    some = np.flatnonzero(round_)
+    x = surface(link, facets[some]).x - point
+    within = np.linalg.norm(x - (x @ axis)[..., None] * axis, axis=2).min(axis=1)
+    round_[some] = within >= (1 - SUNK) * mean[some]
+    facing = np.einsum("fk,fk->f", normals, middle)
+    found = []
+    for inward, side in ((True, facing < -0.5 * out), (False, facing > 0.5 * out)):
+        for same in _of_one_radius(np.flatnonzero(round_ & side), mean):
+            for piece in [same] if inward else _pieces(link, facets, same):
+                if np.linalg.norm(r[piece].mean(axis=(0, 1))) < CLOSED * mean[piece].min():
+                    low, high = float(along[piece].min()), float(along[piece].max())
+                    found.append(Round(facets[piece], float(mean[piece].mean()), inward, low, high))
+    return [each for each in found if each.gap <= FAR * (each.high - each.low + each.radius)]
+
+
+def _of_one_radius(
+    which: Int[np.ndarray, " k"], radius: Float[np.ndarray, " f"]
+) -> list[Int[np.ndarray, " _"]]:
+    """Facets sorted by radius and divided where it differs."""
+    order = which[radius[which].argsort()]
+    steps = np.flatnonzero(np.diff(radius[order]) > CYLINDER_TOLERANCE * radius[order[:-1]])
+    return [part for part in np.split(order, steps + 1) if len(part)]
+
+
+def _pieces(
+    link: Link, facets: Int[np.ndarray, " f"], which: Int[np.ndarray, " k"]
+) -> list[Int[np.ndarray, " _"]]:
+    """Facets divided into those that hang together."""
+    first, second = neighbours(link, facets[which])
+    label = components(first, second, np.ones(len(first), bool), len(which))
+    return [which[label == k] for k in range(label.max() + 1)]
+
+
+def seated(found: list[Round], flat: bool) -> list[Round]:
+    """Those of some bores, or of some journals, that a joint sits on: several only where it cannot be told.
+
+    One whose extent contains the joint's point, of bores the narrowest; else the nearest along the axis.
+
+    Parameters
+    ----------
+    flat : in a plane, where cylinders have no extent
+    """
+    inside = [each for each in found if flat or each.gap < -each.level]
+    if inside:
+        narrowest = min(inside, key=lambda each: each.radius)
+        return [narrowest] if narrowest.inward else inside
+    nearest = min((each.gap for each in found), default=0.0)
+    return [each for each in found if each.gap <= nearest + each.level]
+
+
+def ball(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
+    """Facets of the smallest ball or ball seat about the point, or of what there is of it: a ball may have a neck."""
+    facets, corners, normals = boundary(link)
+    radius = np.linalg.norm(corners - point, axis=2)
+    mean = radius.mean(axis=1)
+    round_ = np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean
+    for same in _of_one_radius(np.flatnonzero(round_), mean):
+        # a cylinder's facets at one height are equidistant too, but their normals lie in a plane
+        spread = np.linalg.eigvalsh(normals[same].T @ normals[same] / len(same))
+        if spread[0] > 0.05 and (len(same) >= MANY or _domed(link, facets[same], point).all()):
+            return np.asarray(facets[same])
+    return facets[:0]
+
+
+def _domed(
+    link: Link, facets: Int[np.ndarray, " f"], point: Float[np.ndarray, "3"]
+) -> Bool[np.ndarray, " f"]:
+    """Whether facets are as far from a point within as at their corners."""
+    distance = np.linalg.norm(surface(link, facets).x - point, axis=2)
+    return np.asarray(np.ptp(distance, axis=1) <= DOMED * distance.max(axis=1))

@@ -1,0 +1,212 @@
+"""The order of methods to mesh a part from CAD: hexahedra where it can be swept, else tetrahedra, and why."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MeshError
+from kedfem.mesh.blends import points_in_file, swept_without_blends
+from kedfem.mesh.blocks import block_mesh
+from kedfem.mesh.cad.faces import with_faces
+from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
+from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
+from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.layered.layers import layered_mesh
+from kedfem.mesh.path_sweep import carried_mesh
+from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.revolved import revolved_mesh
+from kedfem.mesh.tetrahedra import FORMS
+from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
+from kedfem.store import contents, itself, kept
+
+ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other way is tried
+FAIR = 0.2  # of hexahedra that are taken before tetrahedra
+FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some micrometres are in it
+MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
+NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
+TRIES = 6  # meshes made in search of a number of unknowns
+
+Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
+#: Places of the scene [m] and names of faces at which a part keeps its blends.
+KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
+NOTHING: KeptWhole = ((), ())
+
+SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh, revolved_mesh, carried_mesh)
+#: What is tried in turn, by `mesh.kind` and element.
+WAYS: dict[str | None, tuple[Way, ...]] = {
+    None: (*SWEEPS, swept_without_blends, filled_mesh),
+    "hexahedra": (*SWEEPS, swept_without_blends, subdivided_mesh),
+    "tet10": (filled_mesh,),
+}
+
+
+def cad_mesh(
+    keys: CadKeys, name: str, link: LinkScene, shape: Cad, folder: Path, kept_whole: KeptWhole = NOTHING
+) -> SolidMesh:
+    """hex27 or tet10 mesh of a part from CAD, where the scene has it, its faces known; kept between runs.
+
+    Parameters
+    ----------
+    keys : for messages
+    name : the link's name, that of its solid in an assembly
+    folder : what the file's name is relative to
+    kept_whole : places and faces of the part where no blend is left out
+
+    Raises
+    ------
+    MeshError
+        The file cannot be used, or no way gives a mesh.
+    """
+    file = folder / shape.file
+    said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole]
+    key = sha256(json.dumps(said).encode() + contents([file])).hexdigest()
+    mesh: SolidMesh = kept(
+        "mesh",
+        key,
+        lambda: apart(keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole),
+        itself,
+        itself,
+    )
+    return mesh
+
+
+def made_mesh(
+    keys: CadKeys, name: str, link: LinkScene, shape: Cad, file: Path, kept_whole: KeptWhole = NOTHING
+) -> SolidMesh:
+    """What `cad_mesh` keeps, made in this process."""
+    with solid_model(keys, file, name, shape) as (gmsh, solid):
+        if link.mesh.size is not None and link.mesh.size > solid.extent:
+            raise MeshError(
+                f"{keys.file}: must be larger than its mesh.size {link.mesh.size:.6g} [m], got {solid.extent:.6g}"
+            )
+        mesh = with_faces(
+            gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, _wanted(link, shape, kept_whole))
+        )
+        if solid.mended:
+            mesh = replace(mesh, way=f"{mesh.way}; {solid.mended}")
+    return placed(mesh, np.array(shape.origin), file_axes(shape))
+
+
+def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
+    """The mesh; where there is none, or flat tetrahedra, one with tiny edges and faces of the CAD model healed away."""
+    best: SolidMesh | None = None
+    try:
+        best = _sized(where, gmsh, solid, link, asked)
+        if not best.tetrahedra or mesh_quality(best).least > FLAT:
+            return best
+    except MeshError:
+        if link.mesh.kind is not None:
+            raise
+    for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, asked)):
+        try:
+            mesh = filled_mesh(gmsh, mended, asked)
+        except OtherWayError:
+            continue
+        if mesh_quality(mesh).least > FLAT:
+            return replace(mesh, way=f"{mesh.way}; {words}")
+    return best or _sized(where, gmsh, solid, link, asked)  # raises again
+
+
+def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
+    """Where the x, y, z axes of a file go, as rows."""
+    along = (1.0, 0.0, 0.0) if shape.towards is None else np.subtract(shape.towards, shape.origin)
+    return frame_along(np.array(along), None if shape.z is None else np.array(shape.z))
+
+
+def sizing(mesh: Meshing) -> Sizing:
+    """What the keys of a link's mesh ask for."""
+    return Sizing(
+        size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers, ignore=mesh.defeature_size
+    )
+
+
+def _wanted(link: LinkScene, shape: Cad, kept_whole: KeptWhole) -> Sizing:
+    """What the keys of a link's mesh ask for, and where nothing may be left out."""
+    points, names = kept_whole
+    inside = points_in_file(points, np.array(shape.origin), file_axes(shape))
+    return replace(sizing(link.mesh), kept=inside, named=names)
+
+
+def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
+    """The mesh of the size asked for, or of the number of unknowns: then the nearest of at most TRIES."""
+    wanted, element = link.mesh.unknowns, str(link.element)
+    ways, form = WAYS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
+    if wanted is None:
+        return best_mesh(where, gmsh, solid, asked, form, ways)
+    nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # to a cube of the size
+    size = (solid.volume * 3 * nodes_each / wanted) ** (1 / 3)
+    found: list[tuple[float, SolidMesh]] = []
+    for _ in range(TRIES):
+        mesh = best_mesh(where, gmsh, solid, replace(asked, size=min(size, solid.extent / 2)), form, ways)
+        ratio = 3 * len(form(mesh).points) / wanted
+        found.append((abs(np.log(ratio)), mesh))
+        if 1 / NEAR < ratio < NEAR or (
+            len(found) > 1 and ratio == 3 * len(form(found[-2][1]).points) / wanted
+        ):
+            break
+        if mesh.tetrahedra:
+            ways = (filled_mesh,)  # what cannot be swept cannot in other sizes
+        size *= ratio ** (1 / 2.5)  # in between what plates and lumps need
+    off, mesh = min(found, key=lambda each: each[0])
+    if off <= np.log(NEAR):
+        return mesh
+    return replace(mesh, way=f"{mesh.way}; the nearest found to the {wanted:,} unknowns asked for")
+
+
+def best_mesh(
+    where: str,
+    gmsh: ModuleType,
+    solid: Solid,
+    sizing: Sizing,
+    form: Callable[[SolidMesh], SolidMesh] = quadratic,
+    ways: tuple[Way, ...] = WAYS[None],
+) -> SolidMesh:
+    """The mesh by the first way that is good enough, else by the best; in `way` what was done, and why not better.
+
+    Parameters
+    ----------
+    form : what becomes of hexahedra, whose quality counts: of 20 nodes they may be worse than of 27
+    ways : to be tried in turn
+
+    Raises
+    ------
+    MeshError
+        No way gives a mesh; with the reasons of each.
+    """
+    found: list[tuple[float, SolidMesh]] = []
+    reasons: list[str] = []
+    for way in ways:
+        if way in (filled_mesh, subdivided_mesh) and _best_of(found) >= FAIR:
+            break
+        try:
+            mesh = way(gmsh, solid, sizing)
+        except OtherWayError as error:
+            reasons.append(str(error).removeprefix(f"{solid.name}: "))
+            continue
+        least = mesh_quality(form(mesh)).least
+        many = sizing.size is None and sizing.across <= 2 and 3 * len(form(mesh).points) > MOST
+        told = [mesh.way, *reasons[: way not in SWEEPS]]  # the first says what is in the way, of layers
+        if mesh.tetrahedra or (least >= ENOUGH and not many):
+            return replace(mesh, way="; ".join(told))
+        found.append((least - many, replace(mesh, way="; ".join(told))))  # many: behind all others
+        unfit = f"{3 * len(form(mesh).points):,} unknowns" if many else f"worst scaled Jacobian {least:.2g}"
+        reasons.append(f"{mesh.way}: {unfit}")
+    if not found:
+        raise MeshError(
+            f"{where}: must be a solid that can be meshed, got none: {'; '.join(reasons)}; "
+            "take another size (mesh.size) or simplify the part there"
+        )
+    return max(found, key=lambda each: each[0])[1]
+
+
+def _best_of(found: list[tuple[float, SolidMesh]]) -> float:
+    """The best quality so far."""
+    return max((least for least, _ in found), default=-1.0)

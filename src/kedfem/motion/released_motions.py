@@ -1,0 +1,218 @@
+"""What a linkage may still do as drawn, in words that name links and joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from kedfem.motion.constraints import cross
+from kedfem.scene import Joint
+
+RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
+STILL = 1e-6  # of a motion: what counts as none
+SEARCHED = 10  # links up to which all groups are looked through for motions of their own
+AXES = np.eye(3)
+Basis = Float[np.ndarray, "k n"]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A linkage to first order in its reference position.
+
+    J : (m, k) derivatives of the rows by the links' twists (v, ω) at the centre; gaps and v in units of size
+    rows : (m,) joint of each row, or coupling
+    driven : (m,) whether a row is that of a drive
+    links : names, k = 6 a link
+    joints : of the scene
+    centre, size : [m]
+    """
+
+    J: Float[np.ndarray, "m k"]
+    rows: tuple[str, ...]
+    driven: np.ndarray
+    links: tuple[str, ...]
+    joints: Mapping[str, Joint]
+    centre: Float[np.ndarray, "3"]
+    size: float
+
+    def place(self, joint: str) -> Float[np.ndarray, "3"]:
+        """A joint's point, from the centre, in units of size."""
+        return np.asarray((np.asarray(self.joints[joint].at) - self.centre) / self.size)
+
+    def block(self, link: str) -> slice:
+        """Columns of a link."""
+        k = 6 * self.links.index(link)
+        return slice(k, k + 6)
+
+
+def rank(J: Float[np.ndarray, "m k"]) -> int:
+    """Number of independent rows."""
+    s = scipy.linalg.svdvals(J) if J.size else np.zeros(0)
+    return int((s > RANK_TOLERANCE * s.max(initial=0.0)).sum())
+
+
+def null_space(J: Float[np.ndarray, "m k"]) -> Basis:
+    """Orthonormal columns that J takes to zero."""
+    return np.asarray(scipy.linalg.null_space(J, rcond=RANK_TOLERANCE)) if J.size else np.eye(J.shape[1])
+
+
+def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
+    """Orthonormal basis of some vectors; what all but vanishes is left out."""
+    U, s, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.asarray(U[:, s > STILL])
+
+
+# -- words --------------------------------------------------------------------------------------------------
+
+
+def direction(d: Float[np.ndarray, "3"]) -> str:
+    """``z``, or ``(0.6, 0.8, 0)`` with its greatest part positive."""
+    d = d / np.linalg.norm(d) * np.sign(d[np.abs(d).argmax()])
+    if d.max() > 1 - STILL:
+        return "xyz"[int(d.argmax())]
+    return "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(d, 6)) + ")"
+
+
+def directions(
+    what: str, where: str, within: Float[np.ndarray, "3 d"], axis: Float[np.ndarray, "3"] | None = None
+) -> str:
+    """``forces along x and y``: what, where, and a line, plane or all of space; `axis` is that of the joint.
+
+    >>> directions("turn", "about", np.eye(3)[:, 2:])
+    'turn about z'
+    """
+    if within.shape[1] == 3:
+        return f"{what} {'in all directions' if where == 'along' else 'about all axes'}"
+    if within.shape[1] == 1:
+        along = "its axis" if axis is not None and _alike(within[:, 0], axis) else direction(within[:, 0])
+        return f"{what} {where} {along}"
+    normal = scipy.linalg.null_space(within.T)[:, 0]
+    if axis is not None and _alike(normal, axis):
+        return f"{what} across its axis"
+    here = [k for k in range(3) if abs(normal[k]) < STILL]
+    if not here:
+        return f"{what} across {direction(normal)}"
+    two = [*here, *([] if len(here) == 2 else [None])]
+    names = ["xyz"[k] if k is not None else direction(np.cross(normal, AXES[here[0]])) for k in two]
+    return f"{what} {where} {names[0]} and {names[1]}"
+
+
+def _alike(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> bool:
+    """Whether two unit vectors are on one line that is no axis of coordinates, which has a shorter name."""
+    return bool(np.linalg.norm(np.cross(a, b)) < STILL and np.abs(a).max() < 1 - STILL)
+
+
+def listed(names: list[str] | tuple[str, ...], last: str = "and") -> str:
+    """``A, B and C``."""
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def of_joints(names: list[str] | tuple[str, ...], last: str = "and") -> str:
+    """``joint A``, or ``joints A and B``; couplings have names such as ``gears.pair``.
+
+    >>> of_joints(["A", "B", "gears.pair"])
+    'joints A and B and gears.pair'
+    """
+    joints, couplings = ([x for x in names if ("." in x) == coupling] for coupling in (False, True))
+    plural = "s" * (len(joints) > 1 and last == "and")
+    words = [f"joint{plural} {listed(joints, last)}"] if joints else []
+    return f" {last} ".join(words + ([listed(couplings, last)] if couplings else []))
+
+
+# -- free motions -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class FreeMotion:
+    """Motions that only some links make.
+
+    links : that move
+    joints : that work
+    basis : (k, n) scaled twists of all links
+    words : what they are
+    drivable : those of them that have one motion alone
+    spin : the joints between which a link idly spins, if that is what it does
+    """
+
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    basis: Basis
+    words: str
+    drivable: tuple[str, ...] = ()
+    spin: tuple[str, ...] = ()
+
+
+def free_motions(drawn: Drawn) -> list[FreeMotion]:
+    """What joints and drives leave free, sorted by the smallest groups of links that can do it alone."""
+    return [_described(drawn, links, basis) for links, basis in _groups(drawn, null_space(drawn.J))]
+
+
+def _groups(drawn: Drawn, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
+    """Free motions by the links that make them: first those of one link alone, then of two, and so on."""
+    found, out, n = np.zeros((free.shape[1], 0)), [], len(drawn.links)
+    sizes = range(1, n + 1) if n <= SEARCHED else (1, n)
+    for some in (group for size in sizes for group in combinations(drawn.links, size)):
+        if found.shape[1] == free.shape[1]:
+            break
+        others = [free[drawn.block(link)] for link in drawn.links if link not in some]
+        _, s, Vt = np.linalg.svd(np.concatenate([np.zeros_like(free), *others]))
+        within = Vt[(s > STILL).sum() :].T
+        if (fresh := span(within - found @ (found.T @ within))).shape[1]:
+            found = np.concatenate([found, fresh], axis=1)
+            out.append((some, free @ fresh))
+    return out
+
+
+def _relative(drawn: Drawn, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+    """Twists (v, ω) at a joint of its one link against the other."""
+    one, other = (_twists(drawn, link, joint, basis) for link in drawn.joints[joint].links)
+    return np.asarray(one - other)
+
+
+def _twists(drawn: Drawn, link: str, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+    """Twists (v, ω) of a link at a joint's point."""
+    if link not in drawn.links:
+        return np.zeros((6, basis.shape[1]))
+    v, omega = basis[drawn.block(link)].reshape(2, 3, -1)
+    return np.concatenate([v + cross(omega.T, np.broadcast_to(drawn.place(joint), omega.T.shape)).T, omega])
+
+
+def _described(drawn: Drawn, links: tuple[str, ...], basis: Basis) -> FreeMotion:
+    links = tuple(link for link in links if np.abs(basis[drawn.block(link)]).max() > STILL)
+    joints = tuple(name for name in drawn.joints if np.abs(_relative(drawn, name, basis)).max() > STILL)
+    drivable = tuple(name for name in joints if drawn.joints[name].kind in {"revolute", "prismatic"})
+    if len(links) == 1:
+        words, spin = _alone(drawn, links[0], joints, basis)
+        return FreeMotion(links, joints, basis, words, drivable, spin)
+    count = f"{basis.shape[1]} ways" if basis.shape[1] > 1 else "one way"
+    words = f"links {listed([repr(x) for x in links])} can move together in {count}"
+    words += f", by {of_joints(joints)}" if joints else ""
+    return FreeMotion(links, joints, basis, words, drivable)
+
+
+def _alone(drawn: Drawn, link: str, joints: tuple[str, ...], basis: Basis) -> tuple[str, tuple[str, ...]]:
+    """Motions of one link in words; and the joints on the line about which it spins."""
+    twists = {name: _twists(drawn, link, name, basis) for name in joints}
+    still = [name for name in joints if np.abs(twists[name][:3]).max() < STILL]
+    at = still[0] if still else next(iter(joints), None)
+    here = twists[at] if at else basis[drawn.block(link)]
+    turns, slides = span(here[3:]), span(here[:3])
+    parts = [directions("turn", "about", turns)] if turns.shape[1] else []
+    parts += [directions("slide", "along", slides)] if slides.shape[1] else []
+    words = f"link '{link}' can {' and '.join(parts)}"
+    if basis.shape[1] == 1 and len(still) > 1:
+        kinds = {drawn.joints[name].kind for name in still}
+        which = f"both {kinds.pop()}" if len(kinds) == 1 and len(still) == 2 else "on one line"
+        return f"{words}, the line through {of_joints(still)} ({which})", tuple(still)
+    return words + (f" at joint {at} ({drawn.joints[at].kind})" if at else ", held by no joint"), ()
+
+
+def remedy(motion: FreeMotion) -> str:
+    """How a free motion is usually done away with."""
+    if motion.spin:
+        return f"make joint {listed(motion.spin, 'or')} universal"
+    drive = f"drive joint {listed(motion.drivable, 'or')}, or " if motion.drivable else ""
+    return f"{drive}hold {listed(motion.links)} by a further joint"

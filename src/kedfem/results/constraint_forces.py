@@ -1,0 +1,132 @@
+"""Forces of joints enforced by constraint equations, from the port forces of their links: Σ Bᵀ R λ = Cᵀ μ."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.constraint_joints import ConstraintJoint, in_plane
+from kedfem.dynamics.constraint_matrices import directions, joint_rows, port_rows
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.ports import turned_ports
+from kedfem.motion.rigid import resting
+
+DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say
+
+
+@dataclass
+class ConstraintForces:
+    """μ of all rows over successive blocks, worked out once for each block."""
+
+    model: Model
+    block: Block | None = None
+    mu: Float[np.ndarray, "T r"] = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def of(self, block: Block) -> Float[np.ndarray, "T r"]:
+        """Force of each row on link i along its gap, moment along its turn [N, N m]; none where no joint has rows."""
+        if block is not self.block:
+            self.mu, self.block = _multipliers(self.model, block), block
+        return self.mu
+
+    def wrench(
+        self, name: str, block: Block
+    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+        """Force of a joint on its link i, moment about its point there, and that point; world components."""
+        if block.exerted is not None:
+            force, moment, point = np.moveaxis(block.exerted.wrench[:, self._number(name)], 1, 0)
+            return force, moment, point
+        joint, rows = of_joint(self.model.rows, name)
+        along, mu = directions(joint, block.motion), self.of(block)[:, rows]
+        return np.einsum("tr,trk->tk", mu, along.gap), np.einsum("tr,trk->tk", mu, along.turn), along.point
+
+    def between_gears(self, name: str, block: Block) -> Float[np.ndarray, " T"]:
+        """Force along the coordinate of a pair of gears [N m or N]."""
+        if block.exerted is not None:
+            return np.asarray(block.exerted.effort[:, self._number(f"gears.{name}")])
+        return np.asarray(self.of(block)[:, of_joint(self.model.rows, f"gears.{name}")[1]][:, 0])
+
+    def _number(self, name: str) -> int:
+        return [joint.name for joint in self.model.rows].index(name)
+
+    def on_ports(self, block: Block) -> Float[np.ndarray, "T m"]:
+        """Forces on the ports of all rows, side by side, world components."""
+        if block.exerted is not None:
+            return block.exerted.ports
+        mu, out, first = self.of(block), [], 0
+        for joint in self.model.rows:
+            here = mu[:, first : first + len(joint.gap)]
+            first += len(joint.gap)
+            for side, each in port_rows(joint, block.motion):
+                if side.shared:
+                    out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
+        return np.concatenate(out, axis=1)
+
+
+def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJoint, slice]:
+    """A joint enforced by constraint equations, and where its rows are among all."""
+    first = 0
+    for joint in joints:
+        if joint.name == name:
+            return joint, slice(first, first + len(joint.gap))
+        first += len(joint.gap)
+    raise KeyError(name)
+
+
+def known(model: Model, name: str) -> tuple[bool, bool]:
+    """Whether statics tell the force and the moment of a joint enforced by constraint equations, as drawn.
+
+    What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
+    """
+    found = _null_space(model)
+    if found is None:
+        return True, True
+    C, null = found
+    joint, here = of_joint(model.rows, name)
+    loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
+    if any(
+        link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)
+    ):
+        loose &= C[here].any(axis=1) | in_plane(joint.gap, joint.turn)
+    force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
+    return not bool((loose & force).any()), not bool((loose & moment).any())
+
+
+def shared_rows(model: Model, name: str) -> list[str]:
+    """Joints whose constraints repeat those of a joint, as drawn."""
+    found = _null_space(model)
+    if found is None or not any(joint.name == name for joint in model.rows):
+        return []
+    null = found[1]
+    columns = np.abs(null[of_joint(model.rows, name)[1]]).max(axis=0, initial=0.0) > 1e3 * DEPENDENT
+    each = ((joint.name, of_joint(model.rows, joint.name)[1]) for joint in model.rows)
+    return [other for other, here in each if (np.abs(null[here][:, columns]) > 1e3 * DEPENDENT).any()]
+
+
+def _null_space(model: Model) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]] | None:
+    """Rows of all joints as drawn, and the combinations of them that say nothing; None without rows."""
+    bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
+    rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
+    if rows is None:
+        return None
+    U, s, _ = np.linalg.svd(_scaled(rows.C)[0][0])
+    return rows.C[0], U[:, int((s > DEPENDENT).sum()) :]
+
+
+def _multipliers(model: Model, block: Block) -> Float[np.ndarray, "T r"]:
+    rows = joint_rows(model.rows, block.motion)
+    if rows is None:
+        return np.zeros((len(block), 0))
+    p = np.zeros((len(block), rows.C.shape[2]))
+    for joint, history in zip(model.joints, block.links, strict=True):
+        p += turned_ports(joint, history.R, history.port_forces) @ joint.B
+    C, size = _scaled(rows.C)
+    inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)
+    return np.asarray(np.einsum("trk,tk->tr", inverse, p) / size)
+
+
+def _scaled(C: Float[np.ndarray, "T r k"]) -> tuple[Float[np.ndarray, "T r k"], Float[np.ndarray, "T r"]]:
+    size = np.linalg.norm(C, axis=2)
+    size = np.where(size > 0, size, 1.0)
+    return C / size[..., None], size

@@ -1,0 +1,160 @@
+"""Channels of motors and springs, and of how far hinges have turned."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.force_element import (
+    ANGLE,
+    DISTANCE,
+    POINT,
+    TURN,
+    End,
+    ForceElement,
+    Table,
+    kernel_table,
+    vectors,
+)
+from kedfem.dynamics.force_elements import actions, hinges
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model
+from kedfem.motion.constraints import cross
+from kedfem.results.recorded import Recorded, Rows
+from kedfem.results.records import Channel
+from kedfem.scene import Scene
+
+POSITION, SPEED, EFFORT = 0, 1, 2
+
+
+@dataclass
+class Measured:
+    """Values of actions over successive blocks, turns counted on from block to block; worked out once for each block."""
+
+    every: Sequence[ForceElement]
+    table: Table
+    turned: Float[np.ndarray, " A"] = field(default_factory=lambda: np.zeros(0))
+    block: Block | None = None
+    values: Float[np.ndarray, "T A 4"] = field(default_factory=lambda: np.zeros((0, 0, 4)))
+    places: Float[np.ndarray, "T A 2 2 3"] = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
+    forces: Float[np.ndarray, "T A 2 2 3"] = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
+
+    def wrenches(self, block: Block) -> Iterator[tuple[End, Rows, Rows]]:
+        """Force and moment about the world's origin (T, 3) of every end of all actions."""
+        if self.every:
+            self.of(block)
+        known = 0 if block.exerted is None else block.exerted.ends.shape[1]
+        for i, action in enumerate(self.every):
+            for e, end in enumerate(action.ends):
+                if block.exerted is not None and i < known:
+                    yield end, block.exerted.ends[:, i, e, 0], block.exerted.ends[:, i, e, 1]
+                    continue
+                x, f = self.places[:, i, e], self.forces[:, i, e]
+                if end.form == POINT:
+                    yield end, f[:, 0], cross(x[:, 0], f[:, 0])
+                else:
+                    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
+                    yield end, np.zeros_like(moment), np.asarray(moment)
+
+    def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
+        """Force and moment of all actions on a link that has no unknowns of its own: a slider, what the drive carries.
+
+        Parameters
+        ----------
+        about : (T, 3) the point that the moment is about
+        """
+        force, moment = np.zeros((2, len(block), 3))
+        for end, f, m in self.wrenches(block):
+            if end.link == link:
+                force, moment = force + f, moment + m - cross(about, f)
+        return force, moment
+
+    def power(self, links: Collection[str], block: Block) -> Float[np.ndarray, " T"]:
+        """Power of all actions on links that move as given [W]."""
+        out, motion = np.zeros(len(block)), block.motion
+        for end, f, m in self.wrenches(block):
+            if end.link in links:
+                v, omega = motion.v[:, end.body], motion.omega[:, end.body]
+                out += (f * (v - cross(omega, motion.p[:, end.body])) + m * omega).sum(axis=1)
+        return out
+
+    def of(self, block: Block) -> Float[np.ndarray, "T A 4"]:
+        """Coordinate, rate, force and stored energy of all actions; blocks in the order of time."""
+        if block is not self.block:
+            from kedfem.dynamics.force_elements_kernel import evaluate_all
+
+            before = np.zeros(len(self.every)) if block.step == 0 or not self.turned.size else self.turned
+            self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
+            x, v = vectors(self.every, block)
+            self.places, self.forces, self.block = x, np.zeros_like(x), block
+            evaluate_all(block.motion.t, x, v, self.turned, self.table, self.forces, self.values)
+            if block.exerted is not None:
+                self._taken(block.exerted.element)
+        return self.values
+
+    def _taken(self, element: Float[np.ndarray, "T 3 A"]) -> None:
+        """Coordinates, rates and forces of motors and springs as the solver has them."""
+        known = element.shape[2]
+        stiffness, free = (
+            np.array([getattr(x, name) for x in self.every[:known]]) for name in ("stiffness", "free")
+        )
+        self.values[:, :known, :3] = element.transpose(0, 2, 1)
+        self.values[:, :known, 3] = 0.5 * stiffness * (element[:, 0] - free) ** 2
+
+
+def measured_actions(scene: Scene, model: Model) -> Measured:
+    """Motors and springs of a scene and, without a drive, the turns of its hinges.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a motor or spring does not fit its link.
+    """
+    turns = () if scene.driven is not None else hinges(scene, model)
+    every = (*actions(scene, model), *turns)
+    return Measured(every, kernel_table(every))
+
+
+def acting(scene: Scene, measured: Measured) -> list[Recorded]:
+    """How motors, springs and, without a drive, hinges move, and what force they exert."""
+    return [
+        Recorded(channel, partial(_column, measured, i, which, sign))
+        for i, action in enumerate(measured.every)
+        for channel, which, sign in _channels(scene, action)
+    ]
+
+
+def _column(measured: Measured, i: int, which: int, sign: float, block: Block) -> Rows:
+    return np.asarray(sign * measured.of(block)[:, i, which, None])
+
+
+def _channels(scene: Scene, action: ForceElement) -> list[tuple[Channel, int, float]]:
+    """Channels of one action: which value it is, with which sign."""
+    kind, name = action.name.split("/")
+    if kind == "joints":
+        one, other = scene.joints[name].links
+        one, other = (other, one) if one == "ground" else (one, other)
+        text = f"rotation of joint {name}: link {one} against {other}, from the reference position"
+        return [(Channel(f"{action.name}/angle", ("angle",), "rad", "", text), POSITION, 1.0)]
+    what = f"{kind.removesuffix('s')} {name}"
+    if action.kind == DISTANCE:
+        length = Channel(f"{action.name}/length", ("length",), "m", "", f"length of {what}")
+        force = Channel(f"{action.name}/force", ("force",), "N", "", f"pull of {what} and its damper")
+        return [(length, POSITION, 1.0), (force, EFFORT, -1.0)]
+    hinge = action.kind == TURN
+    place, unit = ("angle", "rad") if hinge else ("travel", "m")
+    effort, force_unit = ("torque", "N m") if hinge else ("force", "N")
+    out = [
+        (
+            Channel(f"{action.name}/{place}", (place,), unit, "", f"{place} of the joint of {what}"),
+            POSITION,
+            1.0,
+        ),
+        (Channel(f"{action.name}/{effort}", (effort,), force_unit, "", f"{effort} of {what}"), EFFORT, 1.0),
+    ]
+    if kind == "motors":
+        speed = Channel(f"{action.name}/speed", ("speed",), f"{unit}/s", "", f"speed of the joint of {what}")
+        out.insert(1, (speed, SPEED, 1.0))
+    return out

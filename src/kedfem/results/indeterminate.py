@@ -1,0 +1,73 @@
+"""Forces and moments of joints that no channel tells, because statics does not determine them, and why."""
+
+from collections.abc import Collection, Iterator
+
+import numpy as np
+
+from kedfem.dynamics.model import Model
+from kedfem.results.constraint_forces import shared_rows
+from kedfem.results.joint_forces import INDETERMINATE, rows_of_joint
+from kedfem.scene import GROUND, Scene
+
+
+def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
+    """The channels of joints and drives that a run does not have, each with the reason.
+
+    Parameters
+    ----------
+    channels : names of those that it has
+    """
+    out = {}
+    for name in scene.joints:
+        for what in ("force", "moment"):
+            if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
+                out[f"joints/{name}/{what}"] = _reason(scene, model, name)
+    for name in scene.driven_joints:
+        several = f"{name}/" if len(scene.driven_joints) > 1 else ""
+        if not any(f"drive/{several}{what}" in channels for what in ("torque", "force")):
+            out[f"drive/{several}torque"] = _reason(scene, model, name)
+    return out
+
+
+def undetermined_warning(found: dict[str, str]) -> tuple[str, ...]:
+    """A warning for each force; moments are in the notes of the results only."""
+    return tuple(
+        f"{name}: not reported, {reason}"
+        for name, reason in found.items()
+        if name.endswith(("force", "torque"))
+    )
+
+
+def _on_slider(model: Model, name: str) -> bool:
+    """Whether a joint is of a rigid slider, a point mass, whose moments nothing asks for."""
+    return any(name in (x.guide, x.joint) for x in model.sliders)
+
+
+def _reason(scene: Scene, model: Model, name: str) -> str:
+    elastic = {link.name for link in model.links}
+    links = [link for link in scene.joints[name].links if link != GROUND]
+    if not elastic & set(links):
+        return f"it joins rigid links alone ({', '.join(links)}), whose constraints are not solved for"
+    others = sorted({*_partners(model, name), *shared_rows(model, name)} - {name, ""})
+    if not others:
+        return "the balance of forces does not determine it: it bears on what others constrain already"
+    return (
+        f"the balance of forces does not determine how it is shared with joint{'s' * (len(others) > 1)} "
+        f"{', '.join(others)} (redundant constraints)"
+    )
+
+
+def _partners(model: Model, name: str) -> Iterator[str]:
+    """Joints whose port forces may change together with those of a joint, in balance."""
+    here = [x.loose[rows_of_joint(x, name)] for x in model.joints if name in x.joints]
+    if not here:
+        return
+    columns = np.abs(np.vstack(here)).max(axis=0, initial=0.0) > INDETERMINATE
+    for each in model.joints:
+        for other in set(each.joints):
+            if (
+                columns.any()
+                and np.abs(each.loose[rows_of_joint(each, other)][:, columns]).max(initial=0.0)
+                > INDETERMINATE
+            ):
+                yield other

@@ -1,0 +1,59 @@
+"""Which points of links have a stress that is not what it seems, in words: corners, point forces, joints' surfaces."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.places import on_part, part_seat
+from kedfem.errors import KedfemError
+from kedfem.links.record import Link
+from kedfem.links.recovery import StressRecovery, point_rows
+from kedfem.links.singular_stress import around, re_entrant
+from kedfem.scene import ForceLoad, Scene
+
+CORNER = "a sharp re-entrant corner"
+GROWS = "stress there depends on the mesh and grows when it is refined"
+CONTACT = "the contact itself is not modelled"
+AWAY = "corners, point forces and surfaces held by joints"
+
+
+def doubtful(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -> list[list[str]]:
+    """Per link or segment, then per prescribed rigid link, what each point is near to; mostly empty."""
+    full: dict[str, Link] = {str(k): link.full or link for k, link in enumerate(model.links)}
+    words = [np.full(recovery.points, "", object) for recovery in recoveries]
+    meshed = {link.name for link in full.values() if link.meshed and not link.rigid}
+    for stiff in (False, True):
+        for name, joint in scene.joints.items():
+            for of in meshed.intersection(joint.links):
+                if joint.stiff(of) != stiff:
+                    continue
+                try:
+                    key, seat = part_seat(scene, name, full, of)
+                except KedfemError:  # the line of a slot
+                    continue
+                on = np.abs(seat.fit[0]) > 0
+                link = full[key]
+                what = f"the {'rigid coupling' if stiff else 'surface'} of joint {name}"
+                words[int(key)][around(link, link.X[on]) if stiff else on] = what
+    for name, load in scene.loads.items():
+        if isinstance(load, ForceLoad) and load.link in meshed:
+            at = np.asarray(load.at)
+            where = f"loads.{name}.at"
+            key, place = on_part(full, load.link, at, partial(_place, where, at))
+            words[int(key)][around(full[key], place[None])] = f"the point force loads.{name}"
+    for k, link in full.items():
+        if link.meshed and not link.rigid:
+            words[int(k)][around(link, link.X[re_entrant(link)])] = CORNER
+    return [list(each) for each in words]
+
+
+def _place(where: str, at: Float[np.ndarray, "3"], link: Link) -> Float[np.ndarray, "3"]:
+    return point_rows(link, where, at).X
+
+
+def reason(near: str) -> str:
+    """Why stress near such a place is not what it seems."""
+    return CONTACT if near.startswith("the surface") else GROWS

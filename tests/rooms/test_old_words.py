@@ -1,0 +1,72 @@
+"""Renamed keys and values: docs/notation.md and messages agree, and each message names the present word."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from kedfem.errors import SceneError
+from kedfem.scene import scene_from
+from kedfem.scene.old_words import KEYS, VALUES
+from tests.scenes import arm, bar, constant_speed
+
+TABLE = Path(__file__).parents[2] / "docs" / "notation.md"
+PLACES: dict[str, tuple[str, ...]] = {
+    "functions": ("links", "arm"),
+    "reduction": ("analysis",),
+    "port": ("joints", "A"),
+    "turning_stiffness": ("joints", "A", "bushing"),
+    "turning_damping": ("joints", "A", "bushing"),
+    "spin": ("analysis", "initial_motions", "arm"),
+    "turns": ("analysis",),
+    "last_turns": ("output", "animation"),
+    "steps_per_turn": ("analysis",),
+    "frames_per_turn": ("output", "animation"),
+    "levels": ("analysis",),
+    "exaggeration": ("output", "animation"),
+    "ignore": ("links", "arm", "mesh"),
+}
+WORDS: dict[str, tuple[str, ...]] = {
+    "nominal": ("analysis", "frames"),
+    "following": ("links", "arm", "frames"),
+    "literal": ("analysis", "solver"),
+    "averaged": ("joints", "A", "coupling"),
+    "stiff": ("joints", "A", "coupling"),
+}
+
+
+def changed(place: tuple[str, ...], value: Any) -> dict[str, Any]:
+    raw = arm(bar(), constant_speed(1.0), analysis={"revolutions": 1})
+    table = raw
+    for key in place[:-1]:
+        table = table.setdefault(key, {})
+    table[place[-1]] = value
+    return raw
+
+
+@pytest.mark.parametrize("old", KEYS)
+def test_an_old_key_is_an_unknown_key_whose_message_names_the_present_one(old: str) -> None:
+    place = ".".join((*PLACES[old], old))
+    with pytest.raises(SceneError, match=re.escape(f"{place}: unknown key, did you mean '{KEYS[old]}'?")):
+        scene_from(changed((*PLACES[old], old), 1))
+
+
+@pytest.mark.parametrize("old", VALUES)
+def test_an_old_value_is_refused_with_the_present_one(old: str) -> None:
+    place = ".".join(WORDS[old])
+    with pytest.raises(SceneError, match=rf"{re.escape(place)}: must be .*did you mean '{VALUES[old]}'\?"):
+        scene_from(changed(WORDS[old], old))
+
+
+def test_the_notation_lists_all_renamed_keys_and_values() -> None:
+    section = TABLE.read_text("utf-8").split("### Keys and values of the scene\n", 1)[1].split("\n### ", 1)[0]
+    rows = [line.split("|") for line in section.splitlines() if line.startswith("| `")]
+    found: dict[str, str] = {}
+    for row in rows:
+        words = [re.findall(r'"([\w-]+)"', cell) or re.findall(r"`(\w+)`", cell) for cell in row[1:3]]
+        found |= dict(zip(*words, strict=True))
+        if '"' in row[1]:  # a key may change with its values
+            names = [re.match(r" `(\w+) =", cell) for cell in row[1:3]]
+            found |= {old[1]: new[1] for old, new in [names] if old and new and old[1] != new[1]}
+    assert found == KEYS | VALUES
