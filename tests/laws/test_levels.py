@@ -209,7 +209,7 @@ def test_factors_that_do_not_fit_are_refused(monkeypatch: pytest.MonkeyPatch) ->
     need = factor_bytes(model)
     monkeypatch.setattr(in_time, "memory", lambda: 2.5 * need)
     assert most_levels(model) == 2
-    with pytest.raises(SolveError, match=r"analysis\.levels: must be at most 2 .* got 3"):
+    with pytest.raises(SolveError, match=r"analysis\.extrapolation_levels: must be at most 2 .* got 3"):
         blocks("rigid-body", 20, 3)
 
 

@@ -202,7 +202,7 @@ def test_a_run_says_what_is_left_over_and_warns_when_that_is_much(tmp_path: Path
     done = analyse(scene_from(quick(raw)))
     assert done.balance is not None
     assert done.balance.energy > 0.02
-    assert any("balance leaves over" in warning for warning in done.warnings)
+    assert any("residual of the balance" in warning for warning in done.warnings)
     table = next(x for x in run_tables(scene_from(raw), done) if "Balance" in str(x.title))
     assert table.row_count == 4
     assert done.results.channels["energy/residual"][1].shape == (121, 1)

@@ -76,5 +76,5 @@ def test_the_literal_solver_with_frames_that_follow() -> None:
     assert said == (
         "analysis.solver: must be 'condensed' for co-rotational frames (the monolithic solver of scenes "
         "knows rigid-body ones "
-        "alone), got 'monolithic': leave it out, or take frames = \"nominal\""
+        "alone), got 'monolithic': leave it out, or take frames = \"rigid-body\""
     )

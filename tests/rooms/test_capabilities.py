@@ -143,8 +143,8 @@ def test_a_line_that_is_taken_out_refuses_nothing(monkeypatch: pytest.MonkeyPatc
 def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> None:
     (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}))
     assert said == (
-        'joints.S.kind: must be another than slot with frames = "co-rotational" (the pin of a slot slides as the nominal '
-        'motion tells), got a slot: take frames = "rigid-body", or a slide with a hinge'
+        'joints.S.kind: must be another than slot with frames = "co-rotational" (the pin of a slot slides as the '
+        'rigid-body motion tells), got a slot: take frames = "rigid-body", or a slide with a hinge'
     )
 
 

@@ -295,13 +295,15 @@ def test_broken_toml_is_named_with_its_line(run_kedfem: Command, command: str) -
 
 def test_all_faults_come_at_once_and_nothing_is_written(run_kedfem: Command, arm: Path) -> None:
     text = (
-        arm.read_text(encoding="utf-8").replace("width = 0.01", "width = -0.01").replace("turns =", "trns =")
+        arm.read_text(encoding="utf-8")
+        .replace("width = 0.01", "width = -0.01")
+        .replace("revolutions =", "revolution =")
     )
     arm.write_text(text, encoding="utf-8")
     said = run_kedfem("run", arm)
     assert said.code == USER_ERROR
     assert "links.arm.shape.width: must be positive [m], got -0.01" in said.err
-    assert "analysis.trns: unknown key, did you mean 'turns'?" in said.err
+    assert "analysis.revolution: unknown key, did you mean 'revolutions'?" in said.err
     assert [p.name for p in arm.parent.iterdir()] == [arm.name]
 
 

@@ -61,11 +61,11 @@ def test_a_change_in_what_a_kernel_imports_begins_a_new_folder(tmp_path: Path) -
     assert compiled.kernel_folder(root) != first
 
 
-def test_the_kinds_of_actions_and_the_options_of_the_compiler_are_in_it() -> None:
+def test_the_kinds_of_force_elements_and_the_options_of_the_compiler_are_in_it() -> None:
     from kedfem.compiled import ROOT, _imported
 
-    files = _imported(ROOT / "dynamics" / "actions_kernel.py", ROOT)
-    assert {ROOT / "dynamics" / "action.py", ROOT / "compiled.py"} <= files
+    files = _imported(ROOT / "dynamics" / "force_elements_kernel.py", ROOT)
+    assert {ROOT / "dynamics" / "force_element.py", ROOT / "compiled.py"} <= files
 
 
 @pytest.mark.skipif("NUMBA_CACHE_DIR" in os.environ, reason="the user has chosen a folder")

@@ -366,7 +366,7 @@ def test_without_a_drive_the_linkage_rests_and_the_command_says_so(
 ) -> None:
     path = tmp_path / "free.toml"
     text = re.sub(
-        r"\[drive\].*\[analysis\]\nrevolutions = 2\nsteps_per_turn = 90",
+        r"\[drive\].*\[analysis\]\nrevolutions = 2\nsteps_per_revolution = 90",
         "[analysis]\nend_time = 1\nstep = 0.1",
         SKETCH,
         flags=re.S,

@@ -236,7 +236,7 @@ time = "0.1 s"
 def test_file_names_in_an_included_file_are_relative_to_it(tmp_path: Path) -> None:
     motion = '[drive]\njoint = "A"\nmotion = { kind = "table", file = "motion.csv" }\n'
     plain = GOOD[: GOOD.index("[drive]")] + GOOD[GOOD.index("[damping]") :].replace(
-        'revolutions = "=1/n"\nsteps_per_turn = 400', "end_time = 0.01\nstep = 1e-3"
+        'revolutions = "=1/n"\nsteps_per_revolution = 400', "end_time = 0.01\nstep = 1e-3"
     )
     path = written(
         tmp_path,

@@ -211,7 +211,7 @@ def test_where_stiffening_is_no_small_term_the_run_ends_and_says_so(kind: str) -
             steps += len(block)
 
     with pytest.raises(
-        SolveError, match=r"at step \d+, t = 0\.\d+ s, .* take a smaller step, or frames = \"foll"
+        SolveError, match=r"at step \d+, t = 0\.\d+ s, .* take a smaller step, or frames = \"co-rot"
     ):
         all_of_it()
     assert 1 < steps < 50

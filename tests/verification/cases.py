@@ -26,7 +26,7 @@ MODULES = (
     "spatial_kinematics",
     "mechanisms",
     "nominal_frames",
-    "co-rotational",
+    "corotational",
     "cad",
     "concentrations",
 )

@@ -1,7 +1,7 @@
 """The record of an action: a force that depends on how the mechanism moves; where its ends are, and how they move.
 
 An action has two ends. An end is up to two vectors of a link, linear in its state: a point, or directions across a hinge.
-`actions_kernel` makes forces on these vectors from their positions and velocities.
+`force_elements_kernel` makes forces on these vectors from their positions and velocities.
 """
 
 from collections.abc import Sequence

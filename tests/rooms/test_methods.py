@@ -1,4 +1,4 @@
-"""Parts from CAD as links: the ladder of ways, where they go, how fine, what is kept between runs."""
+"""Parts from CAD as links: the order of methods, where they go, how fine, what is kept between runs."""
 
 import math
 import os
@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_link
-from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh, ways
+from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, methods, part_mesh
 from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.isolated import LONGEST, PART, apart
@@ -82,18 +82,18 @@ class TestLadder:
 
     def test_a_part_that_no_way_fills_is_refused_with_the_reasons(self) -> None:
         def refused(*_: Any) -> SolidMesh:
-            raise ways.OtherWayError("is not what this way wants")
+            raise methods.OtherWayError("is not what this way wants")
 
         message = r"^crank.step: must be a solid .* got none: is not what this way wants; is not what this way .*; take"
         with pytest.raises(MeshError, match=message):
-            ways.best_mesh("crank.step", math, CUBE, ways.Sizing(), ways=(refused, refused))
+            methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), ways=(refused, refused))
 
     def test_the_better_of_two_poor_meshes_is_taken(self) -> None:
         poor, poorer = sheared(0.97, "first"), sheared(0.99, "second")
-        assert mesh_quality(poorer).least < mesh_quality(poor).least < ways.ENOUGH
+        assert mesh_quality(poorer).least < mesh_quality(poor).least < methods.ENOUGH
         for order in ([poor, poorer], [poorer, poor]):
             both = tuple(lambda *_, mesh=mesh: mesh for mesh in order)
-            taken = ways.best_mesh("crank.step", math, CUBE, ways.Sizing(), ways=both)
+            taken = methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), ways=both)
             assert taken.way.startswith("first")
             assert ("worst scaled Jacobian" in taken.way) == (order[0] is poorer)
 
@@ -173,7 +173,7 @@ class TestPlacing:
         assert_allclose(there, [1 - here[1], 2 + here[0], 3 + here[2]], atol=1e-9)
 
     def test_the_z_axis_goes_as_near_to_a_direction_as_the_x_axis_allows(self) -> None:
-        axes = ways.file_axes(link(towards=[1, 0, 0], z=[5, 1, 0]).shape)  # type: ignore[arg-type]
+        axes = methods.file_axes(link(towards=[1, 0, 0], z=[5, 1, 0]).shape)  # type: ignore[arg-type]
         assert_allclose(axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
 
     def test_the_faces_move_with_the_part(self) -> None:
@@ -216,7 +216,7 @@ class TestKept:
     def test_a_mesh_is_made_once(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path))
         first = made()
-        monkeypatch.setattr(ways, "apart", None)
+        monkeypatch.setattr(methods, "apart", None)
         again = made()
         assert np.array_equal(again.points, first.points)
         assert again.way == first.way
