@@ -82,7 +82,16 @@ BOTH = {
     "a": {"kind": "torsion", "joint": "S", "stiffness": 1.0},
     "b": {"kind": "spring", "joint": "A", "stiffness": 1.0},
 }
+STOPS = {
+    "a": {"kind": "angle", "joint": "S", "upper": 1.0, "stiffness": 1.0},
+    "b": {"kind": "travel", "joint": "B", "upper": 1.0, "stiffness": 1.0},
+    "c": {"kind": "travel", "joint": "S", "upper": 1.0, "stiffness": 1.0},
+    "d": {"kind": "angle", "joint": "A", "upper": 1.0, "stiffness": 1.0},
+}
 SCENES: list[Raw] = [
+    slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "solver": "monolithic", "stiffening": True,
+         "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
+    slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "extrapolation_levels": 2}),
     slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}),
     slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "rho_inf": 1.0}),
     slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "frames": "co-rotational"}),

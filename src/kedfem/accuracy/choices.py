@@ -172,7 +172,7 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
                 f"the scene states its step; its error is about {error:.2g}{_with_levels(scene)}"
             )
         return scene, error
-    if not scene.driven_joints:
+    if not scene.driven_joints or scene.limits:
         return free_step(search, scene, allowed)
     span, whole = time_grid(trial).end, time_grid(scene).end
     least = math.ceil(max(_least(trial), LEAST))

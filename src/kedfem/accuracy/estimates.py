@@ -152,7 +152,8 @@ def wanted(ready: Prepared) -> tuple[str, ...]:
 def spanned(scene: Scene, model: Model) -> Scene:
     """The beginning of an analysis that is too long to be run beside itself."""
     grid = time_grid(scene)
-    compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not scene.springs
+    elements = scene.springs or scene.limits
+    compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not elements
     most = SPAN if compiled else SLOW
     if grid.steps <= most:
         return scene

@@ -25,7 +25,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.stations import Stations, stations
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import LineSpring, Motor, Scene, Spring
+from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +112,9 @@ def row_joint(
 
 
 def element_joint(
-    scene: Scene, name: str, element: Spring | Motor, links: dict[str, Link], ways: Ways
+    scene: Scene, name: str, element: Spring | Motor | Limit, links: dict[str, Link], ways: Ways
 ) -> tuple[ConstraintJoint, list[Own | None]]:
-    """The two sides of a spring or motor, as a joint without rows: on those of its joint, or at two points."""
+    """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
         row, own = row_joint(scene, str(element.joint), links, ways, (np.zeros((0, 3)), np.zeros((0, 3))))
         return replace(row, name=name), own

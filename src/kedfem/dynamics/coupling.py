@@ -134,7 +134,7 @@ def joined(
     Parameters
     ----------
     links : elastic links, or their segments, by a key of each
-    elements : whether springs and motors get interface points, as joints without rows
+    elements : whether springs, motors and limits get interface points, as joints without rows
     bars : whether rigid links get points between which distances are kept
 
     Raises
@@ -152,7 +152,7 @@ def joined(
     geared = [gear_joint(scene, name, links, ways) for name in scene.gears]
     acting = [
         element_joint(scene, f"{kind}.{name}", element, links, ways)
-        for kind, every in (("springs", scene.springs), ("motors", scene.motors))
+        for kind, every in (("springs", scene.springs), ("motors", scene.motors), ("limits", scene.limits))
         for name, element in (every.items() if elements else ())
     ]
     stiff = [rigid_points(link, key, ways) for key, link in links.items() if bars and can_be_bars(link)]

@@ -53,10 +53,11 @@ class End:
 class ForceElement:
     """A force law on one coordinate: the turn of a hinge, the travel of a slide, the distance of two points.
 
-    name : ``motors/NAME``, ``springs/NAME`` or ``joints/NAME``
+    name : ``motors/NAME``, ``springs/NAME``, ``limits/NAME`` or ``joints/NAME``
     kind : TURN, SLIDE, DISTANCE
     ends : the coordinate is that of the first against the second
     stiffness, damping, free : of a spring, free where it has no force
+    limits : of a stop, between which it has no force; none: no stop
     axis : of a hinge or slide, as drawn
     over, at, value : of a motor, its curve; none: no points
     """
@@ -67,6 +68,7 @@ class ForceElement:
     stiffness: float = 0.0
     damping: float = 0.0
     free: float = 0.0
+    limits: tuple[float, float] | None = None
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     over: int = 0
     at: tuple[float, ...] = ()
@@ -78,13 +80,14 @@ Table = tuple[np.ndarray, ...]
 
 def kernel_table(every: Sequence[ForceElement]) -> Table:
     """What the kernel takes of actions: kinds, forms, numbers, over, first, at, height."""
-    numbers = np.zeros((len(every), 14))
+    numbers = np.zeros((len(every), 16))
     for row, action in zip(numbers, every, strict=True):
-        row[:3] = action.stiffness, action.damping, action.free
+        row[:2] = action.stiffness, action.damping
+        row[2], row[14] = action.limits or (action.free, action.free)
         e1, e2 = perpendiculars(action.axis)
         row[3:12] = np.concatenate([action.axis, e1, e2])
         if action.kind == TURN:
-            row[12:] = _drawn_angles(action, e1, e2)
+            row[12:14] = _drawn_angles(action, e1, e2)
     return (
         np.array([action.kind for action in every], int),
         np.array([[end.form for end in action.ends] for action in every], int).reshape(-1, 2),

@@ -1,4 +1,4 @@
-"""Motors and springs of a scene as actions on a model, and hinges whose turn is looked at."""
+"""Motors, springs and limits of a scene as actions on a model, and hinges whose turn is looked at."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,11 +28,11 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import GROUND, LineSpring, Motor, Scene, Spring
+from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit
 
 
 def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
-    """All motors and springs of a scene.
+    """All motors, springs and limits of a scene.
 
     Raises
     ------
@@ -55,7 +55,8 @@ def rigid_actions(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, ..
 def _all(find: "_Ends | _RigidEnds") -> tuple[ForceElement, ...]:
     motors = [_motor(find, name, motor) for name, motor in find.scene.motors.items()]
     springs = [_spring(find, name, spring) for name, spring in find.scene.springs.items()]
-    return (*motors, *springs)
+    limits = [_limit(find, name, limit) for name, limit in find.scene.limits.items()]
+    return (*motors, *springs, *limits)
 
 
 def hinges(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -201,3 +202,8 @@ def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement
         for i, end in enumerate(spring.between)
     )
     return ForceElement(f"springs/{name}", DISTANCE, (one, other), **law)
+
+
+def _limit(find: _Ends | _RigidEnds, name: str, limit: Limit) -> ForceElement:
+    made = (_slide if isinstance(limit, TravelLimit) else _hinge)(find, f"limits/{name}", limit.joint)
+    return replace(made, stiffness=limit.stiffness, damping=limit.damping, limits=limit.range)

@@ -1,4 +1,4 @@
-"""Forces of motors, springs and dampers from positions and velocities, compiled by numba.
+"""Forces of motors, springs, dampers and stops from positions and velocities, compiled by numba.
 
 Each action has one coordinate q of the positions x of its two ends: the turn of a hinge, the travel of a slide, the
 distance of two points. Its generalised force Q(t, q, q') acts on the ends as Q ∂q/∂x: its virtual work is Q δq, whatever
@@ -13,7 +13,8 @@ A : actions; every array has a row per action
 
     kinds : (A,) TURN, SLIDE, DISTANCE
     forms : (A, 2) POINT, PAIR, SINGLE, ANGLE: what the vectors of an end are
-    numbers : (A, 14) stiffness, damping, free q; axis, e1, e2 as drawn; of each pair of directions its angle as drawn
+    numbers : (A, 16) stiffness, damping, lower q without force; axis, e1, e2 as drawn; of each pair of directions its
+        angle as drawn; upper q without force, of a spring the lower one
     over : (A,) TIME, SPEED, POSITION: what the curve is over
     first : (A + 1,) where the points of its curve begin
     at, height : (c,) the curves, one after the other
@@ -24,7 +25,7 @@ import numpy as np
 from kedfem.compiled import compiled_in_order as compiled
 from kedfem.dynamics.force_element import PAIR, SINGLE, SLIDE, SPEED, TIME, TURN
 
-STIFFNESS, DAMPING, FREE, AXIS, E1, E2, DRAWN = 0, 1, 2, 3, 6, 9, 12
+STIFFNESS, DAMPING, LOWER, AXIS, E1, E2, DRAWN, UPPER = 0, 1, 2, 3, 6, 9, 12, 14
 
 
 @compiled
@@ -45,8 +46,11 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
             for k in range(2):
                 for c in range(3):
                     rate += gradient[e, k, c] * v[i, e, k, c]
-        stretch = q - numbers[i, FREE]
+        lower, upper = numbers[i, LOWER], numbers[i, UPPER]
+        stretch = q - lower if q < lower else q - upper if q > upper else 0.0
         Q = -numbers[i, STIFFNESS] * stretch - numbers[i, DAMPING] * rate
+        if lower < upper and Q * stretch >= 0.0:  # a stop pushes, and only beyond
+            Q = 0.0
         if first[i] < first[i + 1]:
             along = t if over[i] == TIME else rate if over[i] == SPEED else q
             Q += on_curve(along, at[first[i] : first[i + 1]], height[first[i] : first[i + 1]])

@@ -64,7 +64,8 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     # the system's starts know dampers of bushings, but lose digits where constraint equations are beside stiff links
     hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
     damped = not hubs and any(row.damping.any() for row in model.rows)
-    acted = scene.springs or scene.motors or scene.analysis.initial_deflection or damped
+    elements = scene.springs or scene.motors or scene.limits
+    acted = elements or scene.analysis.initial_deflection or damped
     if stresses is None and (acted or not (literal or model.rows)):
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))

@@ -34,7 +34,7 @@ from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.force_elements import measured_actions
 from kedfem.results.recording import recording
-from kedfem.scene import LineSpring, Motor, Scene, Spring, time_grid
+from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, time_grid
 from kedfem.scene.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
 
@@ -146,14 +146,26 @@ def _over(ready: Prepared) -> str:
 
 
 def _actions(ready: Prepared) -> list[Table]:
-    """Motors and springs: where they act and by which law."""
+    """Motors, springs and limits: where they act and by which law."""
     actions(ready.scene, ready.model)  # refused where they do not fit
-    table = Table(title="Motors and springs", show_header=False)
+    table = Table(
+        title="Motors, springs and limits" if ready.scene.limits else "Motors and springs", show_header=False
+    )
     for name, motor in ready.scene.motors.items():
         table.add_row(name, f"motor on joint {motor.joint}", _motor_law(motor))
     for name, spring in ready.scene.springs.items():
         table.add_row(name, *_spring_law(spring))
+    for name, limit in ready.scene.limits.items():
+        table.add_row(name, f"limit of the {limit.kind} of joint {limit.joint}", _limit_law(limit))
     return [table] if table.row_count else []
+
+
+def _limit_law(limit: Limit) -> str:
+    """Where stops are, and their constants."""
+    unit, force, rate = ("rad", "N m/rad", "N m s/rad") if limit.kind == "angle" else ("m", "N/m", "N s/m")
+    ends = " and ".join(with_prefix(x, unit) for x in (limit.lower, limit.upper) if x is not None)
+    constants = zip((limit.stiffness, limit.damping), (force, rate), strict=True)
+    return f"at {ends}: " + ", ".join(with_prefix(value, each) for value, each in constants if value)
 
 
 def _motor_law(motor: Motor) -> str:

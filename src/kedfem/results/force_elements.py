@@ -1,4 +1,4 @@
-"""Channels of motors and springs, and of how far hinges have turned."""
+"""Channels of motors, springs and limits, and of how far hinges have turned."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -95,22 +95,22 @@ class Measured:
         return self.values
 
     def _taken(self, element: Float[np.ndarray, "T 3 A"]) -> None:
-        """Coordinates, rates and forces of motors and springs as the solver has them."""
+        """Coordinates, rates and forces of force elements as the solver has them."""
         known = element.shape[2]
-        stiffness, free = (
-            np.array([getattr(x, name) for x in self.every[:known]]) for name in ("stiffness", "free")
-        )
+        stiffness = np.array([x.stiffness for x in self.every[:known]])
+        lower, upper = np.array([x.limits or (x.free, x.free) for x in self.every[:known]]).reshape(-1, 2).T
+        q = element[:, 0]
         self.values[:, :known, :3] = element.transpose(0, 2, 1)
-        self.values[:, :known, 3] = 0.5 * stiffness * (element[:, 0] - free) ** 2
+        self.values[:, :known, 3] = 0.5 * stiffness * (q - np.clip(q, lower, upper)) ** 2
 
 
 def measured_actions(scene: Scene, model: Model) -> Measured:
-    """Motors and springs of a scene and, without a drive, the turns of its hinges.
+    """Motors, springs and limits of a scene and, without a drive, the turns of its hinges.
 
     Raises
     ------
     MeshError, SceneError
-        If a motor or spring does not fit its link.
+        If a force element does not fit its link.
     """
     turns = () if scene.driven is not None else hinges(scene, model)
     every = (*actions(scene, model), *turns)
@@ -118,7 +118,7 @@ def measured_actions(scene: Scene, model: Model) -> Measured:
 
 
 def acting(scene: Scene, measured: Measured) -> list[Recorded]:
-    """How motors, springs and, without a drive, hinges move, and what force they exert."""
+    """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
     return [
         Recorded(channel, partial(_column, measured, i, which, sign))
         for i, action in enumerate(measured.every)

@@ -33,6 +33,7 @@ from kedfem.scene.scene import Scene
 from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
 from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
 from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
+from kedfem.scene.stops import AngleLimit, Limit, TravelLimit
 from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "GROUND",
     "ROTARY",
     "Analysis",
+    "AngleLimit",
     "Animation",
     "Arc",
     "Bar",
@@ -61,6 +63,7 @@ __all__ = [
     "Hole",
     "InitialMotion",
     "Joint",
+    "Limit",
     "LineSpring",
     "LinkScene",
     "Load",
@@ -93,6 +96,7 @@ __all__ = [
     "TorqueCurve",
     "TorqueLoad",
     "TorsionSpring",
+    "TravelLimit",
     "TubeSection",
     "by_constraint_equations",
     "corotational",

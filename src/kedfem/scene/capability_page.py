@@ -50,6 +50,7 @@ ON_JOINTS: dict[str, tuple[str, str]] = {
     "drive": ("drives", ""), "gear": ("gears", "gear"), "rack, on its second joint": ("gears", "rack"),
     "motor's torque": ("motors", "torque"), "motor's force": ("motors", "force"),
     "torsion spring": ("springs", "torsion"), "spring along": ("springs", "along"),
+    "limit of the angle": ("limits", "angle limit"), "limit of the travel": ("limits", "travel limit"),
 }  # fmt: skip
 LOADS = ("force", "torque", "body", "surface", "pressure")
 LINKS = ("solid", "plane", "beam", "rigid", "slider")
@@ -91,7 +92,7 @@ def capabilities_page() -> str:
     return "\n".join((
         INTRODUCTION.format(all=sum(CELLS), ran=CELLS[0], refused=CELLS[1]),
         "## Joints with frames and drives\n", table(["joint", *COLUMNS], joints),
-        "## Drives, gears, motors and springs on joints\n", table(["on", *KINDS], elements),
+        "## Drives, gears, motors, springs and limits on joints\n", table(["on", *KINDS], elements),
         "## Loads on kinds of links\n", table(["load", *LINKS], loads),
         "## What is refused, and what to take instead\n",
         table(["", "combination", "what is required", "because", "instead"], lines),

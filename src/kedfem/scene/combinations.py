@@ -118,7 +118,7 @@ def gears(parts: Parts) -> Iterator[Told]:
 
 
 def elements(parts: Parts) -> Iterator[Told]:
-    """Motors, and springs on joints."""
+    """Motors, springs on joints, and limits of these."""
     for motor in parts.motors.values():
         facts, words = on_joint(parts, motor.word("joint"))
         element = next((key for key in ("torque", "force") if motor.has(key)), "")
@@ -127,14 +127,21 @@ def elements(parts: Parts) -> Iterator[Told]:
         facts, words = on_joint(parts, spring.word("joint"))
         element = "torsion" if spring.word("kind") == "torsion" else "along"
         yield "springs", {**facts, "element": element}, {**words, "where": place(spring.where)}
+    for limit in parts.limits.values():
+        facts, words = on_joint(parts, limit.word("joint"))
+        moved = "prescribed" if limit.word("joint") in parts.driven_joints else "free"
+        facts |= {"element": f"{limit.word('kind')} limit", "moved": moved}
+        yield "limits", facts, {**words, "where": place(limit.where)}
 
 
 def analysis(parts: Parts) -> Iterator[Told]:
     """The analysis with its start and times, and damping."""
     entry, damping = parts.analysis, parts.damping
     words = {"where": place(entry.where)}
-    if given := [*parts.motors, *parts.springs]:
-        yield "analysis", {"element": "motor or spring", "frames": ""}, {**words, "elements": shown(given)}
+    if given := [*parts.motors, *parts.springs, *parts.limits]:
+        yield "analysis", {"element": "force element", "frames": ""}, {**words, "elements": shown(given)}
+    if parts.limits:
+        yield "analysis", limited(parts), {**words, "elements": shown(list(parts.limits))}
     yield "analysis", {"drive": ""}, words
     if entry.word("frames"):
         yield "analysis", only(frames=str(entry.word("frames"))), words
@@ -159,6 +166,15 @@ def analysis(parts: Parts) -> Iterator[Told]:
         words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
         words["key"] = "ratio" if damping.has("ratio") else "alpha"
         yield "damping", {"damping": "in proportion to mass"}, words
+
+
+def limited(parts: Parts) -> dict[str, str]:
+    """Factors of an analysis with limits of joints."""
+    several = parts.analysis.record is not None and (parts.analysis.record.extrapolation_levels or 1) > 1
+    deflected = "initial_deflection" if parts.analysis.raw.get("initial_deflection") else ""
+    return only(element="limit", levels="several" if several else "one", start=deflected) | {
+        "solver": parts.analysis.word("solver") or "condensed"
+    }
 
 
 def only(**facts: str) -> dict[str, str]:

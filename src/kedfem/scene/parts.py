@@ -19,6 +19,7 @@ from kedfem.scene.loads import Body, Load
 from kedfem.scene.materials import BUILT_IN
 from kedfem.scene.motors import Motor
 from kedfem.scene.springs import Spring
+from kedfem.scene.stops import Limit
 
 TYPES: dict[str, Any] = {
     "links": LinkScene,
@@ -27,6 +28,7 @@ TYPES: dict[str, Any] = {
     "bodies": Body,
     "motors": Motor,
     "springs": Spring,
+    "limits": Limit,
     "probes": Probe,
     "drive": Drive,
     "drives": Drive,
@@ -97,6 +99,7 @@ class Parts:
     bodies: dict[str, Entry]
     motors: dict[str, Entry]
     springs: dict[str, Entry]
+    limits: dict[str, Entry]
     probes: dict[str, Entry]
     drive: Entry
     drives: dict[str, Entry]
@@ -150,6 +153,7 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         bodies=entries("bodies", raw.get("bodies")),
         motors=entries("motors", raw.get("motors")),
         springs=entries("springs", raw.get("springs")),
+        limits=entries("limits", raw.get("limits")),
         probes=entries("probes", output.get("probes") if isinstance(output, Mapping) else None, "output"),
         drive=single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE,
         drives=entries("drives", raw.get("drives")),

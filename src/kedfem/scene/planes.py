@@ -25,7 +25,7 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
     tables: dict[str, Mapping[str, Any]] = {
         "links": scene.links, "joints": scene.joints, "loads": scene.loads, "bodies": scene.bodies,
-        "motors": scene.motors, "springs": scene.springs,
+        "motors": scene.motors, "springs": scene.springs, "limits": scene.limits,
     }  # fmt: skip
     known = {section: _entries(section, table) for section, table in tables.items()}
     probes = _entries("probes", scene.output.probes, "output")

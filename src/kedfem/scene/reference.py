@@ -34,6 +34,7 @@ from kedfem.scene import (
     sections,
     shapes,
     springs,
+    stops,
 )
 from kedfem.scene.hints import field_hint, keys, kind_of, models, options
 from kedfem.scene.units import Quantity
@@ -126,6 +127,7 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
     ("force of a motor", "", [motors.ForceCurve]),
     ("[springs.NAME]", "", models(springs.Spring)),
     ("Ends of a spring", "", [springs.SpringEnd]),
+    ("[limits.NAME]", "", models(stops.Limit)),
     ("[loads.NAME]", "", models(loads.Load)),
     ("factor of a load", "", [loads.Factor]),
     ("[bodies.NAME]", "", models(loads.Body)),

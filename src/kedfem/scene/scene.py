@@ -43,8 +43,16 @@ from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
 from kedfem.scene.springs import Spring
+from kedfem.scene.stops import Limit
 from kedfem.scene.timing import time_grid
-from kedfem.scene.undriven import frame_faults, initial_faults, motor_faults, spring_faults, undriven_faults
+from kedfem.scene.undriven import (
+    frame_faults,
+    initial_faults,
+    limit_faults,
+    motor_faults,
+    spring_faults,
+    undriven_faults,
+)
 from kedfem.scene.unit_plausibility import bare_numbers
 
 MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than a disk holds
@@ -89,6 +97,8 @@ class Scene(Record):
     """torques and forces on joints that are not driven"""
     springs: dict[Name, Spring] = Field(default_factory=dict)
     """springs and dampers between links, or links and the ground"""
+    limits: dict[Name, Limit] = Field(default_factory=dict)
+    """stops that a hinge or slide runs against"""
     loads: dict[Name, Load] = Field(default_factory=dict)
     """forces, beside gravity and inertia"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
@@ -244,6 +254,7 @@ def cross_faults(parts: Parts) -> list[str]:
         frame_faults,
         motor_faults,
         spring_faults,
+        limit_faults,
         initial_faults,
         undriven_faults,
         combination_faults,

@@ -1,4 +1,4 @@
-"""Cross checks of segments, motors, springs, initial velocities, and of scenes without a drive; each yields fault lines.
+"""Cross checks of segments, force elements, initial velocities, and of scenes without a drive; each yields fault lines.
 
 Which combinations are refused the table of capabilities says.
 """
@@ -72,6 +72,12 @@ def spring_faults(parts: Parts) -> Iterator[str]:
                 yield spring.fault("between", unknown_name("a link", name, known), i, "link")
         if names == [GROUND, GROUND]:
             yield spring.fault("between", "must hold a link, got the ground twice")
+
+
+def limit_faults(parts: Parts) -> Iterator[str]:
+    """Limits of joints that do not exist."""
+    for limit in parts.limits.values():
+        yield from unknown_joint(parts, limit)
 
 
 def end_links(spring: Entry) -> list[str | None]:

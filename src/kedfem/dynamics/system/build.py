@@ -1,7 +1,7 @@
 """From a scene and its elastic model to a system: what each joint constrains and releases, force elements on coordinates.
 
-One table says what a kind of joint constrains (`motion.constraints.CONSTRAINED`); bushings, gears, drives, springs and
-motors are laws on the same coordinates.
+One table says what a kind of joint constrains (`motion.constraints.CONSTRAINED`); bushings, gears, drives, springs,
+motors and limits are laws on the same coordinates.
 """
 
 from collections.abc import Iterator
@@ -29,6 +29,7 @@ from kedfem.dynamics.system.record import (
     Held,
     Law,
     Spring,
+    Stop,
     System,
     Term,
 )
@@ -37,10 +38,11 @@ from kedfem.links.record import Link
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
-from kedfem.scene import LineSpring, Motor, Scene
+from kedfem.scene import AngleLimit, LineSpring, Motor, Scene, TravelLimit
 from kedfem.scene.capabilities import SLOTS
 
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
+ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
 
 
@@ -89,7 +91,7 @@ class _Builder:
     constraints: list[Constraint] = field(default_factory=list)
 
     def joint(self, joint: ConstraintJoint) -> None:
-        """What a joint constrains, a pair of gears couples, a spring or motor acts on."""
+        """What a joint constrains, a pair of gears couples, a spring, motor or limit acts on."""
         scene, (kind, _, name) = self.scene, joint.name.rpartition(".")
         if kind == "rigid":
             self.bars(joint)
@@ -98,7 +100,7 @@ class _Builder:
             of = scene.gears[name].joints
             terms = (*self.coordinate(of[1], joint, 1.0), *self.coordinate(of[0], first, factor))
             self.add(joint.name, terms, Held(), joint, first)
-        elif kind in {"springs", "motors"}:
+        elif kind in ELEMENTS:
             self.element(joint, getattr(scene, kind)[name])
         elif scene.joints[joint.name].kind == "slot" and set(joint.bodies) & self.own:
             raise SceneError(SLOTS.said({"where": f"joints.{joint.name}"}))
@@ -119,8 +121,8 @@ class _Builder:
             self.add(joint.name, (long, Term(DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint)
 
     def between_prescribed(self, known: set[str]) -> None:
-        """Springs and motors between the ground and what drives carry: no unknowns, but hubs bear them."""
-        for kind in ("springs", "motors"):
+        """Springs, motors and limits between the ground and what drives carry: no unknowns, but hubs bear them."""
+        for kind in ELEMENTS:
             for name, element in getattr(self.scene, kind).items():
                 if f"{kind}.{name}" in known:
                     continue
@@ -147,10 +149,12 @@ class _Builder:
                 )
 
     def element(self, joint: ConstraintJoint, element: object) -> None:
-        """The law of a spring or motor on its coordinate, which its links' own motion tells."""
+        """The law of a spring, motor or limit on its coordinate, which its links' own motion tells."""
         law: Law
         if isinstance(element, Motor):
             law = Curve(OVER[element.curve.over], element.curve.at, element.curve.value)
+        elif isinstance(element, AngleLimit | TravelLimit):
+            law = Stop(*element.range, element.stiffness, element.damping)
         else:
             law = Spring(element.stiffness, element.damping, element.free)  # type: ignore[attr-defined]
         if isinstance(element, LineSpring) and element.between is not None:
@@ -159,7 +163,7 @@ class _Builder:
             terms: tuple[Term, ...] = (Term(DISTANCE, i, j, a, a_j, np.zeros(3)),)
         else:
             turns = isinstance(element, Motor) and element.torque is not None
-            turns = turns or not isinstance(element, Motor | LineSpring)
+            turns = turns or not isinstance(element, Motor | LineSpring | TravelLimit)
             terms = self.coordinate(str(element.joint), joint, 1.0, turns)  # type: ignore[attr-defined]
         self.constraints.append(Constraint(joint.name, terms, law, linear=False))
 

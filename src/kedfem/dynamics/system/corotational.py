@@ -40,7 +40,7 @@ Rows = Float[np.ndarray, "T _ _"]
 
 
 def corotational_system(scene: Scene, model: Model) -> tuple[System, Linkage]:
-    """The system of a scene, on the links of its model, with interface points for springs and motors.
+    """The system of a scene, on the links of its model, with interface points for force elements.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def corotational_system(scene: Scene, model: Model) -> tuple[System, Linkage]:
         If the coupling surface of a force element does not tell how it turns as a whole.
     """
     rigid = linkage(scene)
-    if scene.springs or scene.motors:
+    if scene.springs or scene.motors or scene.limits:
         links = dict(zip(link_keys(model), model.links, strict=True))
         ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, {})
         held = joined(scene, links, model.cuts, ways, elements=True)
@@ -72,9 +72,10 @@ class CorotationalSteps:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme, tolerance)
         self.factorisations, self.eased, self.sweeps = len(self.ready.parts), 0, 0
-        points = system.model.joints is not model.joints  # of springs and motors, beside those of joints
+        points = system.model.joints is not model.joints  # of force elements, beside those of joints
         self.elements = [f"motors.{name}" for name in scene.motors]
         self.elements += [f"springs.{name}" for name in scene.springs]
+        self.elements += [f"limits.{name}" for name in scene.limits]
         self.riders = {
             self.linkage.bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders
         }

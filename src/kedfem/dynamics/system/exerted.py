@@ -16,7 +16,7 @@ from kedfem.dynamics.system.record import Constraint, Driven, End, Spring
 from kedfem.dynamics.system.supports import Supports, Vectors
 from kedfem.motion.constraints import cross
 
-ELEMENTS = ("motors.", "springs.")
+ELEMENTS = ("motors.", "springs.", "limits.")
 Rows = Float[np.ndarray, "T _ _"]
 
 
@@ -30,7 +30,7 @@ def exerted(forces: Supports, elements: Sequence[str]) -> Exerted:
 
     Parameters
     ----------
-    elements : names of motors and springs, as ``motors.NAME``, in the order that is recorded
+    elements : names of motors, springs and limits, as ``motors.NAME``, in the order that is recorded
     """
     T, joints, history = len(forces.z), joints_of(forces), forces.history
     constraints = forces.of.system.constraints
@@ -109,7 +109,7 @@ def _on_ports(forces: Supports, joints: Sequence[ConstraintJoint]) -> Float[np.n
 
 
 def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> dict[int, Rows]:
-    """Nodal forces (T, n, d) of springs and motors on the links that they act on, by number, world components.
+    """Nodal forces (T, n, d) of force elements on the links that they act on, by number, world components.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.deflected import plucked, quasi_static
 from kedfem.dynamics.system.ends import end_of
+from kedfem.dynamics.system.exerted import ELEMENTS
 from kedfem.dynamics.system.instant import Motion
 from kedfem.dynamics.system.literal import Now
 from kedfem.dynamics.system.literal_steps import literal_march, oracle
@@ -208,7 +209,7 @@ def _bearings(
     seen : the model with interface points for force elements
     bodies : of the linkage
     """
-    elements = [row for row in seen.rows if row.name.startswith(("springs.", "motors."))]
+    elements = [row for row in seen.rows if row.name.startswith(ELEMENTS)]
     if not elements:
         return [], []
     every = list(zip(model.links, model.joints, seen.joints, strict=True))
