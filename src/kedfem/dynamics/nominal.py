@@ -21,6 +21,7 @@ from kedfem.scene import ConstantSpeed, Scene, path_parameter, time_grid, turn_s
 
 POINTS = 1024  # time points of rigid motion found together
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
+FINER = 8  # instants in a step, from whose differences the rates of constraints at the start are
 
 
 def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iterator[tuple[int, RigidMotion]]:
@@ -93,7 +94,7 @@ def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
     if not model.rows:
         return None
     grid = time_grid(scene)
-    h = min(grid.step, grid.end / (INSTANTS - 1))
+    h = min(grid.step, grid.end / (INSTANTS - 1)) / FINER
     t = h * np.arange(INSTANTS)
     rows = joint_rows(model.rows, rigid_motion(linkage, along, t, path_parameter(scene, t)))
     return None if rows is None else first_rows(rows, h)

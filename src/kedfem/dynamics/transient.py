@@ -66,7 +66,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     damped = not hubs and any(row.damping.any() for row in model.rows)
     elements = scene.springs or scene.motors or scene.limits
     acted = elements or scene.analysis.initial_deflection or damped
-    if stresses is None and (acted or not (literal or model.rows)):
+    if stresses is None and (acted or not literal):
         return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
     small = all(map(_is_small, model.links))
     solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
@@ -175,7 +175,7 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
         return rigid_motion(linkage, along, t, path_parameter(scene, t))
 
-    if solver.ready.c.single and not scene.analysis.initial_deflection and not model.rows:
+    if solver.ready.c.single and not scene.analysis.initial_deflection:
         return from_links(Instant(solver.ready, motion_at, 0.0), first_states(scene, linkage, along, model))
     at_rest = scene.analysis.initial == "rest"
     return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])

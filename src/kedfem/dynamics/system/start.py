@@ -9,11 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import coordinates, work_on
+from kedfem.dynamics.first_rows import interface_forces
 from kedfem.dynamics.ports import turned_ports
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import Asked, Balance, Solved, mass_body
+from kedfem.dynamics.system.balance import DEPENDENT, Asked, Balance, Solved, mass_body
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
@@ -50,7 +51,10 @@ def from_links(now: Instant, links: Sequence[LinkState]) -> State:
     u, v = (as_coordinates(of, [getattr(x, name) for x in links]) for name in "uv")
     state = begun(now, u, v)
     state.a[:] = as_coordinates(of, [x.a for x in links])
-    state.z[2, now.always.number] = now.interface(state.a)
+    z = np.stack([now.interface(x) for x in (u, v, state.a)])
+    state.z[:, now.always.number], state.e[:] = z, now.coordinates(z)
+    if len(state.multiplier):
+        _multiplied(now, z[0], interface_forces(joints, links), state)
     for k, (part, joint, x) in enumerate(zip(of.parts, joints, links, strict=True)):
         here, ports = own(of, k), slice(int(of.bodies.port_at[k]), int(of.bodies.port_at[k + 1]))
         N = here.stop - here.start
@@ -62,6 +66,15 @@ def from_links(now: Instant, links: Sequence[LinkState]) -> State:
             moved = [each.T.ravel() for each in (x.Mu, x.Mv, x.Ma)]
             state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moved)
     return state
+
+
+def _multiplied(now: Instant, z: Flat, p: Flat, state: State) -> None:
+    """Multipliers of a state whose constraints and laws exert p on the interface unknowns together."""
+    C = now.gradients(z)
+    hard = now.hard(C)
+    left = p - C[~hard].T @ state.multiplier[~hard]
+    state.multiplier[hard] = np.linalg.lstsq(C[hard].T, left, rcond=DEPENDENT)[0]
+    state.bearing[now.always.number] = p
 
 
 def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
