@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.scheme import generalised_alpha
@@ -15,7 +13,7 @@ from kedfem.dynamics.transient import steps_of, transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from, time_grid
 
-Solver = type[CondensedSteps | DenseSteps | LiteralSteps]
+Solver = type[LiteralSteps]
 
 
 def bar(fidelity: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:

@@ -70,9 +70,9 @@ def test_the_kinds_of_force_elements_and_the_options_of_the_compiler_are_in_it()
 
 @pytest.mark.skipif("NUMBA_CACHE_DIR" in os.environ, reason="the user has chosen a folder")
 def test_what_is_compiled_goes_there() -> None:
-    from kedfem.dynamics.kernel import times
+    from kedfem.dynamics.system.linear_kernel import marched_linear
 
-    assert Path(times.stats.cache_path).is_relative_to(compiled.kernel_folder(compiled.ROOT))
+    assert Path(marched_linear.stats.cache_path).is_relative_to(compiled.kernel_folder(compiled.ROOT))
 
 
 def test_it_is_kept_for_the_user_even_where_the_cache_is_off(
@@ -116,11 +116,11 @@ def test_after_compiling_beforehand_no_scene_compiles_anything(tmp_path: Path) -
 PRODUCT = """
 import numpy as np
 from kedfem.compiled import compiling
-from kedfem.dynamics.kernel import times
-told, out = [], np.zeros(2)
+from kedfem.dynamics.force_elements_kernel import dot
+told = []
 with compiling(told.append):
-    times(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([1.0, 1.0]), out)
-assert out.tolist() == [3.0, 7.0]
+    product = dot(np.array([1.0, 2.0, 0.0]), np.array([3.0, 4.0, 5.0]))
+assert product == 11.0
 print("compiled" if told else "read")
 """
 

@@ -8,12 +8,9 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.constraint_matrices import joint_rows
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.first_rows import interface_values
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
@@ -97,11 +94,13 @@ def test_stiffer_links_bear_what_rigid_ones_do() -> None:
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_condensed_and_dense_steps_are_the_literal_ones(kind: str) -> None:
-    """Three ways to one number."""
+def test_the_systems_steps_are_the_literal_ones(kind: str) -> None:
+    """Two ways to one number."""
     found = []
-    for solver in (LiteralSteps, CondensedSteps, DenseSteps):
-        ready, blocks = ran(KINDS[kind](), solver)
+    for solver in ("monolithic", "condensed"):
+        raw = KINDS[kind]()
+        raw["analysis"]["solver"] = solver
+        ready, blocks = ran(raw)
         links = range(len(ready.model.links))
         found.append([state(blocks, k, name) for name in ("u", "v", "port_forces") for k in links])
     for other in found[1:]:
@@ -232,8 +231,8 @@ def test_a_bushing_becomes_the_rigid_joint_as_its_compliance() -> None:
 
 def test_bushings_are_the_same_in_all_steps() -> None:
     found = []
-    for solver in (LiteralSteps, CondensedSteps, DenseSteps):
-        _, blocks = ran(bushed(1e7, 1e3, revolutions=0.05), solver)
+    for solver in ("monolithic", "condensed"):
+        _, blocks = ran(bushed(1e7, 1e3, revolutions=0.05, solver=solver))
         found.append([state(blocks, k, name) for name in ("u", "v", "port_forces") for k in range(3)])
     for other in found[1:]:
         for x, y in zip(other, found[0], strict=True):

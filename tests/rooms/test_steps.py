@@ -1,4 +1,4 @@
-"""Dense, condensed and monolithic steps of one model; the compiled loop without its compiler; runs that end early."""
+"""The system's and monolithic steps of one model; the compiled loop without its compiler; runs that end early."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,8 +9,6 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.condensed import CondensedSteps
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.nominal import motions
 from kedfem.dynamics.scheme import generalised_alpha
@@ -65,20 +63,16 @@ def displacements(ready: Prepared, solver: Steps) -> tuple[np.ndarray, np.ndarra
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.9, 0.5])
 @pytest.mark.parametrize("made", [mixed, sliding])
-def test_dense_condensed_and_literal_steps_are_one(made: Any, rho_inf: float) -> None:
+def test_the_systems_steps_are_the_literal_ones(made: Any, rho_inf: float) -> None:
     ready = meshed(scene_from(made()))
     model = ready.model
     scheme = generalised_alpha(time_grid(ready.scene).step, rho_inf)
-    dense, condensed, literal = (
-        displacements(ready, kind(model.links, model.joints, scheme, model.damping))
-        for kind in (DenseSteps, CondensedSteps, LiteralSteps)
-    )
+    literal = displacements(ready, LiteralSteps(model.links, model.joints, scheme, model.damping))
     system = displacements(ready, SystemSteps(ready.scene, nominal_system(ready.scene, model), model, scheme))
     assert model.damping.present
-    for other in (condensed, literal, system):
-        for got, wanted in zip(dense, other, strict=True):
-            # rounding, amplified by the stiffness of the links along their line
-            assert_allclose(got, wanted, rtol=0, atol=2e-8 * np.abs(wanted).max())
+    for got, wanted in zip(system, literal, strict=True):
+        # rounding, amplified by the stiffness of the links along their line
+        assert_allclose(got, wanted, rtol=0, atol=2e-8 * np.abs(wanted).max())
 
 
 def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,23 @@
-"""Histories of a single link through the condensed step; NAFEMS 5T and 5H."""
+"""Histories of a single link by the march of a system; NAFEMS 5T and 5H."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.dense import work_on
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.start import Deflected, initial_states
-from kedfem.dynamics.state import LinkState, Nominal, Rayleigh
+from kedfem.dynamics.state import Nominal, Rayleigh
+from kedfem.dynamics.system.instant import Instant
+from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.record import System
+from kedfem.dynamics.system.start import from_links
 from kedfem.links.record import Link
+from kedfem.motion.rigid import RigidMotion, resting
 
 from .cases import Row, case
 from .linear import deflection, free_map, vector_mass
@@ -19,6 +26,7 @@ from .vibrations import DEEP, STEEL, pinned_beam
 NAFEMS = "Maguire, Dawswell, Gould: Selected benchmarks for forced vibration, NAFEMS R0016 (1989)"
 DAMPING = Rayleigh(alpha=5.36, beta=7.46e-5)  # 2 % at the first frequency
 FIRST = 42.65  # Hz
+BLOCK = 1000  # steps whose states are kept together
 
 
 def grounded(link: Link, dofs: np.ndarray) -> Attachment:
@@ -47,17 +55,32 @@ class Run:
     start: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
 
-def history(run: Run, steps: int) -> Iterator[LinkState]:
-    """All states from t = 0."""
-    link, joint = [run.link], [run.joint]
-    start = Deflected(*(run.start or [np.zeros((run.link.n, 3))] * 3))
-    states = initial_states(link, joint, [Nominal(run.R(0.0), run.forces(0.0))], run.damping, [start])
-    solver = CondensedSteps(link, joint, run.scheme, run.damping)
-    yield states[0]
-    for k in range(1, steps + 1):
-        t = k * run.scheme.h
-        states = solver.step(states, [Nominal(run.R(t), run.forces(t))])
-        yield states[0]
+class Moving(NamedTuple):
+    """Displacement and rate of a link at one time, (n, d), world components."""
+
+    u: np.ndarray
+    v: np.ndarray
+
+
+def history(run: Run, steps: int) -> Iterator[Moving]:
+    """All states from t = 0, by the march of a system of one body."""
+    link, joint = run.link, run.joint
+    model = Model((link,), (0,), (joint,), ((),), (), run.damping)
+    of = ready(System(("link",), (), (), joint.B.shape[1], model), run.scheme)
+    begin = Deflected(*(run.start or [np.zeros((link.n, 3))] * 3))
+    states = initial_states([link], [joint], [Nominal(run.R(0.0), run.forces(0.0))], run.damping, [begin])
+    state = from_links(Instant(of, lambda t: motion_of(run, t), 0.0), states)
+    state.F[:] = work_on(of.parts[0], run.forces(0.0)).ravel()
+    yield Moving(states[0].u, states[0].v)
+    for first in range(1, steps + 1, BLOCK):
+        t = run.scheme.h * np.arange(first, min(first + BLOCK, steps + 1))
+        state, found = march(of, state, motion_of(run, t), loads=[np.stack([run.forces(x) for x in t])])
+        yield from map(Moving, *(displacements(of, 0, x) for x in (found.u, found.v)))
+
+
+def motion_of(run: Run, t: np.ndarray) -> RigidMotion:
+    """The link turned at given times."""
+    return replace(resting(1, t), R=np.stack([run.R(x) for x in t])[:, None])
 
 
 def uniform_load(link: Link) -> np.ndarray:

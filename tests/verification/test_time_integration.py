@@ -13,13 +13,13 @@ from scipy.integrate import solve_ivp
 
 from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.state import LinkState, Rayleigh
+from kedfem.dynamics.state import Rayleigh
 from kedfem.links.beam import beam_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.section import rectangle
 from kedfem.scene import Material
 
-from .histories import Run, grounded, history, pinned_beam
+from .histories import Moving, Run, grounded, history, pinned_beam
 from .linear import held, vector_mass
 from .meshes import box, mapped_link
 
@@ -122,7 +122,7 @@ def free_vibration(kind: str, rho_inf: float) -> Run:
     return Run(link, grounded(link, fixed), scheme, Rayleigh(), lambda _: none, start=(u, none, none))
 
 
-def energy(link: Link, s: LinkState) -> float:
+def energy(link: Link, s: Moving) -> float:
     """½ v·M v + ½ u·K0 u [J], R = 1."""
     return float((s.v * mass_times(link.mass, s.v)).sum() + s.u.ravel() @ (link.K0 @ s.u.ravel())) / 2
 

@@ -11,10 +11,8 @@ from kedfem.accuracy.reduction import reduced
 from kedfem.bench.followed import advanced, first_state
 from kedfem.bench.machine import seconds
 from kedfem.bench.scenes import mechanisms
-from kedfem.dynamics.dense import DenseSteps
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.transient import steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
@@ -73,12 +71,11 @@ def recorded_rate(ready: Prepared) -> float:
 
 def least_time(ready: Prepared, bandwidth: float, rate: float) -> tuple[float, float]:
     """Seconds that a step's products need at a machine's speed: by memory (all from RAM), by arithmetic."""
-    solver = DenseSteps(
-        ready.model.links, ready.model.joints,
-        generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf), ready.model.damping,
-    )  # fmt: skip
-    numbers = sum(x.G.size + 2 * x.Y.size + x.S.size + x.W.size for x in solver.parts)  # Y is used twice
-    read = sum(x.G.size + x.Y.size + x.S.size + x.W.size for x in solver.parts)
+    solver: Any = steps_of(ready.scene, ready.model)
+    numbers = sum(
+        x.G.size + 2 * x.Y.size + x.S.size + x.W.size for x in solver.ready.parts
+    )  # Y is used twice
+    read = sum(x.G.size + x.Y.size + x.S.size + x.W.size for x in solver.ready.parts)
     return 8 * read / bandwidth, 2 * numbers / rate
 
 

@@ -1,38 +1,29 @@
-"""The condensed step against the literal one, in one run: time per step, share of the triangular solves, agreement."""
+"""The system's step against the monolithic one, in one run: time per step, share of the triangular solves, agreement."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import islice
 from pathlib import Path
-from statistics import median
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
+from kedfem.accuracy.prepared import meshed
 from kedfem.bench.machine import Watch, markdown, write_loglog, write_page
 from kedfem.bench.scenes import bar_four_bar
-from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.history import LinkMoment
-from kedfem.dynamics.literal import LiteralSteps
-from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.state import LinkState, Nominal
-from kedfem.dynamics.transient import Steps, snapshots
-from kedfem.motion.linkage import linkage
-from kedfem.motion.path import path
-from kedfem.scene import time_grid
+from kedfem.dynamics.system.sparse import SparsePart
+from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.transient import snapshots, steps_of
 
 SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100
 STEPS_PER_REVOLUTION = 720
 
-Step = Callable[[Sequence[LinkState], Sequence[Nominal]], list[LinkState]]
-
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
-    """Unknowns, factorisations, median seconds of a step, share of the solves in it, states after the first steps."""
+    """Unknowns, factorisations, mean seconds of a step, share of the solves in it, states after the first steps."""
 
     unknowns: int
     factorisations: int
@@ -42,7 +33,7 @@ class _Measured:
 
 
 def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
-    """Median time of a step of both solvers at several sizes; table and plot go to the folder."""
+    """Mean time of a step of both solvers at several sizes; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
     rows, unknowns, condensed_times, literal_times = [], [], [], []
     for number, size in enumerate(sizes):
@@ -72,44 +63,32 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
 def _stepped(size: tuple[int, int, int], solver: str, steps: int) -> "_Measured":
     """Take some steps of a scene and measure them."""
     scene = bar_four_bar(size, solver, revolutions=steps / STEPS_PER_REVOLUTION)
-    joined = linkage(scene)
-    along = path(joined, *drive_range(scene))
-    model = elastic_model(scene, joined)
-    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    kind = LiteralSteps if solver == "monolithic" else CondensedSteps
-    taken = kind(model.links, model.joints, scheme, model.damping)
+    ready = meshed(scene)
+    taken = steps_of(scene, ready.model)
     watch = _Stopwatch(taken)
-    run = snapshots(scene, joined, along, model, taken)
-    states = [snapshot.states for snapshot in islice(run, 1, None)][:LITERAL_STEPS]
-    share = watch.solves / sum(watch.steps)
-    return _Measured(model.unknowns, taken.factorisations, median(watch.steps), share, states)
+    states = [each.states for each in snapshots(scene, ready.linkage, ready.path, ready.model, taken)][1:]
+    step = watch.steps / len(states)
+    return _Measured(ready.model.unknowns, taken.factorisations, step, watch.solves / watch.steps, states)
 
 
 class _Stopwatch:
-    """Notes the seconds of each step, and adds up those of the triangular solves within."""
+    """Adds up the seconds of a solver's steps, and those of the solves with sparse factors within."""
 
-    def __init__(self, solver: Steps) -> None:
-        self.solves = 0.0
-        self.steps: list[float] = []
-        if isinstance(solver, CondensedSteps):
-            solver.parts = [replace(part, solve=self._timed_solve(part.solve)) for part in solver.parts]
-        if isinstance(solver, CondensedSteps | LiteralSteps):
-            solver.step = self._timed_step(solver.step)  # type: ignore[method-assign, assignment]
+    def __init__(self, solver: Any) -> None:
+        self.solves = self.steps = 0.0
+        if isinstance(solver, SystemSteps):
+            parts = solver.ready.parts
+            parts[:] = [
+                replace(part, held=self._timed(part.held, "solves")) if isinstance(part, SparsePart) else part
+                for part in parts
+            ]
+        solver.advance = self._timed(solver.advance, "steps")
 
-    def _timed_solve(self, solve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-        def timed(r: np.ndarray) -> np.ndarray:
+    def _timed(self, call: Callable[..., Any], name: str) -> Callable[..., Any]:
+        def timed(*given: Any) -> Any:
             since = perf_counter()
-            out = solve(r)
-            self.solves += perf_counter() - since
-            return out
-
-        return timed
-
-    def _timed_step(self, step: Step) -> Step:
-        def timed(states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-            since = perf_counter()
-            out = step(states, at)
-            self.steps.append(perf_counter() - since)
+            out = call(*given)
+            setattr(self, name, getattr(self, name) + perf_counter() - since)
             return out
 
         return timed

@@ -1,10 +1,11 @@
 """The monolithic step: assemble T K0 Tᵀ, share nodes, factor, at every step. Oracle for tests, baseline for the
 benchmark.
 
-It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the condensed step.
+It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the system's step.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -12,17 +13,15 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import end_forces
 from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import Forcing, LinkHistory, stepwise
-from kedfem.dynamics.interface import RowState, Tie
-from kedfem.dynamics.ports import Rotation, port_columns, port_vectors
+from kedfem.dynamics.history import Forcing, LinkHistory, history, stepwise
+from kedfem.dynamics.interface import RowState, Tie, after_step, step_tie
+from kedfem.dynamics.ports import Rotation, port_columns, port_rotation, port_vectors
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
 from kedfem.dynamics.stiffening import Stiffening, with_turnings
 from kedfem.dynamics.substructure import mass_matrix
-from kedfem.dynamics.tied import Begun, stepwise_tied
 from kedfem.links.record import Link
 
 DEPENDENT = 1e-9  # rows of length one
@@ -115,6 +114,14 @@ def _bordered_solution(system: sp.csc_array, f: Float[np.ndarray, " n"], tie: Ti
     return np.asarray(x[:n]), m
 
 
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """What a solver carries from block to block: states of all links, and of joints enforced by constraint equations."""
+
+    links: list[LinkState]
+    rows: RowState | None = None
+
+
 class LiteralSteps:
     """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
 
@@ -136,24 +143,24 @@ class LiteralSteps:
     def advance(
         self, state: Begun, forcing: Sequence[Forcing], rows: JointRows | None = None
     ) -> tuple[list[LinkHistory], Begun]:
-        """All time points of a block; see `DenseSteps.advance`."""
+        """All time points of a block, one step after the other."""
         if self.stiffening is not None:
             forcing = self.stiffening.stressed(forcing)
         if rows is None:
             links, last = stepwise(self.step, state.links, forcing)
             return links, Begun(last)
-        return stepwise_tied(self.tied_step, state, forcing, rows, self.scheme)
+        return _stepwise_tied(self.tied_step, state, forcing, rows, self.scheme)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
-        """States of all links one step later, [KED, eq. (20)]; see `CondensedSteps.step`."""
+        """States of all links one step later, [KED, eq. (20)]."""
         new = self.tied_step(states, at, None)[0]
         return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
 
     def tied_step(
         self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
     ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-        """The same where joints are enforced by constraint equations, which border the system; see
-        `CondensedSteps.tied_step`."""
+        """The same where joints are enforced by constraint equations, which border the system; also the interface
+        unknowns and the equations' forces."""
         A = self._matrices(at)
         rhs = [self._rhs(k, states[k], at[k]) for k in range(len(self.links))]
         system = sp.csc_array(self.T.T @ sp.csr_array(sp.block_diag(A)) @ self.T)
@@ -193,6 +200,7 @@ class LiteralSteps:
         return np.asarray(out)
 
     def _next(self, k: int, s: LinkState, at: Nominal, u: Nodal, A: sp.csr_array, rhs: Nodal) -> LinkState:
+        """State of link k at the end of the step; δ = T g, [KED, eq. (5)]."""
         v, a = accelerated(self.scheme, u, s.u, s.v, s.a)
         g = u @ at.R
         Kg = (self.links[k].K0 @ g.ravel()).reshape(g.shape)
@@ -202,7 +210,7 @@ class LiteralSteps:
             Cg = self.damping.alpha * Mu @ at.R + self.damping.beta * Kg
             C = np.stack([Cg, *accelerated(self.scheme, Cg, *s.C)])
             f = Kg + C[1]
-        port_forces = end_forces(self.scheme, self.joints[k], s, at.R, self._port_forces(k, A, u, rhs, at.R))
+        port_forces = _end_forces(self.scheme, self.joints[k], s, at.R, self._port_forces(k, A, u, rhs, at.R))
         return LinkState(u, v, a, Mu, Mv, Ma, g, at.R, Kg, f, C, at.F, port_forces)
 
     def _port_forces(
@@ -215,3 +223,40 @@ class LiteralSteps:
         world = np.linalg.solve(self.Wt[k][s], (A @ u.ravel() - rhs.ravel())[s])
         joint = self.joints[k]
         return np.asarray((port_vectors(joint, world) @ R).ravel()[joint.keep])
+
+
+_TiedStep = Callable[
+    [Sequence[LinkState], Sequence[Nominal], Tie],
+    tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]],
+]
+
+
+def _stepwise_tied(
+    step: _TiedStep, state: Begun, forcing: Sequence[Forcing], rows: JointRows, scheme: Scheme
+) -> tuple[list[LinkHistory], Begun]:
+    """All time points of a block."""
+    links, held, taken = state.links, state.rows, []
+    if held is None:
+        raise ValueError("the rows' state at the first time point must be given, got none")
+    for k in range(len(forcing[0].R)):
+        tie = step_tie(rows.C[k], rows, scheme, held)
+        links, z, m = step(links, [each.at(k) for each in forcing], tie)
+        held = after_step(tie, z, m, scheme, held)
+        taken.append(links)
+    return [history([links[i] for links in taken]) for i in range(len(forcing))], Begun(links, held)
+
+
+def _end_forces(
+    scheme: Scheme, joint: Attachment, s: LinkState, R: Rotation, force: Float[np.ndarray, " q"]
+) -> Float[np.ndarray, " q"]:
+    """λ at the end of a step from the λ of its balance, (1 − α_f) λ1 + α_f λ0, all in the link frame at the end.
+
+    Parameters
+    ----------
+    s : state at the beginning
+    R : orientation at the end
+    """
+    if not scheme.alpha_f:
+        return force
+    before = port_rotation(joint, R.T @ s.R) @ s.port_forces
+    return np.asarray((force - scheme.alpha_f * before) / (1 - scheme.alpha_f))

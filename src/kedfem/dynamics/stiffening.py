@@ -18,8 +18,8 @@ from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import Rotation, port_columns
-from kedfem.dynamics.state import LinkState, Nodal, NodalOf, Nominal
-from kedfem.dynamics.substructure import Substructure, coupled, factored, mass_matrix
+from kedfem.dynamics.state import LinkState, Nodal, Nominal
+from kedfem.dynamics.substructure import Substructure, factored, mass_matrix
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
@@ -27,8 +27,6 @@ from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
 BALANCED = 1e-9  # of a load: what is left of one that only accelerates the link is rounding
 INDEPENDENT = 1e-10  # of the largest energy: loads below repeat others
 NEGLIGIBLE = 1e-12  # of the largest stress: rounding, as of what leaves the plane of a planar linkage
-SWEEPS = 30
-SETTLED = 1e-9  # what the iterations left undone, of the displacement
 Turning = Callable[[Nodal], Nodal]
 """k g P of a link at one time, from g."""
 
@@ -198,45 +196,9 @@ def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.nd
     return out
 
 
-def swept(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], first: Sequence[NodalOf],
-    turnings: Sequence[Turning], share: float,
-) -> tuple[list[NodalOf], list[NodalOf], list[Float[np.ndarray, " _"]]]:  # fmt: skip
-    """Solve A g = r − share · k g P + Wᵀ λ by iterations with the constant A.
-
-    Parameters
-    ----------
-    first : g to begin with
-    share : of the term at this time, 1 − α_f
-
-    Returns
-    -------
-    r − share · k g P as last used; g; λ. g is nan where the iterations do not converge
-    """
-    before, g = 0.0, list(first)
-    for _ in range(SWEEPS):
-        full = [r - share * k(x) for r, k, x in zip(rhs, turnings, g, strict=True)]
-        new, forces = coupled(parts, R, full)
-        change = max(float(np.abs(x - y).max(initial=0.0)) for x, y in zip(new, g, strict=True))
-        size = max(float(np.abs(x).max(initial=0.0)) for x in new)
-        g = [x.copy() for x in new]
-        ratio = change / before if before else 1.0
-        if change == 0.0 or (ratio < 1 and change * ratio / (1 - ratio) <= SETTLED * size):
-            return full, g, forces
-        if not np.isfinite(change):
-            break
-        before = change
-    return full, [np.full_like(x, np.nan) for x in g], forces
-
-
 def with_turnings(states: Sequence[LinkState], turnings: Sequence[Turning]) -> list[LinkState]:
     """The states with k g P in their internal force, so that it is part of all that the scheme says of f."""
     return [replace(s, f=s.f + k(s.g)) for s, k in zip(states, turnings, strict=True)]
-
-
-def predicted(s: LinkState, h: float) -> Nodal:
-    """δ one step later with constant δ''."""
-    return s.u + h * s.v + h**2 / 2 * s.a
 
 
 def _given(now: Nominal) -> Float[np.ndarray, " m"]:

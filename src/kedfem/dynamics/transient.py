@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.condensed import CondensedSteps
 from kedfem.dynamics.constraint_matrices import joint_rows
-from kedfem.dynamics.dense import SMALL, DenseSteps
 from kedfem.dynamics.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
 from kedfem.dynamics.literal import LiteralSteps
@@ -28,7 +26,6 @@ from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.start import from_links
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
-from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -37,13 +34,10 @@ from kedfem.scene import Scene, corotational, path_parameter, time_grid
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
 
-ByLink = CondensedSteps | LiteralSteps | DenseSteps | SystemSteps
+ByLink = LiteralSteps | SystemSteps
 Steps = ByLink | CorotationalSteps
 Start = list[LinkState] | State
-UNSETTLED = (
-    ": the iterations of stiffening do not settle, it is not a small term; "
-    'take a smaller step, or frames = "co-rotational"'
-)
+STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:
@@ -61,23 +55,16 @@ def steps_of(scene: Scene, model: Model) -> Steps:
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
     literal = scene.analysis.solver == "monolithic"
     stresses = stiffening(model) if scene.analysis.stiffening else None
-    # the system's starts know dampers of bushings, but lose digits where constraint equations are beside stiff links
-    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
-    damped = not hubs and any(row.damping.any() for row in model.rows)
     elements = scene.springs or scene.motors or scene.limits
-    acted = elements or scene.analysis.initial_deflection or damped
-    if stresses is None and (acted or not literal):
-        return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal)
-    small = all(map(_is_small, model.links))
-    solver: type[DenseSteps | CondensedSteps | LiteralSteps] = DenseSteps if small else CondensedSteps
-    if literal:
-        solver = LiteralSteps
-    return solver(model.links, model.joints, scheme, model.damping, stresses)
+    if elements or scene.analysis.initial_deflection or _dampers_count(model) or not literal:
+        return SystemSteps(scene, nominal_system(scene, model, stresses), model, scheme, literal)
+    return LiteralSteps(model.links, model.joints, scheme, model.damping, stresses)
 
 
-def _is_small(link: Link) -> bool:
-    """Whether dense matrices serve a link; the stiff hubs of a spatial beam would cost them digits."""
-    return link.unknowns <= SMALL and (link.kind != "spatial_beam" or link.full is not None)
+def _dampers_count(model: Model) -> bool:
+    """Whether quasi-static starts feel dampers of bushings: beside rigid cross-section nodes they would lose digits."""
+    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
+    return not hubs and any(row.damping.any() for row in model.rows)
 
 
 def transient(
@@ -116,11 +103,21 @@ def transient(
             mark.set(first + k, state, solver)
             part = motion.part(k, k + length)
             forcing = forcings(model, part)
-            if isinstance(solver, SystemSteps):
-                links, state = solver.advance(state, forcing, part)
-            else:
+            if not isinstance(solver, SystemSteps):
                 links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
-            yield from _finite(Block(first + k, part, links), UNSETTLED if stresses else "")
+                yield from _finite(Block(first + k, part, links))
+                continue
+            try:
+                links, state = solver.advance(state, forcing, part)
+            except ConvergenceError as failed:
+                if failed.taken:
+                    done = part.part(0, failed.taken)
+                    yield Block(
+                        first + k, done, solver.handed_on(failed.history, forcings(model, done), done)
+                    )
+                advice = "give it more elements" if stresses is None else STIFFENED
+                raise SolveError(_stuck(first + k + failed.taken, part, failed, advice)) from None
+            yield from _finite(Block(first + k, part, links))
 
 
 def _corotational(
@@ -150,8 +147,9 @@ def _corotational(
                 if failed.taken:
                     links, exerted = solver.handed_on(failed.history, forcing, part)
                     yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
-                raise SolveError(_stuck(model, first + k + failed.taken, part, failed)) from None
-            yield from _finite(Block(first + k, part, links, exerted=exerted), "")
+                advice, tried = _finer(model, failed), f", not even in {2**HALVINGS} parts"
+                raise SolveError(_stuck(first + k + failed.taken, part, failed, advice, tried)) from None
+            yield from _finite(Block(first + k, part, links, exerted=exerted))
 
 
 def stresses_of(solver: Steps) -> Stiffening | None:
@@ -175,9 +173,12 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
         return rigid_motion(linkage, along, t, path_parameter(scene, t))
 
-    if solver.ready.c.single and not scene.analysis.initial_deflection:
-        return from_links(Instant(solver.ready, motion_at, 0.0), first_states(scene, linkage, along, model))
     at_rest = scene.analysis.initial == "rest"
+    plain = solver.ready.c.single or solver.stiffening is not None
+    damped = _dampers_count(model)
+    if plain and (at_rest or not damped) and not scene.analysis.initial_deflection:
+        states = first_states(scene, linkage, along, model, solver.stiffening)
+        return from_links(Instant(solver.ready, motion_at, 0.0), states)
     return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])
 
 
@@ -200,21 +201,22 @@ def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> l
     return [history([state]) for state in states]
 
 
-def _stuck(model: Model, step: int, part: RigidMotion, failed: ConvergenceError) -> str:
-    """What to do about a step that does not settle."""
-    k, beams = failed.taken, {link.name for link in model.links if link.kind == "spatial_beam"}
+def _stuck(step: int, part: RigidMotion, failed: ConvergenceError, advice: str, tried: str = "") -> str:
+    """What to do about a step whose iterations do not converge."""
+    k = failed.taken
     moves = f"link '{failed.moves}'" if failed.moves else "a joint or force element"
-    needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)" * (
-        failed.moves in beams
-    )
     return (
-        f"analysis: the iterations of a step must settle, got none that do at step {step}, t = {part.t[k]:.6g} s, drive "
-        f"angle {np.degrees(part.phi[k]):.6g} deg, not even in {2**HALVINGS} parts; {moves} moves most from "
-        "iteration to iteration: give it more elements or segments"
-        + needed
-        + ", take a smaller step, or more numerical damping "
-        "(rho_inf)"
+        f"analysis: the iterations of a step must converge, got none that do at step {step}, t = {part.t[k]:.6g} s, "
+        f"drive angle {np.degrees(part.phi[k]):.6g} deg{tried}; {moves} moves most from iteration to iteration: "
+        f"{advice}, take a smaller step, or more numerical damping (rho_inf)"
     )
+
+
+def _finer(model: Model, failed: ConvergenceError) -> str:
+    """What helps a link with co-rotational frames."""
+    beams = {link.name for link in model.links if link.kind == "spatial_beam"}
+    needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)"
+    return "give it more elements or segments" + needed * (failed.moves in beams)
 
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
@@ -266,7 +268,7 @@ def first_states(
     return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
 
 
-def _finite(block: Block, advice: str) -> Iterator[Block]:
+def _finite(block: Block) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more, or beyond all measure."""
     fine = np.all([np.abs(link.g).max(axis=(1, 2)) < BEYOND for link in block.links], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
@@ -275,5 +277,5 @@ def _finite(block: Block, advice: str) -> Iterator[Block]:
     if k < len(block):
         raise SolveError(
             f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
-            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg{advice}"
+            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg"
         )

@@ -71,6 +71,21 @@ class TurningLoads(NamedTuple):
     fixed: Any
 
 
+class Stresses(NamedTuple):
+    """Stress stiffness k g P of links with geometric stiffening, see `stresses`.
+
+    at : (i + 1,) where the entries of k of each begin; P : (i, 3, 3) what they act on of components
+    row_at, row, column_at, column : of sparse bodies k's pattern, row by row
+    """
+
+    at: Any
+    P: Any
+    row_at: Any
+    row: Any
+    column_at: Any
+    column: Any
+
+
 class Masses(NamedTuple):
     """Matrices of sparse bodies, whose coordinates are nodal: of components, row by row, one after the other.
 
@@ -88,7 +103,7 @@ class Bodies(NamedTuple):
     """All bodies as flat arrays, constant; i counts bodies.
 
     at : (i + 1,) where the coordinates of each begin; functions, components : n and d; motion : number in the linkage
-    frame, kind : NOMINAL, COROTATIONAL or TANGENTIAL; as `frames_kernel` counts kinds
+    frame, kind : NOMINAL, STRESSED, COROTATIONAL or TANGENTIAL; as `frames_kernel` counts kinds
     dense : whether G is here; else a sparse factor gives G r and Yᵀ r, coordinates are nodal and `mass` counts
     passed : where its coordinates stand among those that passes change, −1 if none
     port_at : (i + 1,) held components q; component : of each; group_at : (i + 2...) where interface points begin
@@ -134,6 +149,7 @@ class Bodies(NamedTuple):
     turning: TurningLoads
     stiffness: Masses
     size: Any
+    stresses: Stresses
 
 
 class Ends(NamedTuple):
@@ -271,6 +287,8 @@ class Driving(NamedTuple):
     drives : (T, D)
     F : (T, N) P − M R0'' on the coordinates, world components; amounts : (T, w) of loads that turn with bodies
     stations : (T, n) weights of the stations of all lines, where their pins are
+    factors : (T, m) of the terms of stress stiffness; terms_at : (i + 1,) where those of each body begin
+    entries_at, entries : (m + 1,) where the entries of each term begin
     """
 
     t: Any
@@ -282,6 +300,10 @@ class Driving(NamedTuple):
     F: Any
     amounts: Any
     stations: Any
+    factors: Any
+    terms_at: Any
+    entries_at: Any
+    entries: Any
 
 
 class Trial(NamedTuple):
@@ -295,6 +317,7 @@ class Trial(NamedTuple):
         m, left : (r,); right, dz, part : (k,); change : what a pass asks for
     fixed, moving : places of all ends in the rigid-body motion, and at z
     base, resisted, strained : of planar beams, see `beams_kernel`
+    stress : entries of the stress stiffness of all bodies
     """
 
     u: Any
@@ -335,6 +358,7 @@ class Trial(NamedTuple):
     mixing: Any
     fixed: Any
     moving: Any
+    stress: Any
 
 
 class Work(NamedTuple):

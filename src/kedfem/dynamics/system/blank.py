@@ -41,7 +41,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         G=np.zeros((r, r)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), pivots=np.zeros(r),
         m=np.zeros(r), left=np.zeros(r), right=np.zeros(k), dz=np.zeros(k), part=np.zeros(k),
         change=np.zeros(like.last.shape[1]), mixing=np.zeros((DEPTH + 1, DEPTH)),
-        fixed=place, moving=tuple(x.copy() for x in place),
+        fixed=place, moving=tuple(x.copy() for x in place), stress=np.zeros(int(bodies.stresses.at[-1])),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import balanced, entry, strained
 from kedfem.dynamics.metric_kernel import metric_force
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
-from kedfem.dynamics.system.record import COROTATIONAL, NOMINAL, TANGENTIAL
+from kedfem.dynamics.system.record import COROTATIONAL, RIGID_BODY, TANGENTIAL
 from kedfem.dynamics.system.turning_kernel import turned_loads
 
 
@@ -140,7 +140,7 @@ def internal_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[
     """
     f, beams = trial.f, bodies.beams
     for i in range(len(bodies.motion)):
-        if bodies.frame[i] != NOMINAL:
+        if bodies.frame[i] > RIGID_BODY:
             for x in range(bodies.at[i], bodies.at[i + 1]):
                 f[x] = 0.0
     if len(beams.segment):
@@ -149,7 +149,7 @@ def internal_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == COROTATIONAL:
             corotational_force(c, bodies, i, R, state, trial, work)
-        if bodies.frame[i] != NOMINAL and c.alpha != 0.0:
+        if bodies.frame[i] > RIGID_BODY and c.alpha != 0.0:
             mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
     turned_loads(bodies, R, amounts, trial.u, f, work.frame)
 

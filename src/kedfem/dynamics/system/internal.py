@@ -15,7 +15,7 @@ from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import NOMINAL
+from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.sparse import SparsePart, component_order
 from kedfem.links.record import Link, mass_times
 
@@ -59,7 +59,7 @@ class Still:
         still_forces(self._c, bodies, R, amounts, self._state, trial, self._work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, (K, frame) in enumerate(zip(self.K, bodies.frame, strict=True)):
-            if frame != NOMINAL:
+            if frame > RIGID_BODY:
                 mean[k] = trial.Rp[k]
                 continue
             d = int(bodies.components[k])

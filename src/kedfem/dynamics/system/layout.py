@@ -1,7 +1,6 @@
 """A system's flat arrays: bodies factored for a fixed step, ends, constraints."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,6 +26,7 @@ from kedfem.dynamics.system.record import (
     POINT,
     SPRING,
     STOP,
+    STRESSED,
     TANGENTIAL,
     Constraint,
     Curve,
@@ -36,6 +36,7 @@ from kedfem.dynamics.system.record import (
     Law,
     Spring,
     Stop,
+    System,
 )
 from kedfem.dynamics.system.sparse import (
     Part,
@@ -45,7 +46,8 @@ from kedfem.dynamics.system.sparse import (
     sparse_part,
     stiffness_tables,
 )
-from kedfem.dynamics.system.turning_loads import Loads, turning_loads
+from kedfem.dynamics.system.stresses import stress_tables
+from kedfem.dynamics.system.turning_loads import turning_loads
 from kedfem.links.record import BeamPoint, Link
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
@@ -103,19 +105,19 @@ def frame_of(link: Link) -> int:
 
 
 def body_arrays(
-    links: Sequence[Link], joints: Sequence[Attachment], numbers: Sequence[int], parts: Sequence[Part],
-    numbering: tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]], loads: Loads,
-) -> Bodies:  # fmt: skip
+    system: System, parts: Sequence[Part], numbering: tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]
+) -> Bodies:
     """All bodies as flat arrays, their parts factored.
 
     Parameters
     ----------
-    numbers : of the bodies in the linkage
     numbering : of `near_diagonal`
     """
+    model, stiffening = system.model, system.stiffening
+    links, joints, numbers = model.links, model.joints, model.bodies
     number, first = numbering
     columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
-    frames = [frame_of(link) for link in links]
+    frames = [frame_of(link) if stiffening is None else STRESSED for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
     beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
     at = _ends(sizes)
@@ -147,9 +149,10 @@ def body_arrays(
             *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
         ),
         elements=element_tables(links, parts), mass=mass_tables(links, parts),
-        turning=turning_loads(links, parts, loads),
+        turning=turning_loads(links, parts, model.loads),
         stiffness=stiffness_tables(links, parts, [frame == COROTATIONAL for frame in frames]),
         size=np.array([1.0 if whole else mass_of(link) for link, whole in zip(links, dense, strict=True)]),
+        stresses=stress_tables(stiffening, parts),
     )  # fmt: skip
 
 
@@ -277,7 +280,7 @@ def is_large(link: Link) -> bool:
     return link.unknowns > SMALL or hubs
 
 
-def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
+def groups(system: System) -> list[Int[np.ndarray, " c"]]:
     """Interface unknowns that a body, or a constraint, couples with each other."""
     out = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
     for each in system.constraints:
@@ -287,9 +290,8 @@ def groups(system: Any) -> list[Int[np.ndarray, " c"]]:
     return out
 
 
-def as_arrays(system: Any, parts: Sequence[Part]) -> tuple[Bodies, Ends, Constraints]:
+def as_arrays(system: System, parts: Sequence[Part]) -> tuple[Bodies, Ends, Constraints]:
     """A system's flat arrays, its bodies factored."""
-    model = system.model
-    number, first = near_diagonal(groups(system), system.unknowns)
-    bodies = body_arrays(model.links, model.joints, model.bodies, parts, (number, first), model.loads)
-    return bodies, end_arrays(system.ends, number), constraint_arrays(system.constraints)
+    numbering = near_diagonal(groups(system), system.unknowns)
+    bodies = body_arrays(system, parts, numbering)
+    return bodies, end_arrays(system.ends, numbering[0]), constraint_arrays(system.constraints)

@@ -25,6 +25,7 @@ from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
+from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, forcing_of, stressed
 from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
@@ -38,6 +39,7 @@ Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
 class Ready:
     """A system made ready for steps of one length: all bodies factored once, everything as flat arrays.
 
+    stressed : stress stiffness on the coordinates, if geometric stiffening counts
     halves : the same for steps half as long, once these have been needed
     """
 
@@ -48,6 +50,7 @@ class Ready:
     bodies: Bodies
     ends: Ends
     constraints: Constraints
+    stressed: Stressed | None = None
     halves: list["Ready"] = field(default_factory=list)
 
 
@@ -75,10 +78,11 @@ def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready
         without_unknowns(system, each) or (each.linear and isinstance(each.law, Held | Driven | Spring))
         for each in system.constraints
     )
-    single = linear and all(link.fit is None for link in model.links)
+    single = linear and all(link.fit is None for link in model.links) and system.stiffening is None
     c = coefficients(scheme, model.damping, model.links, single, tolerance)
     parts = factored(model.links, model.joints, c)
-    return Ready(system, scheme, c, parts, *as_arrays(system, parts))
+    modes = None if system.stiffening is None else stressed(system.stiffening, parts)
+    return Ready(system, scheme, c, parts, *as_arrays(system, parts), modes)
 
 
 Loads = Sequence[Float[np.ndarray, "T _ _"]]
@@ -111,7 +115,10 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         amounts(of, motion),
         weights,
     )
-    return Driving(*(np.ascontiguousarray(x) for x in rows))  # other strides would be compiled for anew
+    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing_of(motion, loads, model.bodies))
+    return Driving(
+        *(np.ascontiguousarray(x) for x in (*rows, *terms))
+    )  # other strides would be compiled for anew
 
 
 def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:
@@ -143,7 +150,7 @@ def march(
     trial, work = empty_trial(*arrays, state), room(of.bodies)
     solved, marched = solver(of.parts, of.bodies.at, of.bodies.port_at, trial), compiled_steps(of)
     while done < T:
-        left = Driving(*(x[done:] for x in along)), History(*(x[done:] for x in history))
+        left = _since(along, done), History(*(x[done:] for x in history))
         taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
         solved.check()
         done += int(taken)
@@ -160,6 +167,12 @@ def march(
                 row[done : done + 1] = found[-1:]  # none of what only sparse bodies have
             done += 1
     return state, history
+
+
+def _since(along: Driving, done: int) -> Driving:
+    """What is left of a motion after some of its times."""
+    tables = {name: getattr(along, name) for name in ("terms_at", "entries_at", "entries")}
+    return Driving(*(x[done:] for x in along))._replace(**tables)
 
 
 def compiled_steps(of: Ready) -> Callable[..., tuple[int, int]]:

@@ -30,7 +30,7 @@ def nominal_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: igno
 
 @inner
 def nominal_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
-    """The displacement of a body, g = G r + Y w, and its end of the step."""
+    """The displacement of a body, g = G r + Y w and δ = T g, [KED, eq. (5)], and its end of the step."""
     first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
     q, N = bodies.port_at[i + 1] - of_ports, last - first
     if bodies.dense[i]:

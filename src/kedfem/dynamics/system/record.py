@@ -12,7 +12,8 @@ HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
 TIME, RATE, COORDINATE = range(3)
 GAP, TURN, ANGLE, DISTANCE = range(4)
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
-NOMINAL, COROTATIONAL, TANGENTIAL = range(3)
+NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
+RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
 
 Vector = Float[np.ndarray, "3"]
 
@@ -142,6 +143,7 @@ class System:
 
     links, joints : of the elastic model, in the order of the bodies
     names : of the bodies, for messages
+    stiffening : stress modes of all links, whose geometric stiffening then counts; None without
     """
 
     names: tuple[str, ...]
@@ -149,6 +151,7 @@ class System:
     constraints: tuple[Constraint, ...]
     unknowns: int
     model: Any
+    stiffening: Any = None
 
 
 def without_unknowns(system: System, each: Constraint) -> bool:

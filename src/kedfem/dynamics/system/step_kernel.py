@@ -42,8 +42,9 @@ from kedfem.dynamics.system.nominal_kernel import (
     ported,
     ports_end,
 )
-from kedfem.dynamics.system.record import NOMINAL
+from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.reference import reference
+from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stressed_end, stressed_side
 
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
@@ -79,6 +80,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
     """The predictor, right-hand sides of bodies with rigid-body frames, the common matrix of z."""
     R, h = driving.R[t], c.h
     copied(state.turned, trial.turned)
+    combined(bodies.stresses, driving, t, trial.stress)
     for m in range(len(trial.z)):
         trial.z[m] = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
     for i in range(len(bodies.motion)):
@@ -87,12 +89,15 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
             continue
         for x in range(bodies.at[i], bodies.at[i + 1]):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
+        if bodies.frame[i] == STRESSED:
+            stressed_begin(c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work.room)
+            continue
         frame_copied(state.Q[i], trial.Q[i])
         trial.angle[i] = state.angle[i]
     begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
     internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
     for i in range(len(bodies.motion)):
-        if bodies.frame[i] != NOMINAL:
+        if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
     gathered(bodies, trial)
     if of.linear.any():
@@ -136,14 +141,18 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  
         trial.right[m] = c.alpha_f * state.bearing[m]
     for i in range(len(bodies.motion)):
         first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
-        q, N, own = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.frame[i] != NOMINAL
+        q, N, own = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.frame[i] > RIGID_BODY
         if own:
             residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work.room)
+        elif bodies.frame[i] == STRESSED:
+            stressed_side(c, bodies, i, trial, work)
+        if bodies.frame[i] != NOMINAL:
             if bodies.dense[i]:
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
                 product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             else:
                 solved(i)
+        if own:
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
@@ -162,8 +171,9 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  
                 bodies.Y, bodies.Y_at[i], q, N, trial.w[bodies.port_at[i] : bodies.port_at[i + 1]], work.y
             )
             turned(trial.Rp[i], d, work.y[:N], trial.change[to : to + N])
-            for x in range(to, to + N):
-                trial.change[x] *= bodies.size[i]
+            for x in range(N):
+                before = trial.u[first + x] if bodies.frame[i] == STRESSED else 0.0
+                trial.change[to + x] = bodies.size[i] * (trial.change[to + x] - before)
     k = len(trial.z)
     for m in range(k):
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]
@@ -209,10 +219,12 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
     """What the passes found becomes the state, and row t of the history."""
     R, F = driving.R[t], driving.F[t]
     for i in range(len(bodies.motion)):
-        if bodies.frame[i] != NOMINAL:
+        if bodies.frame[i] > RIGID_BODY:
             own_end(c, bodies, i, R, F, trial.u, state, trial, history, t, work)
         else:
             nominal_finish(c, bodies, i, F, trial, state, history, t, work)
+        if bodies.frame[i] == STRESSED:
+            stressed_end(bodies, i, trial, state, history.g[t], work)
         ports_end(c, bodies, i, trial, state, history, t, work.room)
     ended(t, newmark(c), bodies.beams, R, trial.strained, state.strain, state.direction, state.turn, history.strain,
           history.energy)  # fmt: skip

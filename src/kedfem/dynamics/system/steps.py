@@ -17,6 +17,7 @@ from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import port_columns, turned_ports
 from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.deflected import plucked, quasi_static
@@ -37,8 +38,12 @@ from kedfem.scene import Scene
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def nominal_system(scene: Scene, model: Model) -> System:
+def nominal_system(scene: Scene, model: Model, stresses: Stiffening | None = None) -> System:
     """The system of a scene whose links have rigid-body frames.
+
+    Parameters
+    ----------
+    stresses : stress modes of the links, if geometric stiffening counts
 
     Raises
     ------
@@ -49,7 +54,7 @@ def nominal_system(scene: Scene, model: Model) -> System:
     ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
     held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
     here = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
-    return system_of(scene, rigid, model=here)
+    return replace(system_of(scene, rigid, model=here), stiffening=stresses)
 
 
 def _lines(model: Model) -> dict[str, Stations]:
@@ -97,14 +102,13 @@ class SystemSteps:
         If links are too large for the oracle.
     """
 
-    stiffening = None
-
     def __init__(
         self, scene: Scene, system: System, model: Model, scheme: Scheme, literal: bool = False
     ) -> None:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme)
         self.oracle = oracle(self.ready) if literal else None
+        self.stiffening = system.stiffening
         self.factorisations = len(self.ready.parts)
         self._bearings, self._to_ports = _bearings(model, system.model, linkage(scene).bodies)
 
@@ -136,7 +140,7 @@ class SystemSteps:
             z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None], rate=state.e[1:2],
             Kg=g[None, :0], Mv=g[None, :0], Cg=g[None, :0],
         )  # fmt: skip
-        out = self._histories(found, forcing, motion)
+        out = self.handed_on(found, forcing, motion)
         for k, (x, link) in enumerate(zip(out, self.links, strict=True)):
             flat = x.g.ravel()
             out[k] = replace(x, strain=np.array([0.5 * float(flat @ (link.K0 @ flat))]))
@@ -145,7 +149,7 @@ class SystemSteps:
     def advance(
         self, state: State | Now, forcing: Sequence[Forcing], motion: RigidMotion
     ) -> tuple[list[LinkHistory], State | Now]:
-        """All time points of a block; see `DenseSteps.advance`.
+        """All time points of a block, one step after the other, [KED, eq. (20)].
 
         Raises
         ------
@@ -154,15 +158,13 @@ class SystemSteps:
         """
         if self.oracle is not None:
             later, found = literal_march(self.ready, self.oracle, state, motion)
-            return self._histories(found, forcing, motion), later
+            return self.handed_on(found, forcing, motion), later
         if not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
         state, found = march(self.ready, state, motion, loads=[each.F for each in forcing])
-        return self._histories(found, forcing, motion), state
+        return self.handed_on(found, forcing, motion), state
 
-    def _histories(
-        self, found: History, forcing: Sequence[Forcing], motion: RigidMotion
-    ) -> list[LinkHistory]:
+    def handed_on(self, found: History, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
         """All links, with what force elements exert on them."""
         acting = [np.zeros_like(each.F) for each in forcing]
         bodies, out = self.ready.bodies, []

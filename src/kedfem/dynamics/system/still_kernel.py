@@ -3,7 +3,7 @@
 from kedfem.compiled import compiled
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
-from kedfem.dynamics.system.record import NOMINAL
+from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.reference import reference
 
 
@@ -28,5 +28,5 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
     internal_forces(c, bodies, R, amounts, state, trial, work)
     for i in range(len(bodies.motion)):
-        if bodies.frame[i] != NOMINAL:
+        if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
