@@ -96,6 +96,10 @@ def transient(
         yield Block(0, drawn, _first(model, solver, states, drawn))
         state = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
+
+    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
+        return rigid_motion(linkage, along, t, path_parameter(scene, t))
+
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
@@ -108,7 +112,7 @@ def transient(
                 yield from _finite(Block(first + k, part, links))
                 continue
             try:
-                links, state = solver.advance(state, forcing, part)
+                links, state = solver.advance(state, forcing, part, motion_at)
             except ConvergenceError as failed:
                 if failed.taken:
                     done = part.part(0, failed.taken)

@@ -61,21 +61,28 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
     see its rates. What stands against it in that matrix, c_K/c_M K x, is internal force at the start, so that all
     forces balance there.
     """
-    of, K, pushed = now.of, now.always.still.K, now.pushed(u)
-    share = of.c.c_K / of.c.c_M
+    pushed = now.pushed(u)
     alone = accelerations(now, r - pushed, u, v, replace(asked, known=0 * asked.known))
     if not (asked.known.any() or pushed.any()):
         return alone
+    more = in_a_step(now, pushed, replace(asked, target=0 * asked.target))
+    return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, more.f)
+
+
+def in_a_step(now: Instant, pushed: Flat, asked: Asked) -> Solved:
+    """Accelerations under forces on bodies, and those that constraints know, with a step's matrix; see above."""
+    of, K = now.of, now.always.still.K
+    share = of.c.c_K / of.c.c_M
     held = [
         stepped_body(part, of.c.c_M) if isinstance(part, SparsePart)
         else held_body(np.eye(K[k].shape[0]) + share * K[k], part.W)
         for k, part in enumerate(of.parts)
     ]  # fmt: skip
-    balance = Balance(of, held, now.R, replace(asked, target=0 * asked.target))
+    balance = Balance(of, held, now.R, asked)
     more = balance.solved(pushed)
     x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
     f = np.concatenate([balance.turned(k, share * (K[k] @ x[k])) for k in range(len(K))])
-    return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, f)
+    return replace(more, f=f)
 
 
 def rigid_motions(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "N m"]:

@@ -182,6 +182,7 @@ class Constraints(NamedTuple):
     term_at : (r + 1,); kind, i, j, a, a_j, b, factor : of each term
     linear, law : (r,); numbers : (r, 4) of a law; drive : (r,) whose travel is taken from the coordinate, −1: none
     over, curve_at, abscissa, ordinate : of curves
+    jumps : (r,) stops with damping, whose push begins at once: a step in which it does is divided
     """
 
     term_at: Any
@@ -200,6 +201,7 @@ class Constraints(NamedTuple):
     curve_at: Any
     abscissa: Any
     ordinate: Any
+    jumps: Any
 
 
 class State(NamedTuple):

@@ -89,10 +89,14 @@ def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def law(of, r, t, e, rate, out):  # type: ignore[no-untyped-def]
+def law(of, r, t, e, rate, before, force, out):  # type: ignore[no-untyped-def]
     """Force against the coordinate e with its rate, and how it grows with both: out (3,); a constraint has its misfit.
 
     Returns whether it is a constraint.
+
+    Parameters
+    ----------
+    before, force : coordinate and force along it at the beginning of the step
     """
     kind, numbers = of.law[r], of.numbers[r]
     out[1], out[2] = 0.0, 0.0
@@ -109,14 +113,30 @@ def law(of, r, t, e, rate, out):  # type: ignore[no-untyped-def]
         if over != TIME:
             out[2 if over == RATE else 1] = -slope
     else:
-        lower, upper, k, c = numbers
-        beyond = e - upper if e > upper else (e - lower if e < lower else 0.0)
-        out[0] = k * beyond + c * rate
-        if beyond == 0.0 or out[0] * beyond <= 0.0:
-            out[0] = 0.0
-        else:
-            out[1], out[2] = k, c
+        stop(numbers, e, rate, of.jumps[r] and numbers[0] <= before <= numbers[1], force, out)
     return False
+
+
+@inner
+def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
+    """The law of a stop within a step: one that pushed goes on as long as it does not pull, wherever e is; see `law`.
+
+    So the push is continuous in e and its rate, and a step has a solution: else it would jump by c e' at the limit.
+
+    Parameters
+    ----------
+    apart : whether a step begins within the limits, and is divided where it passes one: if none pushed none does
+    """
+    lower, upper, k, c = numbers
+    side = 0.0
+    if force != 0.0:
+        side = 1.0 if force < 0.0 else -1.0
+    elif not apart:
+        side = 1.0 if e > upper else (-1.0 if e < lower else 0.0)
+    limit = upper if side > 0.0 else lower
+    out[0] = 0.0
+    if side != 0.0 and side * (k * (e - limit) + c * rate) > 0.0:
+        out[0], out[1], out[2] = k * (e - limit) + c * rate, k, c
 
 
 @inner

@@ -234,6 +234,7 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
         drive=np.array([x for _, _, x in laws], int), over=np.array([x.over for x in curves], int),
         curve_at=_ends([len(x.at) for x in curves]), abscissa=_flat([np.array(x.at) for x in curves]),
         ordinate=_flat([np.array(x.value) for x in curves]),
+        jumps=np.array([isinstance(x.law, Stop) and x.law.damping > 0 for x in constraints], bool),
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
+MET = -2  # of `step_kernel`
 HALVINGS = 6  # a step is taken in up to 2⁶ parts
 Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
 """Rigid-body motion at given times."""
@@ -136,7 +137,8 @@ def march(
     Parameters
     ----------
     motion : at the ends of the steps
-    between : rigid-body motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts
+    between : rigid-body motion at any times: a step whose iterations do not converge is then taken in 2, 4, 8, … parts,
+        one in which a stop with damping is met in two
     loads : see `driving`
 
     Raises
@@ -144,7 +146,10 @@ def march(
     ConvergenceError
         If the iterations of a step do not: with its time, the body that moves most, and all that came before.
     """
-    arrays = of.bodies, of.ends, of.constraints
+    constraints = of.constraints
+    if between is None or not halvings:
+        constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
+    arrays = of.bodies, of.ends, constraints
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
@@ -160,7 +165,7 @@ def march(
                 moves = of.system.names[worst] if worst >= 0 else ""
                 raise ConvergenceError(last, state, before, done, moves)
             try:
-                state, parts = _in_parts(of, state, last, between, halvings)
+                state, parts = _in_parts(of, state, last, between, halvings, worst == MET)
             except ConvergenceError as failed:
                 raise ConvergenceError(last, state, before, done, failed.moves) from None
             for row, found in zip(history, parts, strict=True):
@@ -186,12 +191,24 @@ def compiled_steps(of: Ready) -> Callable[..., tuple[int, int]]:
     return cast("Callable[..., tuple[int, int]]", marched)
 
 
-def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
-    """One step in two, each of these in two again where it must be."""
+def _in_parts(
+    of: Ready, state: State, last: float, between: Motion, halvings: int, met: bool
+) -> tuple[State, History]:
+    """One step in two, each of these in two again where it must be; where a stop is met if that is why."""
+    if met:
+        from kedfem.dynamics.system.impacts import divided  # which marches
+
+        return divided(of, state, last, between, halvings)
     if not of.halves:
-        of.halves.append(ready(of.system, replace(of.scheme, h=of.scheme.h / 2), of.c.tolerance))
+        of.halves.append(shortened(of, of.scheme.h / 2))
     finer = of.halves[0]
     return march(finer, state, between(last - finer.c.h * np.array([1.0, 0.0])), between, halvings - 1)
+
+
+def shortened(of: Ready, h: float) -> Ready:
+    """The same for steps of another length."""
+    made = ready(of.system, replace(of.scheme, h=h), of.c.tolerance)
+    return replace(made, constraints=of.constraints)
 
 
 def displacements(of: Ready, k: int, x: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T n d"]:

@@ -46,13 +46,14 @@ from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stressed_end, stressed_side
 
+MET = -2  # instead of a body: a stop was met, and the step is to be divided
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
 
 
 @compiled
 def marched(c, bodies, ends, of, driving, state, trial, work, history, solved):  # type: ignore[no-untyped-def]
-    """Take T steps in place; how many converged, and the body that moved most in the one that did not.
+    """Take T steps in place; how many were taken, and the body that moved most in one that did not converge, or MET.
 
     Parameters
     ----------
@@ -71,8 +72,21 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
         converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work, solved)
         if not converged:
             return t, worst
+        if meets(of, state, trial):
+            return t, MET
         finish(c, bodies, ends, of, driving, t, state, trial, work, history)
     return len(driving.t), -1
+
+
+@inner
+def meets(of, state, trial):  # type: ignore[no-untyped-def]
+    """Whether a stop's push begins at once in a step."""
+    for a in range(len(of.jumps)):
+        if of.jumps[a] and state.multiplier[a] == 0.0:
+            lower, upper, e0, e1 = of.numbers[a, 0], of.numbers[a, 1], state.e[0, a], trial.e[a]
+            if lower <= e0 <= upper and not lower <= e1 <= upper:
+                return True
+    return False
 
 
 @inner

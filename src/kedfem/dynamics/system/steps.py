@@ -147,9 +147,17 @@ class SystemSteps:
         return out
 
     def advance(
-        self, state: State | Now, forcing: Sequence[Forcing], motion: RigidMotion
+        self,
+        state: State | Now,
+        forcing: Sequence[Forcing],
+        motion: RigidMotion,
+        motion_at: Motion | None = None,
     ) -> tuple[list[LinkHistory], State | Now]:
         """All time points of a block, one step after the other, [KED, eq. (20)].
+
+        Parameters
+        ----------
+        motion_at : rigid-body motion at any times; without it steps in which stops are met stay undivided
 
         Raises
         ------
@@ -161,7 +169,8 @@ class SystemSteps:
             return self.handed_on(found, forcing, motion), later
         if not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
-        state, found = march(self.ready, state, motion, loads=[each.F for each in forcing])
+        between = motion_at if self.ready.constraints.jumps.any() else None
+        state, found = march(self.ready, state, motion, between, loads=[each.F for each in forcing])
         return self.handed_on(found, forcing, motion), state
 
     def handed_on(self, found: History, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
