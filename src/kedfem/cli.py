@@ -362,7 +362,7 @@ def bench(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="One of: accuracy, beams, elements, following, growth, kinematics, levels, plane, ports, reduction, "
+            help="One of: accuracy, beams, corotational, elements, growth, kinematics, levels, plane, ports, reduction, "
             "solvers, start, steps, suite.",
         ),
     ],

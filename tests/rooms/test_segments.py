@@ -170,7 +170,7 @@ def test_a_link_is_one_row_with_its_number_of_segments(capsys: pytest.CaptureFix
     assert table.row_count == 3
     Console(width=200).print(table)
     shown = capsys.readouterr().out
-    assert shown.count("quad9, 3 segments that follow, 9 modes each") == 3
+    assert shown.count("quad9, 3 co-rotational segments, 9 modes each") == 3
     mass = 2796 * 0.0254**2 * 0.9144
     assert f"{mass:.4g} kg" in shown  # of the coupler as a whole
 

@@ -1,8 +1,8 @@
 """How far the linear equation is off because links bend: its geometric error, estimated from a run's own deflections.
 
-Equation (20) turns K with the nominal rigid motion, which leaves two things out:
+Equation (20) turns K with the rigid-body motion, which leaves two things out:
 
-* **Axial forces.** On a link that has turned by ψ against its nominal direction an axial force N acts across it. This
+* **Axial forces.** On a link that has turned by ψ against its direction there an axial force N acts across it. This
   changes the stiffness that the deflection meets by the share
 
       e = ∫ N ψ² ds / 2V,     V = ½ gᵀ K0 g the strain energy,
@@ -161,7 +161,7 @@ class GeometricError:
 def slopes(
     link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]
 ) -> Float[np.ndarray, "T c 3"]:
-    """ψ between slices: how far the link's line has turned off its nominal axis [rad]."""
+    """ψ between slices: how far the link's line has turned off its axis in the rigid-body motion [rad]."""
     along = (R @ of.axis)[:, None]
     change = np.diff(in_space(link, of.means @ history.u), axis=1)
     across = change - (change * along).sum(axis=2, keepdims=True) * along

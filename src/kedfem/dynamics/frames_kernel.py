@@ -16,7 +16,7 @@ def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work
     ----------
     rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
     before, now : g (3, L, N) seen from the frame, and its rates, at the beginning and at the end of the step
-    Q, angle : (L, 3, 3) and (L,) of the frame in the nominal one; at the beginning an earlier one
+    Q, angle : (L, 3, 3) and (L,) of the frame in the rigid-body one; at the beginning an earlier one
     work : y (D, n) becomes its shape in the rigid-body frame
     """
     n0, n1, n2, h1, h0, beta = rates

@@ -55,7 +55,7 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
-    own : turns as the link itself does, which no nominal orientation tells: `system.turning_loads`
+    own : turns as the link itself does, which no rigid-body orientation tells: `system.turning_loads`
     """
 
     forces: Float[np.ndarray, "n d"]

@@ -78,7 +78,7 @@ class Slider:
 
 @dataclass(frozen=True, slots=True)
 class PrescribedBody:
-    """A rigid link that the drive turns on the ground: its motion is the nominal one, it has no unknowns.
+    """A rigid link that the drive turns on the ground: its motion is the rigid-body one, it has no unknowns.
 
     link : its record, with attached bodies
     body : its number in the linkage

@@ -60,9 +60,9 @@ def _kind(parts: Sequence[Link]) -> str:
     first, functions = parts[0], [link.n for link in parts]
     kind = "rigid" if first.rigid else ELEMENTS[first.cell_type]
     if first.fit is not None and not first.rigid:
-        kind += f", {len(parts)} segments that follow" if len(parts) > 1 else ", 1 segment that follows"
+        kind += f", {len(parts)} co-rotational segments" if len(parts) > 1 else ", 1 co-rotational segment"
     elif first.fit is not None:
-        kind += ", following"
+        kind += ", co-rotational"
     if first.full and not first.rigid:
         low, high = min(functions), max(functions)
         kind += f", {low} modes" if low == high else f", {low} to {high} modes"

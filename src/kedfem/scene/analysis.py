@@ -54,10 +54,11 @@ class Analysis(Record):
     """ρ∞ of the generalised-α method: what a step leaves of vibration that it cannot resolve; 1 is Newmark's average
     acceleration, which leaves it all"""
     initial: Literal["rest", "quasi-static"] = "rest"
-    """elastic state at the start: none, or that of the slowly turning mechanism"""
+    """elastic state at the start: none, or the deflection with which the mechanism moves on without vibrating"""
     frames: Frames | None = None
-    """nominal: the stiffness of links turns with the rigid motion, deflections are small; following: with the links
-    themselves, which may bend as far as they like, or move freely. Nominal if not given, following without a drive"""
+    """rigid-body: the stiffness of links turns with the rigid-body motion, deflections are small; co-rotational: with the
+    links themselves, which may bend as far as they like, or move freely. Rigid-body if not given, but without a drive
+    co-rotational"""
     initial_speeds: dict[str, JointSpeed] = Field(default_factory=dict)
     """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
     the ground against the other, about or along its axis; other joints then move as little as they can"""

@@ -161,9 +161,6 @@ REFUSALS = (
     Refusal("analysis", {"start": ("initial_deflection",), "beside": ("speeds",)}, "{where}.initial_deflection",
         "not be combined with initial speeds and motions", "what is let go has been at rest", "{given}",
         "take one of them, or loads that end soon"),
-    Refusal("analysis", {"drive": ("none",), "start": ("quasi-static",)}, "{where}.initial",
-        "be 'rest' in a scene without a drive", "no motion is known that the deflection could go with", "'quasi-static'",
-        "leave it out"),
     *(Refusal("analysis", {"drive": ("none",), "time": (key,)}, f"{{where}}.{key}", "be combined with a drive",
         "it counts the drive's revolutions", "a scene without one", f"take {instead} [s]")
         for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step"))),

@@ -1,4 +1,4 @@
-"""Which links have co-rotational frames, and which the nominal one."""
+"""Which links have co-rotational frames, and which rigid-body ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def link_frames(scene: Scene, name: str) -> Frames:
 
 
 def default_frames(driven: bool) -> Frames:
-    """Frames where none are asked for: nominal with a drive; without one nothing prescribes them."""
+    """Frames where none are asked for: rigid-body ones with a drive; without one nothing prescribes them."""
     return "rigid-body" if driven else "co-rotational"
 
 

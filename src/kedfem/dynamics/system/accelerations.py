@@ -110,7 +110,7 @@ def _position(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "n d"]:
 
 
 def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
-    """([ω]² − [ω₀]²) X of some bodies, that turn at ω in all, ω₀ of it nominal; world components."""
+    """([ω]² − [ω₀]²) X of some bodies, that turn at ω in all, ω₀ of it rigid-body; world components."""
     out = np.zeros_like(v)
     for k, link in enumerate(now.of.system.model.links):
         if not which[k]:

@@ -213,7 +213,7 @@ class State(NamedTuple):
     damped : (3N,) per body (3, N): damping force without its rate, and its rates, in the rigid-body frame
     momentum : (3N,) per sparse body (3, N): M δ, M δ', M δ'' in world components
     seen : (3N,) per co-rotational body (3, N): deformation g and its rates
-    Q, angle : (bodies, 3, 3), (bodies,) the frames' rotation in the nominal one; of planar bodies its angle, with turns
+    Q, angle : (bodies, 3, 3), (bodies,) frames' rotation in the rigid-body one; of planar bodies its angle, with turns
     strain, direction, turn : of planar beams at their points, see `beams_kernel`
     port_force : (q,) force on each body at its interface points, world components
     z : (3, k) interface unknowns and their rates

@@ -168,7 +168,7 @@ class _Builder:
         self.constraints.append(Constraint(joint.name, terms, law, linear=False))
 
     def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: ConstraintJoint) -> None:
-        """A constraint, linear where the frames of all its links are nominal."""
+        """A constraint, linear where the frames of all its links are rigid-body ones."""
         numbers = {n for joint in joints for n in joint.bodies}
         self.constraints.append(Constraint(name, terms, law, linear=not numbers & self.own))
 
@@ -256,7 +256,7 @@ class _Builder:
 
     @property
     def own(self) -> set[int]:
-        """Numbers of the bodies whose frames are not nominal."""
+        """Numbers of the bodies whose frames are co-rotational."""
         every = zip(self.model.links, self.model.bodies, strict=True)
         return {n for link, n in every if link.fit is not None}
 

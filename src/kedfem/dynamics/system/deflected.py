@@ -30,6 +30,7 @@ DAMPED = 8  # times that rates of a deflection are found anew where dampers feel
 KRYLOV = 60
 CONVERGED = 1e-10  # change of a iteration, of the deflection
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
+FREE = 1e-3  # the same where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
@@ -147,13 +148,13 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
         asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
         return -accelerations(now, now.F - f, u, moving, asked, rigid=True).x
 
-    u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v))
+    u = _balanced(now, np.zeros_like(v), inertia, None, now.interface(v), FREE)
     return u, rate(u)
 
 
 def _balanced(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
-    z1: Flat | None,
+    z1: Flat | None, rounding: float = ROUNDING,
 ) -> Flat:  # fmt: skip
     """The deflection at which all forces balance, by Newton's method with the stiffness of the mean frames.
 
@@ -162,6 +163,7 @@ def _balanced(
     more : forces beside applied and internal ones, at a deflection u with the internal force f
     spins : of the inertia that it has as it turns, if any
     z1 : rates of the interface unknowns
+    rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
     for _ in range(SWEEPS):
@@ -177,7 +179,7 @@ def _balanced(
             return np.asarray(u + change)
         u = u + (change if of.c.single else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        stalls = size > last / 2 and size <= (LINEAR if of.c.single else ROUNDING) * reached
+        stalls = size > last / 2 and size <= (LINEAR if of.c.single else rounding) * reached
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise SolveError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "

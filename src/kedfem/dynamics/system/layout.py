@@ -52,7 +52,7 @@ from kedfem.links.record import BeamPoint, Link
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
 TOLERANCE = (
-    1e-9  # change of a pass, of what a step moves: far below what following frames are compared to, 1e-7
+    1e-9  # change of a pass, of what a step moves: far below what co-rotational frames are compared to, 1e-7
 )
 SMALLEST = 1e-13  # of a system's size: what a step of one that is at rest may be out by
 

@@ -61,7 +61,7 @@ def literal_march(of: Ready, solver: Literal, state: State | Now, motion: RigidM
 
 
 def begun(of: Ready, solver: Literal, state: State, motion: RigidMotion) -> Now:
-    """A state in nodal rows; its frames are nominal.
+    """A state in nodal rows; its frames are rigid-body ones.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def tangent(of: Literal, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Colu
 
 
 def _of_body(of: Literal, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix:
-    """Of the internal force of body n: K + a₁ C where its frame is nominal, else by differences; world components."""
+    """Of the internal force of body n: K + a₁ C with a rigid-body frame, else by differences; world components."""
     model, own, a1 = of.system.model, of.of[n], of.scheme.a1
     link = model.links[n]
     if link.fit is None:

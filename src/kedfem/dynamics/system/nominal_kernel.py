@@ -1,4 +1,4 @@
-"""What a step does with a body whose frame is the nominal one, beginning and end, and the interface's end of a step."""
+"""What a step does with a body that has a rigid-body frame, beginning and end, and the interface's end of a step."""
 
 from kedfem.compiled import inner
 from kedfem.dynamics.system.algebra_kernel import (

@@ -89,7 +89,7 @@ def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float
 
 
 def gradients(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, "r k"]:
-    """How all coordinates change with z, at rest in their nominal places where they are linear in it."""
+    """How all coordinates change with z, at rest in their places of the rigid-body motion where they are linear in it."""
     C = np.zeros((len(system.constraints), system.unknowns))
     still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
     moving: dict[tuple[int, int, bool], tuple[Series, Series]] = {}

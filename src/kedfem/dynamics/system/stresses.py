@@ -86,7 +86,7 @@ def fewer_terms(
 def forcing_of(
     motion: RigidMotion, loads: Sequence[Float[np.ndarray, "T _ _"]], bodies: Sequence[int]
 ) -> list[Forcing]:
-    """What the nominal motion does to all bodies."""
+    """What the rigid-body motion does to all bodies."""
     return [
         Forcing(motion.R[:, k, : F.shape[2], : F.shape[2]], F) for k, F in zip(bodies, loads, strict=True)
     ]
