@@ -184,6 +184,7 @@ def test_a_motor_that_pushes_against_a_stop_is_borne_by_it(side: int) -> None:
     assert_allclose(channel(run, "effort")[-1], -side * 50.0, rtol=1e-3)
 
 
+QUICK = ("beam", "rigid", "large")
 KINDS: dict[str, Raw] = {
     "beam": bar("beam", (0, 0), (0.04, 0), 1), "plane": bar("plane", (0, 0), (0.04, 0), 3),
     "solid": bar("solid", (0, 0), (0.04, 0), 2), "rigid": bar("rigid", (0, 0), (0.04, 0)),
@@ -192,7 +193,9 @@ KINDS: dict[str, Raw] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in KINDS]
+)
 def test_links_of_all_kinds_bounce_as_the_closed_form(kind: str) -> None:
     """On a slide at a side of theirs: they give way a little there."""
     bounce, side = Bounce(STEEL * 6e-4 * 0.04, 1.0, 1e5, 0.2), 0.0 if kind == "beam" else 0.015
