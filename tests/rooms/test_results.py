@@ -29,6 +29,7 @@ from kedfem.results import (
     replacing,
     write_csv,
 )
+from kedfem.results.layout import read_facts
 from kedfem.results.writer import add_peaks, drive_channel
 from kedfem.scene import scene_from
 
@@ -167,10 +168,10 @@ def said(results: Results) -> str:
 def test_units_stand_inside_the_file(tmp_path: Path) -> None:
     write(tmp_path / "results.h5", 2)
     with h5py.File(tmp_path / "results.h5", "r") as file:
-        stress = file[STRESS.name].attrs
+        stress = read_facts(file[STRESS.name])
         assert (stress["unit"], stress["frame"], stress["description"]) == ("Pa", "link", STRESS.description)
         assert tuple(stress["columns"]) == STRESS.columns
-        assert (file["time"].attrs["unit"], file["drive_angle"].attrs["unit"]) == ("s", "rad")
+        assert [read_facts(file[name])["unit"] for name in ("time", "drive_angle")] == ["s", "rad"]
 
 
 def test_notes_can_be_added_at_the_end(tmp_path: Path) -> None:
@@ -524,7 +525,7 @@ def test_a_drive_that_slides_is_told_in_metres(tmp_path: Path) -> None:
     with ResultsWriter(tmp_path / "results.h5", [], "{}", None, {}, drive) as file:
         file.append(np.array([0.0, 0.05]), np.array([0.0, 0.1]), {})
     with h5py.File(tmp_path / "results.h5") as file:
-        assert file["drive_travel"].attrs["unit"] == "m"
+        assert read_facts(file["drive_travel"])["unit"] == "m"
         assert "angle" not in " ".join(file)
     found = read_results(tmp_path / "results.h5")
     assert (found.drive.name, found.drive.unit) == ("drive_travel", "m")

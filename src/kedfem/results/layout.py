@@ -4,7 +4,7 @@ Numbers carry HDF5's own checksum (Fletcher's), its tables those of the layout o
 checks nothing: their digest is stored beside them.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,53 @@ def new_rows(file: Any, name: str, width: tuple[int, ...]) -> Any:
     return file.create_dataset(
         name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width), fletcher32=True
     )
+
+
+def write_facts(item: Any, facts: Mapping[str, Any]) -> None:
+    """Store facts as attributes, texts at fixed length: HDF5 may read damaged ones of variable length for ever."""
+    for key, value in facts.items():
+        if isinstance(value, str):
+            data = _encoded(value)
+            item.attrs.create(key, data, dtype=_text_type(len(data)))
+        elif isinstance(value, list):
+            every = [_encoded(each) for each in value]
+            item.attrs.create(key, every, dtype=_text_type(max(map(len, every))))
+        else:
+            item.attrs[key] = value
+
+
+def write_text(group: Any, key: str, text: str) -> None:
+    """Store a text as a dataset: an attribute holds no more than 64 kB."""
+    data = _encoded(text)
+    group.create_dataset(key, data=data, dtype=_text_type(len(data)))
+
+
+def read_facts(item: Any) -> dict[str, Any]:
+    """The attributes of an item as Python's own texts and numbers, and lists of texts."""
+    return {key: _plain(value) for key, value in item.attrs.items()}
+
+
+def read_text(item: Any) -> str:
+    """The text of a dataset."""
+    return str(_plain(item[()]))
+
+
+def _encoded(value: str) -> bytes:
+    return value.encode("utf-8", "surrogateescape")
+
+
+def _text_type(length: int) -> Any:
+    import h5py
+
+    return h5py.string_dtype("utf-8", max(length, 1))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "surrogateescape")
+    if isinstance(value, np.ndarray) and value.dtype.kind in "SO":
+        return [_plain(each) for each in value]
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def series(file: Any) -> list[Any]:
@@ -98,7 +145,7 @@ def _digest(texts: Iterable[str]) -> UInt8[np.ndarray, "32"]:
 def _channel_texts(file: Any) -> Iterator[str]:
     """What is said of the channels, and the scene, in an order of its own."""
     for key in sorted(file["scene"]):
-        yield f"{key} = {file['scene'][key].asstr()[()]}"
+        yield f"{key} = {read_text(file['scene'][key])}"
     for rows in sorted(series(file), key=lambda each: str(each.name)):
         yield from _said(rows.name, rows)
 
@@ -113,7 +160,6 @@ def _note_texts(file: Any) -> Iterator[str]:
 
 
 def _said(where: str, item: Any) -> Iterator[str]:
-    for key in sorted(item.attrs):
-        value = item.attrs[key]
-        if isinstance(value, str) or np.asarray(value).dtype == object:
-            yield f"{where} {key} = {value if isinstance(value, str) else list(value)}"
+    for key, value in sorted(read_facts(item).items()):
+        if isinstance(value, str | list):
+            yield f"{where} {key} = {value}"

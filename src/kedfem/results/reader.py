@@ -4,11 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.layout import FORMAT, PEAKS, all_rows, opened, sealed, series
+from kedfem.results.layout import FORMAT, PEAKS, all_rows, opened, read_facts, read_text, sealed, series
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results
 
 WANTED = "a results file of kedfem"
@@ -53,7 +51,7 @@ def abandoned_rows(path: Path) -> int | None:
     """How many rows a run left whose process was killed; None if there is no such run."""
     try:
         with _opened(path) as file:
-            if file.attrs.get("status") != "running":
+            if read_facts(file).get("status") != "running":
                 return None
             rows = len(file[TIME.name])
         return None if _alive(path) else rows
@@ -65,7 +63,7 @@ def run_status(path: Path) -> str:
     """What a results file says of its run, without its rows; "" of a file that cannot be read."""
     try:
         with _opened(path) as file:
-            return str(file.attrs["status"])
+            return str(read_facts(file)["status"])
     except (OSError, RuntimeError, KeyError):
         return ""
 
@@ -102,7 +100,7 @@ def _refuse_foreign(file: Any, path: Path) -> None:
     if layout is None or "kedfem_version" not in file.attrs:
         raise OutputError(f"{path}: must be {WANTED}, got another HDF5 file")
     if int(layout) != FORMAT:
-        got = f"layout {layout} of kedfem {file.attrs['kedfem_version']}"
+        got = f"layout {layout} of kedfem {read_facts(file)['kedfem_version']}"
         raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT}, got {got}")
 
 
@@ -113,24 +111,24 @@ def _results(file: Any) -> Results:
     named = {rows.name.removeprefix("/"): rows for rows in every}
     toml = file["scene"].get("toml")
     position = TRAVEL if TRAVEL.name in named else ANGLE
-    drive = named.pop(position.name)
+    drive, said = named.pop(position.name), read_facts(file)
     return Results(
         time=all_rows(named.pop(TIME.name), n),
         angle=all_rows(drive, n),
         channels={name: (_channel(name, rows), all_rows(rows, n)) for name, rows in named.items()},
-        status=file.attrs["status"],
-        scene_json=file["scene/json"].asstr()[()],
-        scene_toml=None if toml is None else toml.asstr()[()],
-        notes={key: _plain(value) for key, value in file["notes"].attrs.items()},
-        reason=file.attrs["reason"],
-        version=file.attrs["kedfem_version"],
-        drive=replace(position, description=drive.attrs["description"]),
+        status=said["status"],
+        scene_json=read_text(file["scene/json"]),
+        scene_toml=None if toml is None else read_text(toml),
+        notes=read_facts(file["notes"]),
+        reason=said["reason"],
+        version=said["kedfem_version"],
+        drive=replace(position, description=read_facts(drive)["description"]),
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
     )
 
 
 def _peak(group: Any) -> Peak:
-    said = group.attrs
+    said = read_facts(group)
     x, y, z = map(float, said["place [m]"])
     return Peak(
         float(said["von_mises [Pa]"]), said["link"], (x, y, z), int(said["node"]), int(said["step"]),
@@ -140,11 +138,5 @@ def _peak(group: Any) -> Peak:
 
 
 def _channel(name: str, rows: Any) -> Channel:
-    said = rows.attrs
-    return Channel(name, tuple(map(str, said["columns"])), said["unit"], said["frame"], said["description"])
-
-
-def _plain(value: Any) -> str | float:
-    """A note as Python's own text or number."""
-    plain: str | float = value.item() if isinstance(value, np.generic) else value
-    return plain
+    said = read_facts(rows)
+    return Channel(name, tuple(said["columns"]), said["unit"], said["frame"], said["description"])

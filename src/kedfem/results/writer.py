@@ -14,7 +14,18 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError, SolveError
 from kedfem.results.files import own_part, ready_folder, reason, require_space
-from kedfem.results.layout import CHUNK_ROWS, FORMAT, PEAKS, new_rows, opened, seal, series
+from kedfem.results.layout import (
+    CHUNK_ROWS,
+    FORMAT,
+    PEAKS,
+    new_rows,
+    opened,
+    read_facts,
+    seal,
+    series,
+    write_facts,
+    write_text,
+)
 from kedfem.results.reader import read_results
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
 from kedfem.scene import Scene
@@ -177,7 +188,7 @@ class ResultsWriter:
     def note(self, notes: Mapping[str, str | float]) -> None:
         """Store more facts about the run, e.g. what is known only at its end."""
         try:
-            self._file["notes"].attrs.update(notes)
+            write_facts(self._file["notes"], notes)
             seal(self._file)
         except OSError as error:
             raise self._fault(error) from error
@@ -210,19 +221,24 @@ class ResultsWriter:
 
     def _lay_out(self) -> None:
         """The empty file: scene, notes, one extendable dataset per channel with its units."""
-        self._file.attrs.update(
-            {"format": FORMAT, "kedfem_version": installed_version(), "status": "running", "reason": ""}
-        )
-        self._file.attrs["run"] = self.run
-        scene = self._file.create_group("scene")  # datasets: an attribute holds no more than 64 kB
+        version = installed_version()
+        began = {
+            "format": FORMAT,
+            "kedfem_version": version,
+            "status": "running",
+            "reason": "",
+            "run": self.run,
+        }
+        write_facts(self._file, began)
+        scene = self._file.create_group("scene")
         for key, text in self._scene.items():
-            scene[key] = text
-        self._file.create_group("notes").attrs.update(self._notes)
+            write_text(scene, key, text)
+        write_facts(self._file.create_group("notes"), self._notes)
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if channel.columns else ()
             rows = new_rows(self._file, channel.name, width)
-            rows.attrs.update(unit=channel.unit, frame=channel.frame, description=channel.description)
-            rows.attrs.update(columns=list(channel.columns) or [channel.name], index=index)
+            said = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
+            write_facts(rows, {**said, "columns": list(channel.columns) or [channel.name], "index": index})
         seal(self._file)
 
     def _go_on(self) -> None:
@@ -233,14 +249,18 @@ class ResultsWriter:
         self._file = opened(self._part, "r+")
         found = {each.name: each for each in series(self._file)}
         names = {f"/{each.name}" for each in (TIME, self.drive, *self.channels)}
-        if self._file.attrs.get("run") != self.run or set(found) != names or len(before.time) < self._before:
+        if (
+            read_facts(self._file).get("run") != self.run
+            or set(found) != names
+            or len(before.time) < self._before
+        ):
             wanted = f"{self.path}: must hold the {self._before} rows of the run to be resumed"
             raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
         self._file.pop(PEAKS, None)
         for rows in found.values():
             rows.resize(self._before, axis=0)
-        self._file["notes"].attrs.update(self._notes)
-        self._file.attrs.update(status="running", reason="")
+        write_facts(self._file["notes"], self._notes)
+        write_facts(self._file, {"status": "running", "reason": ""})
         seal(self._file)
         self.rows = self._before
         self._publish()
@@ -272,7 +292,7 @@ class ResultsWriter:
             self._file = opened(self.path, "r+")
         for channel in (TIME, self.drive, *self.channels):
             self._file[channel.name].resize(self.rows, axis=0)
-        self._file.attrs.update(reason=why, status=status)
+        write_facts(self._file, {"reason": why, "status": status})
         seal(self._file)
         if self._published:
             self._file.close()
@@ -319,7 +339,7 @@ def mark_doubtful(path: Path, why: str) -> None:
         The file cannot be written.
     """
     with _changed(path) as file:
-        file.attrs.update(status="doubtful", reason=why)
+        write_facts(file, {"status": "doubtful", "reason": why})
 
 
 def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
@@ -336,7 +356,8 @@ def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
 
 
 def _lay_peak(group: Any, peak: Peak) -> None:
-    group.attrs.update(
+    write_facts(
+        group,
         {
             "von_mises [Pa]": peak.stress, "place [m]": peak.place, "node": peak.node, "step": peak.step,
             "time [s]": peak.time, "drive [rad or m]": peak.angle, "near": peak.near, "link": peak.link,
@@ -355,7 +376,7 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
         The file cannot be written.
     """
     with _changed(path) as file:
-        file["notes"].attrs.update(notes)
+        write_facts(file["notes"], notes)
 
 
 @contextmanager
