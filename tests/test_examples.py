@@ -17,7 +17,7 @@ SOURCE = Path(kedfem.__file__).parents[1]
 EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/run.py"))
 
 
-GENERATED = ("*-results", "*-kinematics", "*-accuracy", "*-mesh")
+GENERATED = ("*-results", "*-kinematics", "*-accuracy", "*-mesh", "*-sweep")
 
 
 def test_nothing_generated_is_committed() -> None:

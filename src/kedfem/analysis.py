@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path as FilePath
 from time import perf_counter
 from typing import TypeVar
@@ -84,6 +85,7 @@ def analyse(
     watch: Watch = lambda stage, done, total: None,
     resumes: bool = False,
     every: float = EVERY,
+    stresses_since: float = -inf,
 ) -> Run:
     """Run a scene and write its results.
 
@@ -93,6 +95,7 @@ def analyse(
     watch : told of progress
     resumes : whether to go on from the last state that an earlier run of the same scene stored
     every : seconds between stored states
+    stresses_since : time [s] before which stresses do not count as highest
 
     Raises
     ------
@@ -102,12 +105,12 @@ def analyse(
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
-        run = _analysed(scene, folder, watch, keeper)
+        run = _analysed(scene, folder, watch, keeper, stresses_since)
         remove_state(folder)
         return run
 
 
-def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper) -> Run:
+def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float) -> Run:
     """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
@@ -128,7 +131,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper) -> R
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready))
+    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready), since)
     envelope, seen, step = clock.timed(
         "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
     )

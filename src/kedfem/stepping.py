@@ -54,13 +54,17 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses."""
+    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses.
+
+    stresses_since : time [s] before which they do not count as highest
+    """
 
     recorded: list[Recorded]
     untold: dict[str, str]
     efforts: CrossChecks
     recoveries: list[StressRecovery]
     passes: SingularPasses
+    stresses_since: float = -np.inf
 
 
 def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
@@ -75,7 +79,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
-    envelope = Envelope(model, watched.recoveries)
+    envelope = Envelope(model, watched.recoveries, watched.stresses_since)
     seen = watcher(ready)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]

@@ -9,6 +9,7 @@ from kedfem.report.mesh import mesh_tables
 from kedfem.report.run import run_tables
 from kedfem.report.sizes import size_line
 from kedfem.report.study import study_tables
+from kedfem.report.sweep import sweep_tables
 
 __all__ = [
     "assembly_tables",
@@ -20,4 +21,5 @@ __all__ = [
     "run_tables",
     "size_line",
     "study_tables",
+    "sweep_tables",
 ]

@@ -113,12 +113,14 @@ class Envelope:
 
     model : whose steps they are
     recoveries : per link, then per prescribed rigid link
+    since : time [s] before which stresses do not count
     worst : the instant of the highest stress so far
     looked, evaluated : stresses at a point and a time that were looked at, and that all modes were summed up for
     """
 
     model: Model
     recoveries: Sequence[StressRecovery]
+    since: float = -np.inf
     worst: Snapshot | None = None
     looked: int = 0
     evaluated: int = 0
@@ -137,8 +139,11 @@ class Envelope:
 
     def add(self, block: Block) -> None:
         """Look at a block, with others that wait or later."""
-        self._waiting.append(block)
         self._when.append(np.stack([block.motion.t, block.motion.phi]))
+        first = int(np.searchsorted(block.motion.t, self.since))
+        if first == len(block):
+            return
+        self._waiting.append(block.part(first, len(block)))
         steps = sum(map(len, self._waiting))
         if steps >= STEPS or 9 * 8 * steps * self.model.unknowns >= WAITING:
             self.flush()

@@ -33,17 +33,32 @@ def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) 
         With all faults: of the file, or of the scene in it.
     """
     path = Path(path)
+    raw, text = read_keys(path, within=within)
+    token = sketched.set(sketch)
+    try:
+        return scene_from(raw, path.parent, source=text, stem=path.stem)
+    finally:
+        sketched.reset(token)
+
+
+def read_keys(path: Path, *, within: bool = False) -> tuple[dict[str, Any], str]:
+    """Keys and values of a scene file as they are written, includes taken over, and their text.
+
+    Parameters
+    ----------
+    path, within : as of `read_scene`
+
+    Raises
+    ------
+    SceneError
+        With all faults of the file.
+    """
     folder = path.parent
     found, text = toml_table(path)
     raw = with_includes(found, folder, path, lambda each: not within or inside(folder, each.absolute()))
     if within and (faults := outside(raw, folder)):
         raise SceneError(faults)
-    text = toml_text(raw) if KEY in found else text
-    token = sketched.set(sketch)
-    try:
-        return scene_from(raw, folder, source=text, stem=path.stem)
-    finally:
-        sketched.reset(token)
+    return raw, toml_text(raw) if KEY in found else text
 
 
 def link_from(raw: Mapping[str, Any]) -> LinkScene:

@@ -2,15 +2,15 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 
+from kedfem.cli.screen import err, out, progress, show
+from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted
-from kedfem.terminal import terminal
 
 USER_ERROR, DEFECT, DOUBTFUL, INTERRUPTED = 2, 3, 4, 130
 KINDS = ("four-bar", "slider-crank", "single-arm")
@@ -23,7 +23,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-out, err = terminal(), terminal(stderr=True)
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
 Quick = Annotated[
     bool,
@@ -75,13 +74,13 @@ def run(
         said += "; --resume would go on with it" * has_state(file.parent)
         err.print(f"warning: {said}", style="yellow", markup=False, soft_wrap=True)
     try:
-        with _progress() as watch:
+        with progress() as watch:
             done = analyse(loaded, watch, resume, states)
     except KeyboardInterrupt:
         _interrupted(file, _version(file) != before)
     if done.sizes:
         out.print(size_line(done.sizes), markup=False, soft_wrap=True)
-    _show(run_tables(loaded, done), done.warnings)
+    show(run_tables(loaded, done), done.warnings)
     _say_where(done.folder)
     if done.results.status == "doubtful":
         said = f"doubtful: {done.results.reason}; these results mean nothing"
@@ -101,7 +100,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
 
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(_quick(read) if quick else read)
-    with _progress() as watch:
+    with progress() as watch:
 
         def stage(name: str) -> None:
             watch(name, 0, 0)
@@ -110,7 +109,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
     found = sizes(loaded, ready.model)
     out.print(size_line(found), markup=False, soft_wrap=True)
-    _show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
+    show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
 
 
 @app.command()
@@ -127,9 +126,9 @@ def kinematics(
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene, sketch=True, within=within)
-    with _progress() as watch:
+    with progress() as watch:
         done = moved_by(loaded, folder, watch)
-    _show(kinematics_tables(loaded, done), done.warnings)
+    show(kinematics_tables(loaded, done), done.warnings)
     _say_where(done.folder)
 
 
@@ -152,9 +151,9 @@ def frequencies(
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene, within=within)
-    with _progress() as watch:
+    with progress() as watch:
         done = found_of(loaded, Wanted(modes, positions, free, harmonics), folder, watch)
-    _show(frequencies_tables(loaded, done), done.warnings)
+    show(frequencies_tables(loaded, done), done.warnings)
     out.print(f"{done.folder}  table and plots", markup=False, soft_wrap=True)
 
 
@@ -193,11 +192,11 @@ def mesh(
     sizes = {"size": size, "elements_across": across, "unknowns": unknowns}
     given = {"shape": _given(shape), "mesh": _given(sizes), "element": element, "min_quality": min_quality}
     link = link_from(_given(given))
-    with _progress() as watch:
+    with progress() as watch:
         watch("mesh", 0, 0)
         made = part_mesh(link, part.parent)
         found = offers(made)
-    _show(mesh_tables(part.name, made, found))
+    show(mesh_tables(part.name, made, found))
     stem = part.stem if solid is None else f"{part.stem}-{solid}"
     target = ready_folder(folder or part.with_name(f"{stem}-mesh"))
     write_mesh(made, target / "mesh.vtu")
@@ -240,12 +239,12 @@ def accuracy(
     loaded = read_scene(scene)
     target = ready_folder(folder or scene.with_name(f"{scene.stem}-accuracy"))
     try:
-        with _progress() as watch:
+        with progress() as watch:
             study = studied(loaded, most, repeats, quick, watch)
     except KeyboardInterrupt:
         err.print("interrupted; nothing was written", style="yellow")
         raise typer.Exit(INTERRUPTED) from None
-    _show(study_tables(study, machine()))
+    show(study_tables(study, machine()))
     for name, write in (("accuracy.csv", write_study), ("accuracy.png", write_study_plot)):
         write(study, target / name, machine())
         out.print(f"{target / name}", markup=False, soft_wrap=True)
@@ -297,7 +296,7 @@ def _new_from(assembly: Path, target: Path, scale: float | None) -> None:
         raise _exists(target)
     if not target.parent.is_dir():
         raise OutputError(f"{target}: must be in a folder that is there, got none at {target.parent}")
-    with _progress() as watch:
+    with progress() as watch:
         watch("assembly", 0, 0)
         text = draft_scene(assembly, target.parent, scale)
     _write_new(target, text)
@@ -351,7 +350,7 @@ def compile_() -> None:
     """Compile what scenes need, once for this version; otherwise the first runs do."""
     from kedfem.precompile import precompile
 
-    with _progress() as watch:
+    with progress() as watch:
         precompile(watch)
     out.print("compiled")
 
@@ -374,63 +373,17 @@ def bench(
 
     if what not in BENCHMARKS:
         raise SceneError(f"WHAT: must be one of {', '.join(BENCHMARKS)}, got '{what}'")
-    with _progress() as watch:
+    with progress() as watch:
         text = BENCHMARKS[what](folder, quick, watch)
     out.print(text, markup=False, soft_wrap=True)
+
+
+app.command()(sweep)
 
 
 def _quick(scene: Any) -> Any:
     """The scene with plain defaults for what it leaves open."""
     return scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"accuracy": "quick"})})
-
-
-class _progress:  # noqa: N801
-    """Progress bars as a context: stages spin, counted work shows a bar."""
-
-    def __enter__(self) -> Callable[[str, int, int], None]:
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            SpinnerColumn,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
-
-        from kedfem.compiled import compiling
-
-        columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
-        self._bars = Progress(
-            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True
-        )
-        self._compiling = compiling(self._compiles)
-        self._compiling.__enter__()
-        self._bars.start()
-        self._stage, self._task = "", None
-        return self._watch
-
-    def __exit__(self, *_: object) -> None:
-        self._bars.stop()
-        self._compiling.__exit__(None, None, None)
-
-    def _compiles(self, begins: bool) -> None:
-        if begins:
-            self._once = self._bars.add_task("compiling, once for this version of kedfem", total=None)
-        else:
-            self._bars.remove_task(self._once)
-
-    def _watch(self, stage: str, done: int, total: int) -> None:
-        if stage != self._stage:
-            if self._task is not None:
-                self._bars.remove_task(self._task)
-            self._stage, self._task = stage, self._bars.add_task(stage, total=total or None)
-        if total and self._task is not None:
-            self._bars.update(self._task, completed=done, total=total)
-
-    _stage: str
-    _task: Any
-    _once: Any
 
 
 def _version(file: Path) -> tuple[int, int] | None:
@@ -450,13 +403,6 @@ def _interrupted(file: Path, begun: bool) -> NoReturn:
     kept += "; kedfem run --resume goes on with it" * has_state(file.parent)
     err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
     raise typer.Exit(INTERRUPTED)
-
-
-def _show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
-    for table in tables:
-        out.print(table)
-    for warning in warnings:
-        err.print(f"warning: {warning}", style="yellow", markup=False)
 
 
 def _say_where(folder: Path) -> None:

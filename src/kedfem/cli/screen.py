@@ -1,0 +1,65 @@
+"""What the commands print on: the two streams, tables, warnings, progress bars."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from kedfem.terminal import terminal
+
+out, err = terminal(), terminal(stderr=True)
+
+
+def show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
+    """Tables, and warnings after them."""
+    for table in tables:
+        out.print(table)
+    for warning in warnings:
+        err.print(f"warning: {warning}", style="yellow", markup=False)
+
+
+class progress:  # noqa: N801
+    """Progress bars as a context: stages spin, counted work shows a bar."""
+
+    def __enter__(self) -> Callable[[str, int, int], None]:
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            SpinnerColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        from kedfem.compiled import compiling
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
+        self._bars = Progress(
+            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True
+        )
+        self._compiling = compiling(self._compiles)
+        self._compiling.__enter__()
+        self._bars.start()
+        self._stage, self._task = "", None
+        return self._watch
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+        self._compiling.__exit__(None, None, None)
+
+    def _compiles(self, begins: bool) -> None:
+        if begins:
+            self._once = self._bars.add_task("compiling, once for this version of kedfem", total=None)
+        else:
+            self._bars.remove_task(self._once)
+
+    def _watch(self, stage: str, done: int, total: int) -> None:
+        if stage != self._stage:
+            if self._task is not None:
+                self._bars.remove_task(self._task)
+            self._stage, self._task = stage, self._bars.add_task(stage, total=total or None)
+        if total and self._task is not None:
+            self._bars.update(self._task, completed=done, total=total)
+
+    _stage: str
+    _task: Any
+    _once: Any

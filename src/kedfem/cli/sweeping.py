@@ -1,0 +1,60 @@
+"""`kedfem sweep`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kedfem.cli.screen import err, out, progress, show
+
+INTERRUPTED = 130
+
+
+def sweep(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")],
+    over: Annotated[
+        list[str],
+        typer.Option(
+            metavar="KEY=VALUES", help="A key or parameter, and a,b,c or from:to:count; several: a grid."
+        ),
+    ],
+    samples: Annotated[
+        int | None, typer.Option(help="Points of a Latin hypercube instead of a grid; each KEY=from:to.")
+    ] = None,
+    last: Annotated[
+        float, typer.Option(metavar="REVOLUTIONS", help="Whose extremes count, the last ones.")
+    ] = 1.0,
+    workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Plain defaults for what the scene leaves open.")
+    ] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Leave a folder of results for each point.")] = False,
+    folder: Annotated[
+        Path | None, typer.Option(help="Where all goes; default: SCENE-sweep beside the scene.")
+    ] = None,
+    within: Annotated[
+        bool, typer.Option("--within", help="Refuse a scene that names files outside its own folder.")
+    ] = False,
+) -> None:
+    """Run a scene at many values of its keys: peak stresses, joint forces, torque over them. Started again it goes on."""
+    from kedfem.report import sweep_tables
+    from kedfem.scene import read_keys
+    from kedfem.sweep import Asked, Base, axes_of, sweep_folder
+    from kedfem.sweep import sweep as swept_by
+
+    raw, _ = read_keys(scene, within=within)
+    base = Base(raw, scene.parent, scene.stem)
+    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep)
+    try:
+        with progress() as watch:
+            done = swept_by(base, axes, asked, folder, watch)
+    except KeyboardInterrupt:
+        said = (
+            f"finished points are in {folder or sweep_folder(base)}; the same command goes on with the others"
+        )
+        err.print(f"interrupted; {said}", style="yellow", markup=False, soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from None
+    show(*sweep_tables(done))
+    for name in ("sweep.h5", "sweep.csv", "sweep.png"):
+        if (done.folder / name).exists():
+            out.print(f"{done.folder / name}", markup=False, soft_wrap=True)

@@ -1,0 +1,7 @@
+"""Sweeps: a scene run at many values of some of its keys, and the extremes of each run in one file."""
+
+from kedfem.sweep.axes import Axis, axes_of
+from kedfem.sweep.points import Base, Row
+from kedfem.sweep.run import Asked, Swept, sweep, sweep_folder
+
+__all__ = ["Asked", "Axis", "Base", "Row", "Swept", "axes_of", "sweep", "sweep_folder"]

@@ -1,0 +1,147 @@
+"""Files of a sweep: a row for each point as it is done, all rows as `sweep.h5` and `sweep.csv`."""
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from kedfem.results import replacing
+from kedfem.results.layout import opened
+from kedfem.results.writer import installed_version
+from kedfem.sweep.axes import Axis
+from kedfem.sweep.extremes import MAGNITUDE
+from kedfem.sweep.points import Row
+
+ROWS = "rows"
+KINDS = ("max", "min", "rms", "when")
+FORMAT = 1
+
+
+def kept_row(folder: FilePath, identity: str) -> Row | None:
+    """The row of a point that an earlier sweep finished; None if there is none, or it failed."""
+    try:
+        row = Row.read((folder / ROWS / f"{identity}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return None if row.status == "failed" else row
+
+
+def keep_row(folder: FilePath, identity: str, row: Row) -> None:
+    """Put a row on the disk, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    with replacing(folder / ROWS / f"{identity}.json") as part:
+        part.write_text(row.text(), encoding="utf-8")
+
+
+def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> None:
+    """One line a point: values of the keys, how it ended, extremes of every column.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    units = column_units(rows)
+    header = [f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in axes]
+    header += ["status", "settled", "change of the last turn"]
+    header += [
+        f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS
+    ]
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow([*header, "message"])
+        for k, row in enumerate(rows):
+            values = [axis.values[k] if axis.numbers is None else f"{axis.numbers[k]:.15g}" for axis in axes]
+            extremes = [f"{x:.17g}" if math.isfinite(x) else "" for x in _numbers(row, units)]
+            change = "" if math.isnan(row.change) else f"{row.change:.3g}"
+            table.writerow([*values, row.status, row.settled, change, *extremes, row.message])
+
+
+def write_sweep(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], last: float) -> None:
+    """All rows in HDF5, in the layout of netCDF 4: dimensions `point` and `column`, which xarray reads as they are.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    units = column_units(rows)
+    numbers = np.array([list(_numbers(row, units)) for row in rows]).reshape(
+        len(rows), len(units), len(KINDS)
+    )
+    with replacing(path) as part, opened(part, "w") as file:
+        file.attrs.update(kedfem_version=installed_version(), sweep_format=FORMAT, last_revolutions=last)
+        file["point"] = np.arange(len(rows))
+        _texts(file, "column", list(units))
+        for name in ("point", "column"):
+            file[name].make_scale(name)
+        for axis in axes:
+            if axis.numbers is None:
+                _texts(file, axis.key, [str(value) for value in axis.values])
+            else:
+                file[axis.key] = axis.numbers
+                file[axis.key].attrs["units"] = axis.unit
+            _along(file, axis.key, "point")
+        _texts(file, "status", [row.status for row in rows])
+        _texts(file, "settled", [row.settled for row in rows])
+        _texts(file, "message", [row.message for row in rows])
+        file["change"] = [row.change for row in rows]
+        file["seconds"] = [row.seconds for row in rows]
+        for name in ("status", "settled", "message", "change", "seconds"):
+            _along(file, name, "point")
+        _texts(file, "unit", list(units.values()))
+        _along(file, "unit", "column")
+        for k, kind in enumerate(KINDS):
+            file[kind] = numbers[:, :, k]
+            _along(file, kind, "point", "column")
+        coordinates = [axis.key for axis in axes if " " not in axis.key] + ["unit"]
+        file.attrs["coordinates"] = " ".join(coordinates)
+
+
+def column_units(rows: Sequence[Row]) -> dict[str, str]:
+    """Every column that a row has, in order, and its unit."""
+    return {name: unit for row in rows for name, (unit, _) in row.extremes.items()}
+
+
+def plain_quantities(names: Sequence[str]) -> list[str]:
+    """Names to be shown: of vectors the magnitude alone, nothing of the rigid mechanism, stresses first."""
+    whole = {name.rpartition("/")[0] for name in names if name.endswith(f"/{MAGNITUDE}")}
+    some = [
+        name
+        for name in names
+        if "/rigid_" not in name and (name.rpartition("/")[0] not in whole or name.endswith(f"/{MAGNITUDE}"))
+    ]
+    return sorted(some, key=lambda name: not name.startswith("stress/"))
+
+
+def largest(row: Row, name: str) -> float:
+    """The largest magnitude of a column; nan where the row has none."""
+    if name not in row.extremes:
+        return math.nan
+    most, least, _, _ = row.extremes[name][1]
+    return abs(most) if math.isnan(least) else max(abs(most), abs(least))
+
+
+def _numbers(row: Row, units: dict[str, str]) -> Iterator[float]:
+    """Extremes of all columns one after the other; nan where a row has none."""
+    for name in units:
+        yield from row.extremes.get(name, ("", (math.nan,) * len(KINDS)))[1]
+
+
+def _texts(file: Any, name: str, texts: list[str]) -> None:
+    import h5py
+
+    file.create_dataset(name, data=np.array(texts, object), dtype=h5py.string_dtype())
+
+
+def _along(file: Any, name: str, *dimensions: str) -> None:
+    for k, dimension in enumerate(dimensions):
+        file[name].dims[k].attach_scale(file[dimension])

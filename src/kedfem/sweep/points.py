@@ -1,0 +1,196 @@
+"""One point of a sweep: the scene with its values, its run, the row that it leaves."""
+
+import json
+import math
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from hashlib import sha256
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.trials import Stage
+from kedfem.analysis import analyse
+from kedfem.errors import KedfemError, SceneError
+from kedfem.motion.assembly import assembled
+from kedfem.resume import origin
+from kedfem.scene import Scene, scene_from, time_grid, turn_steps
+from kedfem.scene.hints import Where
+from kedfem.sweep.axes import Value
+from kedfem.sweep.extremes import Extreme, change, extremes
+from kedfem.sweep.keys import with_values
+
+SETTLED = 0.01  # what the last two turns may differ by
+STRESS = "stress/{}/peak"
+
+
+@dataclass(frozen=True, slots=True)
+class Base:
+    """A scene as it is written: keys and values, what file names are relative to, its name."""
+
+    raw: Mapping[str, Any]
+    folder: FilePath
+    stem: str
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """What one plan chose, for all points: of the analysis, and of links by name."""
+
+    analysis: Mapping[str, Any] = field(default_factory=dict)
+    links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def applied(self, scene: Scene) -> Scene:
+        """A scene with these choices."""
+        links = {
+            name: link.model_copy(update=dict(self.links.get(name, {}))) for name, link in scene.links.items()
+        }
+        analysis = scene.analysis.model_copy(update=dict(self.analysis))
+        return scene.model_copy(update={"links": links, "analysis": analysis})
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A point to be run, in another process: nothing but plain records.
+
+    values : key → value
+    last : turns whose extremes count
+    folder : where the run's files stay; None if they do not
+    """
+
+    base: Base
+    values: Mapping[Where, Value]
+    chosen: Chosen
+    last: float
+    folder: FilePath | None = None
+
+    def scene(self) -> Scene:
+        """The scene of this point.
+
+        Raises
+        ------
+        SceneError
+            With all faults.
+        """
+        raw = with_values(self.base.raw, self.values)
+        return self.chosen.applied(scene_from(raw, self.base.folder, stem=self.base.stem))
+
+    def identity(self) -> str:
+        """What the row depends on, as a digest: values, scene, its files, kedfem's version, turns.
+
+        Raises
+        ------
+        SceneError
+            With all faults of the scene.
+        """
+        said = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
+        return sha256(json.dumps([said, self.last], sort_keys=True, default=str).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What a point leaves.
+
+    status : ``complete``, ``doubtful`` or ``failed``
+    message : why it failed or is doubtful, else empty
+    change : between the last two turns, relative; nan if there were none
+    seconds : that the run took
+    extremes : name of a column → unit, (maximum, minimum, root of the mean square, time [s] of the largest magnitude)
+    """
+
+    status: str
+    message: str = ""
+    change: float = math.nan
+    seconds: float = 0.0
+    extremes: Mapping[str, tuple[str, Extreme]] = field(default_factory=dict)
+
+    @property
+    def settled(self) -> str:
+        """``yes``, ``no``, or ``unknown`` where there were no two turns."""
+        return "unknown" if math.isnan(self.change) else "yes" if self.change <= SETTLED else "no"
+
+    def text(self) -> str:
+        """As JSON."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def read(cls, text: str) -> "Row":
+        """From JSON.
+
+        Raises
+        ------
+        ValueError, KeyError, TypeError
+            It is another text.
+        """
+        said = json.loads(text)
+        found: dict[str, tuple[str, Extreme]] = {}
+        for name, (unit, (most, least, rms, when)) in said.pop("extremes").items():
+            found[name] = unit, (float(most), float(least), float(rms), float(when))
+        return cls(**said, extremes=found)
+
+
+def chosen_by_plan(scene: Scene, stage: Stage) -> Chosen:
+    """What the plan of one point chooses, which all other points then take too.
+
+    Raises
+    ------
+    KedfemError
+        The point cannot be planned.
+    """
+    before, _ = assembled(scene)
+    plan = plan_for(before, stage)
+    if plan is None:
+        return Chosen()
+    links = {
+        name: _different(dict(before.links[name]), dict(link)) for name, link in plan.scene.links.items()
+    }
+    return Chosen(_different(dict(before.analysis), dict(plan.scene.analysis)), links)
+
+
+def _different(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in after.items() if value != before.get(key)}
+
+
+def finished(job: Job) -> Row:
+    """The row of a point; whatever goes wrong is its message."""
+    began = perf_counter()
+    try:
+        row = _ran(job)
+    except KedfemError as error:
+        row = Row("failed", str(error))
+    except Exception as error:  # noqa: BLE001 - a defect at one point must not cost the others
+        row = Row("failed", f"internal error: {type(error).__name__}: {error}")
+    return Row(row.status, row.message, row.change, perf_counter() - began, row.extremes)
+
+
+def _ran(job: Job) -> Row:
+    scene = job.scene()
+    since = _since(scene, job.last)
+    with ExitStack() as stack:
+        folder = job.folder or FilePath(stack.enter_context(TemporaryDirectory(prefix="kedfem-sweep-")))
+        update: dict[str, Any] = {"folder": str(folder.absolute())}
+        if job.folder is None:
+            update |= {"csv": False, "plots": False, "picture": False, "animation": None}
+        output = scene.output.model_copy(update=update)
+        run = analyse(scene.model_copy(update={"output": output}), stresses_since=since)
+        results = run.results
+    found = extremes(results, since)
+    for name, peak in run.peaks.items():
+        found[STRESS.format(name)] = ("Pa", (peak.stress, math.nan, math.nan, peak.time))
+    turn = turn_steps(scene)
+    settled = change(results, turn * time_grid(scene).step) if turn else math.nan
+    return Row(results.status, results.reason, settled, extremes=found)
+
+
+def _since(scene: Scene, last: float) -> float:
+    """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns."""
+    turn, grid = turn_steps(scene), time_grid(scene)
+    if turn is None:
+        return -0.5 * grid.step
+    if last * turn > grid.steps + 0.5:
+        said = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"
+        raise SceneError(f"--last: {said}")
+    return grid.end - (last * turn - 0.5) * grid.step

@@ -1,0 +1,220 @@
+"""All points of a sweep on a pool of processes; what was done before is not done again."""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path as FilePath
+from typing import Any
+
+from kedfem.errors import KedfemError, OutputError, SceneError
+from kedfem.processes import end_with_parent
+from kedfem.results import claimed
+from kedfem.scene import scene_from
+from kedfem.scene.timing import scene_speed
+from kedfem.sweep.axes import Axis
+from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
+from kedfem.sweep.keys import with_values
+from kedfem.sweep.plot import write_plot
+from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
+
+AHEAD = 2  # points that wait for each worker, so that none is idle
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+
+Watch = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How a sweep is done.
+
+    last : turns of the drive whose extremes count
+    workers : processes; as many as this one may use cores if None
+    quick : plain defaults for what the scene leaves open, instead of a plan
+    keep : whether the files of each run stay
+    """
+
+    last: float = 1.0
+    workers: int | None = None
+    quick: bool = False
+    keep: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """What a sweep leaves: a row for each point, in the order of the axes' values.
+
+    before : rows that an earlier sweep had finished
+    planned : the point by whose plan all were run; None if there was none
+    """
+
+    folder: FilePath
+    axes: tuple[Axis, ...]
+    rows: tuple[Row, ...]
+    before: int
+    planned: int | None
+
+
+def sweep_folder(base: Base) -> FilePath:
+    """Where a sweep goes if nothing else is said: beside the scene."""
+    return base.folder / f"{base.stem}-sweep"
+
+
+def sweep(
+    base: Base, axes: Sequence[Axis], asked: Asked, folder: FilePath | None = None,
+    watch: Watch = lambda stage, done, total: None, executor: Executor | None = None,
+) -> Swept:  # fmt: skip
+    """Run a scene at all points; rows are kept as they are finished, so that the same sweep goes on where it was.
+
+    Parameters
+    ----------
+    folder : `sweep_folder` if not given
+    executor : what runs the points instead of a pool of processes of this machine
+
+    Raises
+    ------
+    KedfemError
+        The scene is invalid, no point can be planned, the folder cannot be written, a worker was killed. What fails at
+        one point is told in its row.
+    """
+    if not asked.last > 0:
+        raise SceneError(f"--last: must be positive, got {asked.last:g}")
+    if asked.workers is not None and asked.workers < 1:
+        raise SceneError(f"--workers: must be at least 1, got {asked.workers}")
+    if asked.quick:
+        base = _quick(base)
+    scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
+    with claimed(folder or sweep_folder(base)) as target:
+        chosen, planned = _planned(base, axes, watch)
+        rows: dict[int, Row] = {}
+        waiting: dict[int, tuple[str, Job]] = {}
+        for k, values in enumerate(_points(axes)):
+            job = Job(base, values, chosen, asked.last)
+            try:
+                name = job.identity()
+            except SceneError as error:
+                rows[k] = Row("failed", str(error))
+                continue
+            own = target / "runs" / f"{k:05d}" if asked.keep else None
+            kept = kept_row(target, name)
+            if kept is not None and (own is None or (own / "results.h5").exists()):
+                rows[k] = kept
+            else:
+                waiting[k] = name, Job(base, values, chosen, asked.last, own)
+        before = sum(row.status != "failed" for row in rows.values())
+        try:
+            _run(waiting, rows, target, watch, executor or _pool(asked.workers, len(waiting)))
+        finally:
+            order = sorted(rows)
+            done = [_some(axis, order) for axis in axes]
+            write_sweep(target / "sweep.h5", done, [rows[k] for k in order], asked.last)
+            write_table(target / "sweep.csv", done, [rows[k] for k in order])
+            write_plot(target / "sweep.png", done, [rows[k] for k in order])
+    return Swept(target, tuple(axes), tuple(rows[k] for k in sorted(rows)), before, planned)
+
+
+def _quick(base: Base) -> Base:
+    analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
+    return Base({**base.raw, "analysis": analysis}, base.folder, base.stem)
+
+
+def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:
+    for values in zip(*(axis.values for axis in axes), strict=True):
+        yield {axis.where: value for axis, value in zip(axes, values, strict=True)}
+
+
+def _some(axis: Axis, which: list[int]) -> Axis:
+    numbers = None if axis.numbers is None else axis.numbers[which]
+    return Axis(axis.where, tuple(axis.values[k] for k in which), numbers, axis.unit)
+
+
+def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, int | None]:
+    """What is chosen for all points: planned at the one whose drive is fastest, the first of several."""
+    speeds: dict[int, float] = {}
+    for k, values in enumerate(_points(axes)):
+        try:
+            scene = scene_from(with_values(base.raw, values), base.folder, stem=base.stem)
+        except SceneError:
+            continue
+        speeds[k] = scene_speed(scene)
+    for k in sorted(speeds, key=lambda k: -speeds[k]):
+        scene = scene_from(with_values(base.raw, list(_points(axes))[k]), base.folder, stem=base.stem)
+        try:
+            chosen = chosen_by_plan(scene, lambda name: watch(name, 0, 0))
+        except KedfemError:
+            continue  # its row says why
+        return chosen, k if chosen.analysis else None
+    return Chosen(), None
+
+
+def _run(
+    waiting: Mapping[int, tuple[str, Job]],
+    rows: dict[int, Row],
+    target: FilePath,
+    watch: Watch,
+    pool: Executor,
+) -> None:
+    """Rows of points that wait, in whatever order they are finished."""
+    queue, total = iter(waiting.items()), len(rows) + len(waiting)
+    pending: dict[Future[Row], int] = {}
+    most = AHEAD * (getattr(pool, "_max_workers", 0) or os.cpu_count() or 1)
+    try:
+        watch("points", len(rows), total)
+        while True:
+            for k, (_, job) in islice(queue, most - len(pending)):
+                pending[pool.submit(finished, job)] = k
+            if not pending:
+                break
+            _keep(wait(pending, return_when=FIRST_COMPLETED).done, pending, waiting, rows, target)
+            watch("points", len(rows), total)
+    except BrokenExecutor as error:
+        raise OutputError(
+            f"{target}: a worker process must not end before its point is done, got one that was killed, by a lack of "
+            f"memory perhaps; {len(rows)} of {total} points are kept: start again to go on, with fewer --workers"
+        ) from error
+    except BaseException:
+        _keep({each for each in pending if each.done()}, pending, waiting, rows, target)
+        _end(pool, kill=True)
+        raise
+    _end(pool, kill=False)
+
+
+def _keep(
+    done: set[Future[Row]], pending: dict[Future[Row], int], waiting: Mapping[int, tuple[str, Job]],
+    rows: dict[int, Row], target: FilePath,
+) -> None:  # fmt: skip
+    """Rows of points that are done go to the disk."""
+    for each in done:
+        k = pending.pop(each)
+        rows[k] = each.result()
+        keep_row(target, waiting[k][0], rows[k])
+
+
+def _end(pool: Executor, kill: bool) -> None:
+    from joblib.externals.loky.process_executor import ProcessPoolExecutor
+
+    if isinstance(pool, ProcessPoolExecutor):
+        pool.shutdown(wait=True, kill_workers=kill)
+    else:
+        pool.shutdown(wait=True, cancel_futures=kill)
+
+
+def _pool(workers: int | None, points: int) -> Executor:
+    """Processes of this machine, with one thread each."""
+    from joblib.externals.loky import cpu_count
+    from joblib.externals.loky.process_executor import ProcessPoolExecutor
+
+    count = max(1, min(workers or cpu_count(), points))
+    pool: Executor = ProcessPoolExecutor(count, initializer=_begin, env=ONE_THREAD)
+    return pool
+
+
+def _begin() -> None:
+    """A worker leaves Ctrl-C to its parent, and ends with it."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()

@@ -1,0 +1,213 @@
+"""`kedfem sweep`: keys, values, rows of points, continuing, files, refusals."""
+
+from concurrent.futures import Executor, Future
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from kedfem.analysis import analyse
+from kedfem.errors import SceneError
+from kedfem.scene import scene_from
+from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
+from tests import scenes
+from tests.scenes import bar, constant_speed, material
+
+G = 9.81
+RHO, L, W = 7850.0, 0.5, 0.02  # an arm of steel, square
+MASS = RHO * L * W**2
+QUICK = Asked(quick=True)
+
+
+def arm(**analysis: Any) -> dict[str, Any]:
+    return scenes.arm(
+        bar("=L", W, W, fidelity="beam", mesh={"elements": 2}),
+        constant_speed("200 rpm"),
+        parameters={"L": L},
+        materials={"steel": material(RHO, 2.1e11)},
+        damping={"ratio": 0.02, "frequencies": [50, 500]},
+        analysis={
+            "revolutions": 2,
+            "steps_per_revolution": 120,
+            "rho_inf": 0.6,
+            "initial": "quasi-static",
+            **analysis,
+        },
+        gravity=[0, -G, 0],
+        output={"plots": False, "picture": False, "animation": False},
+    )
+
+
+class Inline(Executor):
+    """Runs points in this process, and counts them; ends like Ctrl-C after some."""
+
+    def __init__(self, most: int = 1000) -> None:
+        self.most, self.runs = most, 0
+
+    def submit(self, fn: Any, /, *args: Any, **_: Any) -> Future[Any]:
+        if self.runs == self.most:
+            raise KeyboardInterrupt
+        self.runs += 1
+        future: Future[Any] = Future()
+        future.set_result(fn(*args))
+        return future
+
+
+def swept(
+    tmp_path: Path, *over: str, asked: Asked = QUICK, most: int = 1000, **analysis: Any
+) -> tuple[Swept, int]:
+    raw, runs = arm(**analysis), Inline(most)
+    done = sweep(Base(raw, tmp_path, "arm"), axes_of(over, raw), asked, tmp_path / "out", executor=runs)
+    return done, runs.runs
+
+
+def test_a_range_a_list_and_their_grid() -> None:
+    speeds, lengths = axes_of(["drive.speed=100rpm:300:3", "L=0.4,500 mm"], arm())
+    assert speeds.key == "drive.motion.speed"
+    assert speeds.values == ("100 rpm", "100 rpm", "200 rpm", "200 rpm", "300 rpm", "300 rpm")
+    assert_array_equal(speeds.numbers, [100, 100, 200, 200, 300, 300])
+    assert (lengths.key, lengths.unit) == ("parameters.L", "mm")
+    assert lengths.values == (0.4, "500 mm") * 3
+    (steps,) = axes_of(["analysis.steps_per_revolution=60:120:3"], arm())
+    assert steps.values == (60, 90, 120)
+    assert all(isinstance(value, int) for value in steps.values)
+    (words,) = axes_of(["analysis.initial=rest,quasi-static"], arm())
+    assert words.numbers is None
+
+
+def test_a_latin_hypercube_has_one_point_in_each_slice_and_is_the_same_again() -> None:
+    over = ["drive.speed=100rpm:300rpm", "L=0.4:0.6"]
+    axes = axes_of(over, arm(), samples=10)
+    for axis, first, last in zip(axes, (100, 0.4), (300, 0.6), strict=True):
+        assert axis.numbers is not None
+        slices = np.floor((axis.numbers - first) / (last - first) * 10).astype(int)
+        assert_array_equal(np.sort(slices), np.arange(10))
+    for axis, again in zip(axes, axes_of(over, arm(), samples=10), strict=True):
+        assert axis.values == again.values
+
+
+@pytest.mark.parametrize(
+    ("over", "samples", "said"),
+    [
+        (
+            ["drive.sped=1:2:3"],
+            None,
+            r"--over drive\.sped: must name a key .*did you mean 'drive\.motion\.speed'",
+        ),
+        (["analysis.revolution=1,2"], None, "did you mean 'analysis.revolutions'"),
+        (["joints.links=1,2"], None, "must name a key"),
+        (
+            ["drive.speed"],
+            None,
+            "--over: must be KEY=a list a,b,c or a range from:to:count, got 'drive.speed'",
+        ),
+        (["drive.speed=1rpm:2rpm"], None, "must be a list a,b,c or a range"),
+        (["drive.speed=1rpm:2rpm:1"], None, "must be a list a,b,c or a range"),
+        (["drive.speed=1rpm:fast:3"], None, "must have two ends"),
+        (["drive.speed=1rpm:2mm:3"], None, "must be in one unit, got mm and rpm"),
+        (
+            ["drive.speed=60rpm:2 Hz:2"],
+            None,
+            "must be in one unit, got Hz and rpm: speeds and frequencies are not",
+        ),
+        (["L=1,2", "parameters.L=1,2"], None, "must name each key once"),
+        (["L=1:2:3"], 4, "must have two ends"),
+        (["L=1:2"], 0, "--samples: must be from 1"),
+        (["L=0:1:1000", "drive.speed=1:2:1000"], None, "at most 100,000 points, got 1,000,000"),
+    ],
+)
+def test_what_cannot_be_swept_is_refused(over: list[str], samples: int | None, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        axes_of(over, arm(), samples)
+
+
+def test_the_joint_of_a_turning_arm_holds_its_centripetal_force_and_its_weight(tmp_path: Path) -> None:
+    done, runs = swept(tmp_path, "drive.speed=100rpm,300rpm", "L=0.4,0.5")
+    assert (runs, done.before) == (4, 0)
+    n, length = (axis.numbers for axis in done.axes)
+    mass = MASS / L * length
+    force = mass * length / 2 * (2 * np.pi * n / 60) ** 2  # m ω² L/2
+    for k, row in enumerate(done.rows):
+        unit, (most, least, rms, when) = row.extremes["joints/A/force/magnitude"]
+        assert (unit, row.status, row.settled) == ("N", "complete", "yes")
+        # slowly bent by its weight: (ω/ω1)² of the weight, 6e-3 at the most
+        assert_allclose(most, force[k] + mass[k] * G, rtol=6e-3)
+        assert_allclose(least, abs(force[k] - mass[k] * G), rtol=6e-3)
+        assert_allclose(rms, np.hypot(force[k], mass[k] * G), rtol=6e-3)
+        assert 60 / n[k] < when <= 120 / n[k] * (1 + 1e-9)
+    assert {"sweep.h5", "sweep.csv"} <= {x.name for x in (tmp_path / "out").iterdir()}
+    assert not (tmp_path / "out" / "sweep.png").exists()  # of two keys
+
+
+def test_what_counts_is_the_last_turns(tmp_path: Path) -> None:
+    scene = scene_from(arm(initial="rest", accuracy="quick"), tmp_path)
+    whole = analyse(scene).peaks["arm"]
+    late = analyse(scene, stresses_since=0.301).peaks["arm"]  # one turn of 200 rpm
+    assert whole.time < 0.3 <= late.time
+    assert late.stress < whole.stress
+    done, _ = swept(tmp_path, "drive.speed=200rpm,201rpm", initial="rest")
+    most, _, _, when = done.rows[0].extremes["stress/arm/peak"][1]
+    assert_allclose([most, when], [late.stress, late.time], rtol=1e-12)
+    assert done.rows[0].settled == "no"
+    assert (tmp_path / "out" / "sweep.png").exists()
+
+
+def test_a_sweep_that_was_stopped_goes_on_without_a_lost_or_doubled_point(tmp_path: Path) -> None:
+    over = "drive.speed=100rpm:300rpm:3"
+    with pytest.raises(KeyboardInterrupt):
+        swept(tmp_path, over, most=2)
+    with h5py.File(tmp_path / "out" / "sweep.h5") as file:
+        assert_array_equal(file["drive.motion.speed"], [100, 200])
+    stopped, runs = swept(tmp_path, over)
+    assert (stopped.before, runs, len(stopped.rows)) == (2, 1, 3)
+    done, runs = swept(tmp_path, over)
+    assert (done.before, runs) == (3, 0)
+    assert [row.text() for row in done.rows] == [row.text() for row in stopped.rows]
+    finer, runs = swept(tmp_path, "drive.speed=100rpm:300rpm:5", most=2)
+    assert (finer.before, runs) == (3, 2)
+    with pytest.raises(KeyboardInterrupt):
+        swept(tmp_path, over, most=0, rho_inf=0.9)  # another scene: all is run again
+
+
+def test_a_point_that_fails_is_a_row_with_its_message(tmp_path: Path) -> None:
+    done, _ = swept(tmp_path, "L=-0.5,0.5,0.6")
+    assert [row.status for row in done.rows] == ["complete", "complete", "complete"]
+    done, _ = swept(tmp_path, "links.arm.shape.width=-0.02,0.02", "analysis.revolutions=0.5,2")
+    assert [row.status for row in done.rows] == ["failed", "failed", "failed", "complete"]
+    assert "links.arm.shape.width: must be" in done.rows[0].message
+    assert "--last: must be at most the 0.5 revolutions" in done.rows[2].message
+    lines = (tmp_path / "out" / "sweep.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 5
+    assert "links.arm.shape.width: must be" in lines[1]
+
+
+def test_the_file_has_dimensions_that_readers_of_netcdf_know(tmp_path: Path) -> None:
+    done, _ = swept(tmp_path, "drive.speed=100rpm:200rpm:2")
+    with h5py.File(tmp_path / "out" / "sweep.h5") as file:
+        assert [file["max"].dims[k][0].name for k in range(2)] == ["/point", "/column"]
+        names = list(file["column"].asstr()[()])
+        where = names.index("joints/A/force/x")
+        expected = [row.extremes["joints/A/force/x"][1][2] for row in done.rows]
+        assert_array_equal(file["rms"][:, where], expected)
+        assert_array_equal(file["drive.motion.speed"], [100, 200])
+        assert file["drive.motion.speed"].attrs["units"] == "rpm"
+
+
+@pytest.mark.long
+def test_all_points_run_by_one_plan(tmp_path: Path) -> None:
+    raw = arm()
+    del raw["analysis"]["steps_per_revolution"]
+    axes = axes_of(["drive.speed=100rpm,200rpm"], raw)
+    asked = Asked(keep=True)
+    done = sweep(Base(raw, tmp_path, "arm"), axes, asked, tmp_path / "out", executor=Inline())
+    assert done.planned == 1  # the faster one
+    steps = []
+    for k in range(2):
+        with h5py.File(tmp_path / "out" / "runs" / f"{k:05d}" / "results.h5") as file:
+            steps.append(float(file["time"][1]))
+    for a, b in pairwise(steps):
+        assert_allclose(a, b, rtol=0.05)  # one step, shortened to a whole number in each run
