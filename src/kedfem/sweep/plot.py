@@ -56,7 +56,7 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> Non
                     color=line.get_color(),
                 )
             ax.set_ylabel(label)
-            ax.set_ylim(bottom=0.0)
+            ax.set_ylim(0.0, 1.05 * ax.get_ylim()[1])
             ax.grid(alpha=0.3)
             ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
         panes[-1].set_xlabel(axes[0].key + (f" ({axes[0].unit})" if axes[0].unit else ""))
