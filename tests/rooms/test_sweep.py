@@ -211,3 +211,14 @@ def test_all_points_run_by_one_plan(tmp_path: Path) -> None:
             steps.append(float(file["time"][1]))
     for a, b in pairwise(steps):
         assert_allclose(a, b, rtol=0.05)  # one step, shortened to a whole number in each run
+
+
+@pytest.mark.long
+def test_a_pool_of_processes_finds_the_same_rows(tmp_path: Path) -> None:
+    raw = arm()
+    axes = axes_of(["drive.speed=100rpm:300rpm:3"], raw)
+    pooled = sweep(Base(raw, tmp_path, "arm"), axes, Asked(workers=2, quick=True), tmp_path / "pool")
+    here, _ = swept(tmp_path, "drive.speed=100rpm:300rpm:3")
+    for one, other in zip(pooled.rows, here.rows, strict=True):
+        for name, (_, four) in other.extremes.items():
+            assert_allclose(one.extremes[name][1], four, rtol=1e-9, atol=1e-9, err_msg=name)
