@@ -29,8 +29,8 @@ from kedfem.results import (
     replacing,
     write_csv,
 )
-from kedfem.results.layout import read_facts
-from kedfem.results.writer import add_peaks, drive_channel
+from kedfem.results.layout import read_facts, seal, write_facts
+from kedfem.results.writer import add_peaks, drive_channel, mark_doubtful
 from kedfem.scene import scene_from
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -172,6 +172,37 @@ def test_units_stand_inside_the_file(tmp_path: Path) -> None:
         assert (stress["unit"], stress["frame"], stress["description"]) == ("Pa", "link", STRESS.description)
         assert tuple(stress["columns"]) == STRESS.columns
         assert [read_facts(file[name])["unit"] for name in ("time", "drive_angle")] == ["s", "rad"]
+
+
+def test_no_text_has_a_variable_length(tmp_path: Path) -> None:
+    """HDF5 may loop for ever over a damaged heap of such texts, which no checksum covers."""
+    path = tmp_path / "results.h5"
+    write(path, 2)
+    add_peaks(path, {"rod": Peak(2e6, "rod", (0.1, 0.2, 0.3), 7, 3, 0.01, 0.5, "a corner")})
+    add_notes(path, {"way": "layers", "error": 0.01})
+    mark_doubtful(path, "too much energy")
+    found: list[str] = []
+
+    def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        kinds = {key: item.attrs.get_id(key).dtype.kind for key in item.attrs}
+        kinds |= {"data": item.dtype.kind} if isinstance(item, h5py.Dataset) else {}
+        found.extend(kinds.values())
+        assert "O" not in kinds.values(), f"{name}: {kinds}"
+
+    with h5py.File(path) as file:
+        look("/", file)
+        file.visititems(look)
+    assert found.count("S") > 15
+    assert b"GCOL" not in path.read_bytes()  # the signature of such a heap
+
+
+@pytest.mark.parametrize("words", ["", "Größe ∅ 140°", "long " * 40_000, "broken \udcff byte"])
+def test_notes_of_any_text_are_read_as_they_were(tmp_path: Path, words: str) -> None:
+    """Empty, of many bytes a letter, beyond the 64 kB of a compact attribute, of bytes that are not UTF-8."""
+    path = tmp_path / "results.h5"
+    write(path, 2)
+    add_notes(path, {"said": words})
+    assert read_results(path).notes["said"] == words
 
 
 def test_notes_can_be_added_at_the_end(tmp_path: Path) -> None:
@@ -422,6 +453,13 @@ def newer(path: Path) -> None:
         file.attrs["format"] = 99
 
 
+def unknown_status(path: Path) -> None:
+    write(path, 1)
+    with h5py.File(path, "r+") as file:
+        write_facts(file, {"status": "perfect"})
+        seal(file)
+
+
 def gap(path: Path) -> None:
     write(path, 1)
     with h5py.File(path, "r+") as file:
@@ -437,6 +475,7 @@ def gap(path: Path) -> None:
         (truncated, "must be a results file of kedfem, got a corrupt file .*truncated"),
         (foreign, "must be a results file of kedfem, got another HDF5 file"),
         (newer, "must be a results file of kedfem with layout 2, got layout 99"),
+        (unknown_status, "must be a results file of kedfem, got one with a gap .*status 'perfect'"),
         (gap, "must be a results file of kedfem, got one with a gap .*angle"),
     ],
 )

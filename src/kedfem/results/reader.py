@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
 from kedfem.results.layout import FORMAT, PEAKS, all_rows, opened, read_facts, read_text, sealed, series
-from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results
+from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results, Status
 
 WANTED = "a results file of kedfem"
 
@@ -116,7 +116,7 @@ def _results(file: Any) -> Results:
         time=all_rows(named.pop(TIME.name), n),
         angle=all_rows(drive, n),
         channels={name: (_channel(name, rows), all_rows(rows, n)) for name, rows in named.items()},
-        status=said["status"],
+        status=_status(said["status"]),
         scene_json=read_text(file["scene/json"]),
         scene_toml=None if toml is None else read_text(toml),
         notes=read_facts(file["notes"]),
@@ -125,6 +125,14 @@ def _results(file: Any) -> Results:
         drive=replace(position, description=read_facts(drive)["description"]),
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
     )
+
+
+def _status(found: str) -> Status:
+    """One of the words that a file may say."""
+    for known in get_args(Status):
+        if found == known:
+            return cast(Status, known)
+    raise ValueError(f"a status {found!r}")
 
 
 def _peak(group: Any) -> Peak:
