@@ -7,8 +7,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -490,12 +492,42 @@ def test_what_is_no_results_file_is_refused(tmp_path: Path, spoil, message: str)
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path, below: str) -> None:
     (tmp_path / "taken").write_text("mine")
     folder = tmp_path / "taken" / below
-    message = r"^output\.folder: must be a writable folder, got .*taken"
+    message = (
+        r"^output\.folder: must be a writable folder, got .*taken is a file: move it, or name another folder"
+    )
     with pytest.raises(OutputError, match=message):
         ready_folder(folder)
     with pytest.raises(OutputError, match=message):
         write(folder / "results.h5", 1)
     assert (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.parametrize("below", ["", "deeper/still"])
+def test_a_link_to_nothing_in_the_way_of_the_folder(tmp_path: Path, below: str) -> None:
+    """The system says "File exists" of it, of a file that is not there."""
+    link = tmp_path / "link"
+    try:
+        link.symlink_to(tmp_path / "gone")
+    except OSError:
+        pytest.skip("this system makes no links")
+    with pytest.raises(OutputError, match=r"link is a link to nothing: remove it, or make .*gone\)$"):
+        ready_folder(link / below)
+    assert link.is_symlink()
+    (tmp_path / "gone").mkdir()
+    assert ready_folder(link / below).is_dir()
+
+
+@pytest.mark.parametrize("code", [errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EACCES])
+def test_a_folder_that_takes_no_files(tmp_path: Path, code: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that is read-only, or full, a quota used up, a right missing: said before anything is computed."""
+
+    def refused(**_: Any) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)
+    with pytest.raises(OutputError, match=rf"^output\.folder: .*{tmp_path.name} \({os.strerror(code)}\)$"):
+        write(tmp_path / "results.h5", 1)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")

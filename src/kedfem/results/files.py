@@ -43,9 +43,21 @@ def ready_folder(folder: Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        message = f"output.folder: must be a writable folder, got {folder} ({reason(error)})"
-        raise OutputError(message) from error
+        why = _in_the_way(folder) or reason(error)
+        raise OutputError(f"output.folder: must be a writable folder, got {folder} ({why})") from error
     return folder
+
+
+def _in_the_way(folder: Path) -> str:
+    """What stands where a folder is wanted, and what to do; "" if nothing does."""
+    with suppress(OSError):
+        for place in (folder, *folder.parents):
+            there = place.exists()
+            if not there and place.is_symlink():
+                return f"{place} is a link to nothing: remove it, or make {place.readlink()}"
+            if there:
+                return "" if place.is_dir() else f"{place} is a file: move it, or name another folder"
+    return ""
 
 
 def require_space(folder: Path, size: int) -> None:
