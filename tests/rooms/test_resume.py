@@ -10,7 +10,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.dynamics import nominal, transient
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
-from kedfem.results import read_results
+from kedfem.results import envelope, read_results
 from kedfem.resume import STATE
 from kedfem.scene import Scene, scene_from
 from tests.laws.test_levels import linkage
@@ -124,6 +124,28 @@ def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: in
     whole = content(analyse(turning(tmp_path / "whole")))
     ended_early(turning(tmp_path / "ended"), at)
     assert_same(whole, content(analyse(turning(tmp_path / "ended"), resumes=True)))
+
+
+def test_the_envelope_goes_on_with_the_modes_that_it_had(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Looked at after so few steps that there are modes, and steps that wait, in the state."""
+    monkeypatch.setattr(envelope, "STEPS", 20)
+    whole = content(analyse(turning(tmp_path / "whole")))
+    ended = turning(tmp_path / "ended")
+    ended_early(ended, 0.7)
+    stored = Packed((ended.results_folder / STATE).read_bytes()[32:])
+    held = envelope_in(stored.said)
+    assert all(modes["remembered"]["gain"] > 0 for modes in held["_modes"]["list"])
+    assert_same(whole, content(analyse(ended, resumes=True)))
+
+
+def envelope_in(said: Any) -> Any:
+    """What an envelope remembers, wherever it stands in a state."""
+    if isinstance(said, dict) and "_modes" in said:
+        return said
+    inner = said.values() if isinstance(said, dict) else said if isinstance(said, list) else ()
+    return next((found for each in inner if (found := envelope_in(each)) is not None), None)
 
 
 @pytest.mark.long
