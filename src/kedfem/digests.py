@@ -8,7 +8,8 @@ import json
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from secrets import token_hex
+
+from kedfem.folders import whole
 
 DIGESTS = "digests.json"
 _LENGTH = sha256().digest_size
@@ -42,12 +43,8 @@ def note(folder: Path) -> None:
         new = [file for file in _files(folder) if _name(file) not in known or file.stat().st_mtime_ns > last]
         if not new:
             return
-        part = written.with_name(f"{DIGESTS}.{token_hex(4)}.part")
-        try:
+        with whole(written) as part:
             part.write_text(json.dumps(known | {_name(file): _digest(file) for file in new}))
-            part.replace(written)
-        finally:
-            part.unlink(missing_ok=True)
 
 
 def _files(folder: Path) -> list[Path]:

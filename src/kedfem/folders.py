@@ -1,9 +1,16 @@
-"""Where kedfem keeps what it need not find out twice."""
+"""Where kedfem keeps what it need not find out twice, and files that appear only when they are whole."""
 
 import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 
 from kedfem.processes import private
+
+PART = re.compile(r".+\.[0-9a-f]{8}\.part(\.\w+)?")
+"""Names of files that are not whole yet, or that killed runs left."""
 
 KERNELS = "kernels"
 """Compiled code, in the cache folder."""
@@ -40,3 +47,33 @@ def _users() -> Path:
     from platformdirs import user_cache_path
 
     return user_cache_path("kedfem")
+
+
+def own_part(path: Path) -> Path:
+    """A name beside `path` that no other writer has, for a file that is not whole yet."""
+    return path.with_name(f"{path.stem}.{token_hex(4)}.part{path.suffix}")
+
+
+@contextmanager
+def whole(path: Path, mode: int = 0o666) -> Iterator[Path]:
+    """A file of its own beside `path` that takes its place when the block ends without an error, else is removed.
+
+    Readers see the old file or the new one, never a part of it.
+
+    Parameters
+    ----------
+    mode : rights of the new file, as far as the user's mask leaves them
+
+    Raises
+    ------
+    OSError
+        It cannot be made or put in place; the old file is left as it was.
+    """
+    part = own_part(path)
+    try:
+        os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
+        yield part
+        part.replace(path)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)

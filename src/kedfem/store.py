@@ -15,11 +15,10 @@ from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from secrets import token_hex
 from typing import Any, TypeVar
 
 from kedfem.digests import sealed, unsealed
-from kedfem.folders import KERNELS, cache_folder
+from kedfem.folders import KERNELS, cache_folder, whole
 from kedfem.processes import private
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")
@@ -51,7 +50,9 @@ def kept(what: str, key: str, made: Callable[[], T], packed: Callable[[T], Any],
     fresh = made()
     if (small := packed(fresh)) is not None:
         with suppress(OSError):  # nothing is kept where nothing can be written
-            _write(entry, pickle.dumps(small, protocol=pickle.HIGHEST_PROTOCOL))
+            entry.parent.mkdir(mode=0o700, exist_ok=True)
+            with whole(entry, 0o600) as part:
+                part.write_bytes(sealed(pickle.dumps(small, protocol=pickle.HIGHEST_PROTOCOL)))
             _make_room(folder)
     return fresh
 
@@ -85,18 +86,6 @@ def _read(entry: Path) -> bytes | None:
     except OSError:
         return None
     return unsealed(whole)
-
-
-def _write(entry: Path, content: bytes) -> None:
-    """Put an entry in place whole."""
-    entry.parent.mkdir(mode=0o700, exist_ok=True)
-    part = entry.with_name(f"{entry.stem}.{token_hex(4)}.part")
-    try:
-        with os.fdopen(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
-            file.write(sealed(content))
-        part.replace(entry)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _make_room(folder: Path) -> None:

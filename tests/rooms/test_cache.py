@@ -1,7 +1,10 @@
 """What is kept between runs: the same results, and new ones when anything changes or an entry is damaged."""
 
 import os
+import signal
 import struct
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -217,6 +220,39 @@ def test_old_entries_go_and_those_used_longest_ago_where_space_is_short(
         os.utime(entry, (time.time() - store.OLDEST - 1,) * 2)
     numbers([], "e")
     assert len(list(entries(folder))) == 1
+
+
+KILLED = """
+import os, signal
+from pathlib import Path
+from kedfem.store import itself, kept
+
+def half(path, content):
+    with path.open("wb") as file:
+        file.write(content[: len(content) // 2])
+    os.kill(os.getpid(), signal.SIGKILL)
+
+Path.write_bytes = half
+kept("number", "key", lambda: 17, itself, itself)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
+@pytest.mark.parametrize("before", [False, True])
+def test_a_run_that_is_killed_while_it_writes_an_entry_leaves_none_or_the_one_before(
+    folder: Path, before: bool
+) -> None:
+    if before:
+        assert kept("number", "key", lambda: 17, itself, itself) == 17
+        (entry,) = entries(folder)
+        entry.write_bytes(b"damaged")
+    done = subprocess.run([sys.executable, "-c", KILLED], timeout=120, check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert len(list(entries(folder))) == 1 + before  # what the killed run left
+    assert kept("number", "key", lambda: 18, itself, itself) == 18
+    assert kept("number", "key", lambda: 19, itself, itself) == 18
+    assert clear(folder) == 2
+    assert not [path for path in folder.rglob("*") if path.is_file()]
 
 
 def test_clearing_removes_entries_and_nothing_else(folder: Path) -> None:

@@ -1,17 +1,15 @@
 """Folders and files that can be written, and files that appear only when they are whole."""
 
-import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from secrets import token_hex
 
 from kedfem.errors import OutputError
+from kedfem.folders import PART, whole
 from kedfem.processes import reserve
 
 LOCK = ".kedfem.lock"
-PART = re.compile(r".+\.[0-9a-f]{8}\.part(\.\w+)?")
 
 
 def reason(error: OSError | RuntimeError) -> str:
@@ -107,11 +105,6 @@ def claimed(folder: Path) -> Iterator[Path]:
         lock.release()
 
 
-def own_part(path: Path) -> Path:
-    """A name beside `path` that no other writer has, for a file that is not whole yet."""
-    return path.with_name(f"{path.stem}.{token_hex(4)}.part{path.suffix}")
-
-
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place when the block ends without an error.
@@ -124,13 +117,8 @@ def replacing(path: Path) -> Iterator[Path]:
         The folder or the file cannot be written; the old file is left as it was.
     """
     ready_folder(path.parent)
-    part = own_part(path)
     try:
-        part.touch(exist_ok=False)
-        yield part
-        part.replace(path)
+        with whole(path) as part:
+            yield part
     except OSError as error:
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)

@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import OutputError, SolveError
-from kedfem.results.files import own_part, ready_folder, reason, require_space
+from kedfem.folders import own_part
+from kedfem.results.files import ready_folder, reason, require_space
 from kedfem.results.layout import (
     CHUNK_ROWS,
     FORMAT,
