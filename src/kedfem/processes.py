@@ -7,14 +7,15 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from math import ceil
 from pathlib import Path
-from types import FrameType
-from typing import IO
+from types import CodeType, FrameType
+from typing import IO, Any
 
+INTERRUPTIONS = ("SIGTERM", "SIGBREAK", "SIGHUP")
 POLL = 0.5  # seconds between two looks for the parent
 
 
@@ -28,10 +29,42 @@ def end_as_interrupted() -> None:
         del number, frame
         raise KeyboardInterrupt
 
-    for name in ("SIGTERM", "SIGBREAK", "SIGHUP"):
+    for name in INTERRUPTIONS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, interrupt)
+
+
+@contextmanager
+def caught_in(call: CodeType, caught: Callable[[BaseException], None]) -> Iterator[None]:
+    """Hand on what signals raise while a function is at work that compiled code calls, from its first instruction on.
+
+    Raised there, it would be printed and forgotten; a `try` of the function's own begins too late. Elsewhere, as before.
+    """
+
+    def watched(before: Callable[[int, FrameType | None], Any]) -> Callable[[int, FrameType | None], None]:
+        def told(number: int, frame: FrameType | None) -> None:
+            try:
+                before(number, frame)
+            except BaseException as error:
+                while frame is not None and frame.f_code is not call:
+                    frame = frame.f_back
+                if frame is None:
+                    raise
+                caught(error)
+
+        return told
+
+    main = threading.current_thread() is threading.main_thread()  # no other one is told of signals
+    numbers = [getattr(signal, name) for name in ("SIGINT", *INTERRUPTIONS) if main and hasattr(signal, name)]
+    before = {number: each for number in numbers if callable(each := signal.getsignal(number))}
+    try:
+        for number, each in before.items():
+            signal.signal(number, watched(each))
+        yield
+    finally:
+        for number, each in before.items():
+            signal.signal(number, each)
 
 
 @cache

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.errors import OutputError
+from kedfem.folders import PART
 from kedfem.results import Results, read_results
 
 SCENE = """
@@ -160,7 +161,7 @@ def unequal(ground: Ground, folder: Path, whole: bool = True) -> str:
 def torn(folder: Path) -> str:
     """A frame that is listed and not whole."""
     for path in (folder / "scene-results").glob("*.vtu"):
-        if not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
+        if not PART.fullmatch(path.name) and not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
             return f"{path.name} is not whole"
     return ""
 
@@ -181,7 +182,7 @@ def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> 
             running.kill()
     stage = _stage(folder) if ended else "after the end"
     what = f"{number.name} {stage}"
-    wrong = "a traceback" if "Traceback" in said else ""
+    wrong = f"a traceback: {said[said.index('Traceback') :][:900]}" if "Traceback" in said else ""
     if ended and number == signal.SIGTERM and code not in {ENDED, FOUND, DOUBTFUL, -number}:
         wrong = f"exit code {code}: {said[-300:]}"
     end = time.monotonic() + ORPHANS

@@ -1,6 +1,9 @@
 """The system's and monolithic steps of one model; the compiled loop without its compiler; runs that end early."""
 
+import signal
+import sys
 from dataclasses import replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -175,6 +178,30 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
     assert relative_errors(flat, reference)[names[0]] == pytest.approx(4 / 5)
     half = run(t[:6], {names[0]: vectors(t[:6], 0.1)})
     assert relative_errors(half, reference)[names[0]] == pytest.approx(0.1 / 5)
+
+
+def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march() -> None:
+    """Before the first instruction of the function that compiled steps call back, where no `try` of its own helps."""
+    ready = meshed(scene_from(four_bar("plate", revolutions=0.1, steps_per_revolution=40)))
+    solver: Any = steps_of(ready.scene, ready.model)
+    start = started(ready.scene, ready.linkage, ready.path, ready.model, solver)
+    calls: list[str] = []
+
+    def watch(frame: FrameType, event: str, _: Any) -> None:
+        if event == "call" and frame.f_code.co_qualname == "solver.<locals>.solved":
+            calls.append(event)
+            if len(calls) == 3:
+                signal.raise_signal(signal.SIGINT)
+
+    handler = signal.getsignal(signal.SIGINT)
+    sys.setprofile(watch)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver, start))
+    finally:
+        sys.setprofile(None)
+    assert len(calls) >= 3
+    assert signal.getsignal(signal.SIGINT) is handler
 
 
 def test_an_interruption_while_a_large_link_is_solved_ends_the_march() -> None:

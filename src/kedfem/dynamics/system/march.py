@@ -156,7 +156,8 @@ def march(
     solved, marched = solver(of.parts, of.bodies.at, of.bodies.port_at, trial), compiled_steps(of)
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))
-        taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
+        with solved.watched():
+            taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
         solved.check()
         done += int(taken)
         if done < T:

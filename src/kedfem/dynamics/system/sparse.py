@@ -6,6 +6,7 @@ call a step, or a pass of those with frames of their own: G r and Yᵀ r of its 
 
 import ctypes
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +22,7 @@ from kedfem.dynamics.state import Nodal
 from kedfem.dynamics.substructure import Substructure, mass_matrix
 from kedfem.dynamics.system.arrays import Masses, Trial
 from kedfem.links.record import Link
+from kedfem.processes import caught_in
 
 SHIFT = 1e-9  # of the mean eigenvalue: what makes the stiffness of a free link definite
 Held = Callable[[Nodal], tuple[Nodal, Float[np.ndarray, " q"]]]
@@ -145,5 +147,9 @@ def solver(
             """Raise what was raised within a call."""
             if failed:
                 raise failed[0]
+
+        def watched(self) -> AbstractContextManager[None]:
+            """What a signal raises as a call begins or ends counts as raised within it."""
+            return caught_in(solved.__code__, failed.append) if every else nullcontext()
 
     return Called()
