@@ -112,6 +112,20 @@ def busy(seconds: float) -> None:
         pass
 
 
+def busy_in(process: int) -> int:
+    """The number of the process; never, in that one."""
+    while os.getpid() == process:
+        pass
+    return os.getpid()
+
+
+def busy_and_counted(file: Path) -> None:
+    """One more letter in a file, then never back."""
+    with file.open("a") as tries:
+        tries.write("x")
+    busy(60)
+
+
 def loud() -> int:
     """Writes where gmsh and OpenCASCADE do: past Python."""
     return os.write(1, b"BFGS update error2") + os.write(2, b"BFGS update error2")
@@ -145,9 +159,28 @@ class TestApart:
             apart("rod.step", PART, LONGEST, np.ones, int(1e9))
         assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
-    def test_errors_come_through(self) -> None:
+    def test_errors_come_through_and_the_next_work_has_a_new_process(self) -> None:
+        before = apart("rod.step", PART, LONGEST, os.getpid)
+        assert apart("rod.step", PART, LONGEST, os.getpid) == before
         with pytest.raises(ValueError, match="math domain"):
             apart("rod.step", PART, LONGEST, math.sqrt, -1.0)
+        assert apart("rod.step", PART, LONGEST, os.getpid) != before
+
+    def test_what_only_a_used_process_does_not_end_is_done_by_a_new_one(self) -> None:
+        used = apart("rod.step", PART, LONGEST, os.getpid)
+        assert apart("rod.step", PART, 1, busy_in, used) != used
+
+    @pytest.mark.parametrize("tries", [1, 2])
+    def test_what_no_process_ends_is_tried_once_more_where_the_first_was_used(
+        self, tries: int, tmp_path: Path
+    ) -> None:
+        with pytest.raises(ValueError, match="math domain"):
+            apart("rod.step", PART, LONGEST, math.sqrt, -1.0)  # its process is ended
+        if tries == 2:
+            apart("rod.step", PART, LONGEST, os.getpid)
+        with pytest.raises(MeshError, match="got none within 1 s of processor time"):
+            apart("rod.step", PART, 1, busy_and_counted, tmp_path / "tries")
+        assert len((tmp_path / "tries").read_text()) == tries
 
 
 class TestStiffness:

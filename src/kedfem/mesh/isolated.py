@@ -23,12 +23,15 @@ MESH_FILE = (
 )
 
 T = TypeVar("T")
+_used: set[int] = set()  # the executors whose process has had work before
 
 
 def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns in a process of its own: libraries break down or hang on some files.
 
-    Nothing that they write reaches the terminal.
+    Nothing that they write reaches the terminal. The process is ended after work that raises: a damaged file leaves
+    OpenCASCADE in a state in which it may read the next one for ever. Work at which a used process breaks down or
+    hangs is tried once more in a new one.
 
     Parameters
     ----------
@@ -45,8 +48,10 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     reason = ""
-    for _ in range(2):  # a process that has served others may break down where a new one does not
+    for _ in range(2):
         executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
+        used = executor.executor_id in _used
+        _used.add(executor.executor_id)
         try:
             found: T = executor.submit(limited, str(Path.cwd()), seconds, work, *given).result(
                 timeout=PATIENCE
@@ -56,13 +61,21 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
             reason = f"got none within {PATIENCE} s"
             break
         except MemoryError:
+            executor.shutdown(kill_workers=True)
             reason = f"got one for which they need more than {MOST_MEMORY / 1e9:g} GB of memory"
             break
         except TerminatedWorkerError as error:
-            reason = "got one at which they broke down"
-            if "SIGXCPU" in str(error):
-                reason = f"got none within {seconds:g} s of processor time"
+            late = "SIGXCPU" in str(error)
+            reason = (
+                f"got none within {seconds:g} s of processor time"
+                if late
+                else "got one at which they broke down"
+            )
+            if late and not used:
                 break
+        except Exception:
+            executor.shutdown(kill_workers=True)
+            raise
         else:
             return found
     wanted, advice = words
