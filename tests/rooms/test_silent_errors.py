@@ -82,7 +82,7 @@ def test_growth_in_any_function_ends_a_run(value: float) -> None:
     block = ran(raw)[1][1]
     g = block.links[0].g.copy()
     g[2, -1, 1] = value
-    every = _finite(replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]), "")
+    every = _finite(replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]))
     assert len(next(every)) == 2
     with pytest.raises(SolveError, match="got none at step 3"):
         next(every)
