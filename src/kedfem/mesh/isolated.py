@@ -29,9 +29,9 @@ _used: set[int] = set()  # the executors whose process has had work before
 def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns in a process of its own: libraries break down or hang on some files.
 
-    Nothing that they write reaches the terminal. The process is ended after work that raises: a damaged file leaves
-    OpenCASCADE in a state in which it may read the next one for ever. Work at which a used process breaks down or
-    hangs is tried once more in a new one.
+    Nothing that they write reaches the terminal. The process is ended after work that raises: what a damaged file leaves
+    in a library's memory is not known. OpenCASCADE refuses some files in one process and hangs or breaks down at them in
+    another: where a process breaks down, or a used one hangs, a new one tries once.
 
     Parameters
     ----------
