@@ -7,12 +7,14 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
 from kedfem.cli.screen import err, out, progress, show
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted
 
-USER_ERROR, DEFECT, DOUBTFUL, INTERRUPTED = 2, 3, 4, 130
+__all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
+
 KINDS = ("four-bar", "slider-crank", "single-arm")
 
 app = typer.Typer(
@@ -23,15 +25,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
-Quick = Annotated[
-    bool,
-    typer.Option("--quick", help="Plain defaults for what the scene leaves open."),
-]
-Within = Annotated[
-    bool,
-    typer.Option("--within", help="Refuse a scene that names files or folders outside its own folder."),
-]
 
 
 @app.callback(invoke_without_command=True)

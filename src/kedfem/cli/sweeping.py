@@ -5,13 +5,12 @@ from typing import Annotated
 
 import typer
 
+from kedfem.cli.options import INTERRUPTED, Quick, ScenePath, Within
 from kedfem.cli.screen import err, out, progress, show
-
-INTERRUPTED = 130
 
 
 def sweep(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")],
+    scene: ScenePath,
     over: Annotated[
         list[str],
         typer.Option(
@@ -25,16 +24,12 @@ def sweep(
         float, typer.Option(metavar="REVOLUTIONS", help="Whose extremes count, the last ones.")
     ] = 1.0,
     workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores.")] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Plain defaults for what the scene leaves open.")
-    ] = False,
+    quick: Quick = False,
     keep: Annotated[bool, typer.Option("--keep", help="Leave a folder of results for each point.")] = False,
     folder: Annotated[
         Path | None, typer.Option(help="Where all goes; default: SCENE-sweep beside the scene.")
     ] = None,
-    within: Annotated[
-        bool, typer.Option("--within", help="Refuse a scene that names files outside its own folder.")
-    ] = False,
+    within: Within = False,
 ) -> None:
     """Run a scene at many values of its keys: peak stresses, joint forces, torque over them. Started again it goes on."""
     from kedfem.report import sweep_tables

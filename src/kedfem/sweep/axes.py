@@ -41,6 +41,11 @@ class Axis:
         """The key's full name."""
         return place(self.where)
 
+    def at(self, which: Sequence[int]) -> "Axis":
+        """The same with the values of some points."""
+        numbers = None if self.numbers is None else self.numbers[list(which)]
+        return Axis(self.where, tuple(self.values[k] for k in which), numbers, self.unit)
+
 
 def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = None) -> list[Axis]:
     """The swept keys, each with a value for every point: a grid of all, or a Latin hypercube.
@@ -70,12 +75,7 @@ def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = 
     if count > MOST:
         raise SceneError(f"--over: must make at most {MOST:,} points, got {count:,}")
     order = list(product(*(range(len(axis.values)) for axis in single)))
-    return [_chosen(axis, [k[i] for k in order]) for i, axis in enumerate(single)]
-
-
-def _chosen(axis: Axis, which: list[int]) -> Axis:
-    numbers = None if axis.numbers is None else axis.numbers[which]
-    return Axis(axis.where, tuple(axis.values[k] for k in which), numbers, axis.unit)
+    return [axis.at([k[i] for k in order]) for i, axis in enumerate(single)]
 
 
 def _named(text: str, raw: Mapping[str, Any]) -> tuple[Where, str]:

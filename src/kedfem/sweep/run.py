@@ -1,7 +1,7 @@
 """All points of a sweep on a pool of processes; what was done before is not done again."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -13,6 +13,7 @@ from kedfem.processes import end_with_parent
 from kedfem.results import claimed
 from kedfem.scene import scene_from
 from kedfem.scene.timing import scene_speed
+from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.keys import with_values
@@ -23,8 +24,6 @@ AHEAD = 2  # points that wait for each worker, so that none is idle
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-
-Watch = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +108,7 @@ def sweep(
             _run(waiting, rows, target, watch, executor or _pool(asked.workers, len(waiting)))
         finally:
             order = sorted(rows)
-            done = [_some(axis, order) for axis in axes]
+            done = [axis.at(order) for axis in axes]
             write_sweep(target / "sweep.h5", done, [rows[k] for k in order], asked.last)
             write_table(target / "sweep.csv", done, [rows[k] for k in order])
             write_plot(target / "sweep.png", done, [rows[k] for k in order])
@@ -126,22 +125,17 @@ def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:
         yield {axis.where: value for axis, value in zip(axes, values, strict=True)}
 
 
-def _some(axis: Axis, which: list[int]) -> Axis:
-    numbers = None if axis.numbers is None else axis.numbers[which]
-    return Axis(axis.where, tuple(axis.values[k] for k in which), numbers, axis.unit)
-
-
 def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, int | None]:
     """What is chosen for all points: planned at the one whose drive is fastest, the first of several."""
-    speeds: dict[int, float] = {}
-    for k, values in enumerate(_points(axes)):
+    points, speeds = list(_points(axes)), dict[int, float]()
+    for k, values in enumerate(points):
         try:
             scene = scene_from(with_values(base.raw, values), base.folder, stem=base.stem)
         except SceneError:
             continue
         speeds[k] = scene_speed(scene)
     for k in sorted(speeds, key=lambda k: -speeds[k]):
-        scene = scene_from(with_values(base.raw, list(_points(axes))[k]), base.folder, stem=base.stem)
+        scene = scene_from(with_values(base.raw, points[k]), base.folder, stem=base.stem)
         try:
             chosen = chosen_by_plan(scene, lambda name: watch(name, 0, 0))
         except KedfemError:
