@@ -28,6 +28,10 @@ class Forcing:
         """At the k-th of the times."""
         return Nominal(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
 
+    def first(self, T: int) -> "Forcing":
+        """Over the first of the times."""
+        return Forcing(self.R[:T], self.F[:T], None if self.stress is None else self.stress[:T])
+
 
 @dataclass(frozen=True, slots=True)
 class Products:
@@ -235,16 +239,3 @@ def history(states: Sequence[LinkState]) -> LinkHistory:
         **stacked, port_forces=np.stack([s.port_forces for s in states]),
         strain=np.array([0.5 * float(np.vdot(s.g, s.Kg)) for s in states]), products=products,
     )  # fmt: skip
-
-
-def stepwise(
-    step: Callable[[Sequence[LinkState], Sequence[Nominal]], list[LinkState]],
-    states: list[LinkState],
-    forcing: Sequence[Forcing],
-) -> tuple[list[LinkHistory], list[LinkState]]:
-    """All time points of a block by a solver that takes one step at a time."""
-    taken = []
-    for k in range(len(forcing[0].R)):
-        states = step(states, [each.at(k) for each in forcing])
-        taken.append(states)
-    return [history([states[i] for states in taken]) for i in range(len(forcing))], states

@@ -4,7 +4,7 @@ benchmark.
 It follows [KED, eqs. (14)-(20)] word by word and shares no shortcut with the system's step.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.constraint_matrices import JointRows
 from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.history import Forcing, LinkHistory, history, stepwise
+from kedfem.dynamics.history import Forcing, LinkHistory, history
 from kedfem.dynamics.interface import RowState, Tie, after_step, step_tie
 from kedfem.dynamics.ports import Rotation, port_columns, port_rotation, port_vectors
 from kedfem.dynamics.scheme import Scheme
@@ -146,10 +146,19 @@ class LiteralSteps:
         """All time points of a block, one step after the other."""
         if self.stiffening is not None:
             forcing = self.stiffening.stressed(forcing)
-        if rows is None:
-            links, last = stepwise(self.step, state.links, forcing)
-            return links, Begun(last)
-        return _stepwise_tied(self.tied_step, state, forcing, rows, self.scheme)
+        links, held, taken = state.links, state.rows, []
+        for k in range(len(forcing[0].R)):
+            at = [each.at(k) for each in forcing]
+            if rows is None:
+                links = self.step(links, at)
+            elif held is None:
+                raise ValueError("the rows' state at the first time point must be given, got none")
+            else:
+                tie = step_tie(rows.C[k], rows, self.scheme, held)
+                links, z, m = self.tied_step(links, at, tie)
+                held = after_step(tie, z, m, self.scheme, held)
+            taken.append(links)
+        return [history([links[i] for links in taken]) for i in range(len(forcing))], Begun(links, held)
 
     def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)]."""
@@ -223,27 +232,6 @@ class LiteralSteps:
         world = np.linalg.solve(self.Wt[k][s], (A @ u.ravel() - rhs.ravel())[s])
         joint = self.joints[k]
         return np.asarray((port_vectors(joint, world) @ R).ravel()[joint.keep])
-
-
-_TiedStep = Callable[
-    [Sequence[LinkState], Sequence[Nominal], Tie],
-    tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]],
-]
-
-
-def _stepwise_tied(
-    step: _TiedStep, state: Begun, forcing: Sequence[Forcing], rows: JointRows, scheme: Scheme
-) -> tuple[list[LinkHistory], Begun]:
-    """All time points of a block."""
-    links, held, taken = state.links, state.rows, []
-    if held is None:
-        raise ValueError("the rows' state at the first time point must be given, got none")
-    for k in range(len(forcing[0].R)):
-        tie = step_tie(rows.C[k], rows, scheme, held)
-        links, z, m = step(links, [each.at(k) for each in forcing], tie)
-        held = after_step(tie, z, m, scheme, held)
-        taken.append(links)
-    return [history([links[i] for links in taken]) for i in range(len(forcing))], Begun(links, held)
 
 
 def _end_forces(

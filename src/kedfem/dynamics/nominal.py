@@ -1,9 +1,10 @@
 """The rigid-body motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
@@ -64,10 +65,16 @@ def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iter
 
 def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
     """Orientation and P − M R0'' of all links over time."""
-    return [
-        Forcing(motion.R[:, body, : link.d, : link.d], applied(link, loads, motion, body))
-        for link, loads, body in zip(model.links, model.loads, model.bodies, strict=True)
-    ]
+    every = zip(model.links, model.loads, model.bodies, strict=True)
+    return forcing_of(model, motion, [applied(link, loads, motion, body) for link, loads, body in every])
+
+
+def forcing_of(
+    model: Model, motion: RigidMotion, loads: Sequence[Float[np.ndarray, "T _ _"]]
+) -> list[Forcing]:
+    """The same where P − M R0'' is known."""
+    every = zip(model.links, model.bodies, loads, strict=True)
+    return [Forcing(motion.R[:, body, : link.d, : link.d], F) for link, body, F in every]
 
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:

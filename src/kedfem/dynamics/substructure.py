@@ -109,28 +109,21 @@ def coupled(
     g : per link (n, d), link frame
     forces : per link (q,) λ on the link at its ports, link frame
     """
-    return tied(parts, R, rhs, tie)[:2]
-
-
-def tied(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None
-) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-    """`coupled`, and with it the interface unknowns z and the rows' forces m."""
     y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
     v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
     held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
     RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
-    z, m = np.zeros(parts[0].attachment.B.shape[1]), np.zeros(0)
+    z = np.zeros(parts[0].attachment.B.shape[1])
     if len(z):
         # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
         H, f = np.zeros((len(z), len(z))), np.zeros(len(z))
         for part, b, c, x in zip(parts, RB, held, v, strict=True):
             H[np.ix_(c, c)] += b.T @ part.S @ b
             f[c] += b.T @ (part.S @ x)
-        z, m = solved(H, f, tie)
+        z, _ = solved(H, f, tie)
     forces = [part.S @ (b @ z[c] - x) for part, b, c, x in zip(parts, RB, held, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
-    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)], z, m
+    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
 
 
 def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:

@@ -88,7 +88,7 @@ def transient(
     if isinstance(solver, CorotationalSteps):
         yield from _corotational(scene, linkage, along, model, solver, mark)
         return
-    stresses = stresses_of(solver)
+    stresses = solver.stiffening
     state: Any = mark.state
     if state is None:
         states = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
@@ -156,11 +156,6 @@ def _corotational(
             yield from _finite(Block(first + k, part, links, exerted=exerted))
 
 
-def stresses_of(solver: Steps) -> Stiffening | None:
-    """Geometric stiffening that a solver knows, if any."""
-    return None if isinstance(solver, CorotationalSteps) else solver.stiffening
-
-
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
     """How the elastic motion begins: at rest, or quasi-static.
 
@@ -172,7 +167,7 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     if isinstance(solver, CorotationalSteps):
         return solver.begin(lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)))
     if not isinstance(solver, SystemSteps):
-        return first_states(scene, linkage, along, model, stresses_of(solver))
+        return first_states(scene, linkage, along, model, solver.stiffening)
 
     def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
         return rigid_motion(linkage, along, t, path_parameter(scene, t))

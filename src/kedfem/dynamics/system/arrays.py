@@ -4,9 +4,18 @@ Bodies are solved in coordinates in which their mass is one, component first: al
 one after the other; `at` says where each begins.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+from jaxtyping import Int
+
 from kedfem.dynamics.metric import Elements
+
+
+def ends_of(sizes: Sequence[int]) -> Int[np.ndarray, " _"]:
+    """Where each of some arrays begins that stand one after the other, and where the last ends."""
+    return np.concatenate([[0], np.cumsum(np.array(sizes, int))])
 
 
 class Coefficients(NamedTuple):
@@ -259,9 +268,8 @@ class History(NamedTuple):
     """What a march records at each of T times; as in `State`, and R (T, bodies, 3, 3) the frames, link to world.
 
     g : (T, N) deformation; strain : (T, beams, 3, points) of planar beams; energy : (T, bodies) ½ gᵀ K0 g [J]
-    Kg : (T, N) K0 g of bodies with rigid-body frames; Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones
-    among
-        them, (0, N) without any
+    Kg : (T, N) K0 g of bodies with rigid-body frames
+    Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones among them, (0, N) without any
     """
 
     u: Any

@@ -65,8 +65,6 @@ class CorotationalSteps:
     tolerance : change of an iteration, of what a step moves
     """
 
-    stiffening = None
-
     def __init__(self, scene: Scene, model: Model, scheme: Scheme, tolerance: float) -> None:
         system, self.linkage = corotational_system(scene, model)
         self.scene, self.model, self.links = scene, model, model.links
@@ -135,7 +133,7 @@ class CorotationalSteps:
     ) -> tuple[list[LinkHistory], Exerted]:
         """The first time points of a block, as far as a history goes."""
         T = len(found.u)
-        return self._handed_on(found, [replace(x, R=x.R[:T], F=x.F[:T]) for x in forcing], motion.part(0, T))
+        return self._handed_on(found, [x.first(T) for x in forcing], motion.part(0, T))
 
     def _handed_on(
         self, found: History, forcing: Sequence[Forcing], motion: RigidMotion

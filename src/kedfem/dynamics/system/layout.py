@@ -14,7 +14,7 @@ from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.state import Rayleigh
 from kedfem.dynamics.substructure import effective_coefficients
 from kedfem.dynamics.substructure import factored as condensed
-from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends
+from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of
 from kedfem.dynamics.system.record import (
     COORDINATE,
     COROTATIONAL,
@@ -120,7 +120,7 @@ def body_arrays(
     frames = [frame_of(link) if stiffening is None else STRESSED for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
     beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
-    at = _ends(sizes)
+    at = ends_of(sizes)
     passed, place = np.full(len(links), -1), 0
     for k, frame in enumerate(frames):
         if frame != NOMINAL:
@@ -134,13 +134,13 @@ def body_arrays(
     return Bodies(
         at=at, functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
-        dense=dense, passed=passed, port_at=_ends(ports),
+        dense=dense, passed=passed, port_at=ends_of(ports),
         component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
-        G_at=_ends([x.G.size for x in parts]), Y_at=_ends([q * n for q, n in zip(ports, sizes, strict=True)]),
-        S_at=_ends([q * q for q in ports]), B_at=_ends([q * len(c) for q, c in zip(ports, columns, strict=True)]),
+        G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([q * n for q, n in zip(ports, sizes, strict=True)]),
+        S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),
         G=_flat([x.G for x in parts]), Y=_flat([x.Y.T for x in parts]), W=_flat([x.W for x in parts]),
         S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
-        column_at=_ends([len(c) for c in columns]), columns=_flat([number[c] for c in columns], int), first=first,
+        column_at=ends_of([len(c) for c in columns]), columns=_flat([number[c] for c in columns], int), first=first,
         X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),
         K=_flat(stiff),
         beams=Beams(
@@ -191,10 +191,6 @@ def _groups(joints: Sequence[Attachment]) -> Int[np.ndarray, " q"]:
     return _flat(out, int)
 
 
-def _ends(sizes: Sequence[int]) -> Int[np.ndarray, " _"]:
-    return np.concatenate([[0], np.cumsum(np.array(sizes, int))])
-
-
 def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
     return np.concatenate([np.zeros(0, kind), *(np.asarray(x, kind).ravel() for x in arrays)])
 
@@ -212,9 +208,9 @@ def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
         origin=_rows([end.origin for end in ends]),
         directions=np.array([end.directions for end in ends]).reshape(-1, 3, 3),
         lengths=_rows([end.lengths for end in ends]), known=np.array([end.known for end in ends], int),
-        components=np.array([end.onto.shape[1] for end in ends], int), column_at=_ends([len(c) for c in columns]),
-        columns=_flat([number[c] for c in columns], int), onto_at=_ends([x.size for x in onto]), onto=_flat(onto),
-        line=np.array(lines, int), line_at=_ends([len(x) for x in full]), full_at=_ends([x.size for x in full]),
+        components=np.array([end.onto.shape[1] for end in ends], int), column_at=ends_of([len(c) for c in columns]),
+        columns=_flat([number[c] for c in columns], int), onto_at=ends_of([x.size for x in onto]), onto=_flat(onto),
+        line=np.array(lines, int), line_at=ends_of([len(x) for x in full]), full_at=ends_of([x.size for x in full]),
         full=_flat(full),
     )  # fmt: skip
 
@@ -225,14 +221,14 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
     laws = [_law(each.law) for each in constraints]
     curves = [each.law if isinstance(each.law, Curve) else Curve(COORDINATE, (), ()) for each in constraints]
     return Constraints(
-        term_at=_ends([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
+        term_at=ends_of([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
         i=np.array([x.i for x in terms], int), j=np.array([x.j for x in terms], int),
         a=_rows([x.a for x in terms]), a_j=_rows([x.a_j for x in terms]), b=_rows([x.b for x in terms]),
         factor=np.array([x.factor for x in terms], float), linear=np.array([x.linear for x in constraints], bool),
         law=np.array([kind for kind, _, _ in laws], int),
         numbers=np.array([x for _, x, _ in laws], float).reshape(-1, 4),
         drive=np.array([x for _, _, x in laws], int), over=np.array([x.over for x in curves], int),
-        curve_at=_ends([len(x.at) for x in curves]), abscissa=_flat([np.array(x.at) for x in curves]),
+        curve_at=ends_of([len(x.at) for x in curves]), abscissa=_flat([np.array(x.at) for x in curves]),
         ordinate=_flat([np.array(x.value) for x in curves]),
         jumps=np.array([isinstance(x.law, Stop) and x.law.damping > 0 for x in constraints], bool),
     )  # fmt: skip

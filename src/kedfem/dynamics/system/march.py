@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import rows_of, work_over_time
-from kedfem.dynamics.loads import applied
+from kedfem.dynamics.nominal import forcing_of, forcings
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.system.arrays import (
     Bodies,
@@ -25,7 +25,7 @@ from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
-from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, forcing_of, stressed
+from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
@@ -98,10 +98,11 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     loads : if they are there already
     """
     model = of.system.model
-    if loads is None:
-        every = zip(model.links, model.loads, model.bodies, strict=True)
-        loads = [applied(link, each, motion, body) for link, each, body in every]
-    F = [work_over_time(part, x).reshape(len(motion.t), -1) for part, x in zip(of.parts, loads, strict=True)]
+    forcing = forcings(model, motion) if loads is None else forcing_of(model, motion, loads)
+    F = [
+        work_over_time(part, x.F).reshape(len(motion.t), -1)
+        for part, x in zip(of.parts, forcing, strict=True)
+    ]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
@@ -116,10 +117,9 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         amounts(of, motion),
         weights,
     )
-    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing_of(motion, loads, model.bodies))
-    return Driving(
-        *(np.ascontiguousarray(x) for x in (*rows, *terms))
-    )  # other strides would be compiled for anew
+    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing)
+    # other strides would be compiled for anew
+    return Driving(*(np.ascontiguousarray(x) for x in (*rows, *terms)))
 
 
 def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:

@@ -20,7 +20,7 @@ from kedfem.dynamics.held import held_substructure
 from kedfem.dynamics.ports import port_columns
 from kedfem.dynamics.state import Nodal
 from kedfem.dynamics.substructure import Substructure, mass_matrix
-from kedfem.dynamics.system.arrays import Masses, Trial
+from kedfem.dynamics.system.arrays import Masses, Trial, ends_of
 from kedfem.links.record import Link
 from kedfem.processes import caught_in
 
@@ -96,11 +96,11 @@ def stiffness_tables(links: Sequence[Link], parts: Sequence[Part], which: Sequen
 
 
 def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
-    ends = np.cumsum([0, *(m.nnz for m in every)])
+    ends = ends_of([m.nnz for m in every])
     none = np.zeros(1, int)
     return Masses(
         of,
-        np.cumsum([0, *(m.shape[0] + 1 for m in every)]),
+        ends_of([m.shape[0] + 1 for m in every]),
         np.concatenate([none, *(m.indptr + end for m, end in zip(every, ends, strict=False))])[1:],
         np.concatenate([none, *(m.indices for m in every)])[1:],
         np.concatenate([np.zeros(1), *(m.data for m in every)])[1:],

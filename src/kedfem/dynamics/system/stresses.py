@@ -9,9 +9,8 @@ from jaxtyping import Float
 
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.stiffening import Stiffening, StressModes
-from kedfem.dynamics.system.arrays import Stresses
+from kedfem.dynamics.system.arrays import Stresses, ends_of
 from kedfem.dynamics.system.sparse import Part, SparsePart
-from kedfem.motion.rigid import RigidMotion
 
 ROUNDING = 1e-14  # of the largest singular value
 
@@ -33,18 +32,17 @@ class Stressed:
 
     def over(self, forcing: Sequence[Forcing]) -> Terms:
         """Terms over the times of a motion."""
-        every, ends = [], [0]
+        every = []
         for each, entries, size in zip(
             self.stiffening.stressed(forcing), self.entries, self.size, strict=True
         ):
             if each.stress is None:
                 raise ValueError("stress factors must be there, got none")
             every.append(fewer_terms(each.stress * size, entries / size[:, None]))
-            ends.append(ends[-1] + every[-1][0].shape[1])
         sizes = [k.shape[1] for _, k in every for _ in range(len(k))]
         flat = np.concatenate([np.zeros(0), *(k.ravel() for _, k in every)])
         factors = np.ascontiguousarray(np.concatenate([s for s, _ in every], axis=1))
-        return factors, np.array(ends), np.concatenate([[0], np.cumsum(np.array(sizes, int))]), flat
+        return factors, ends_of([len(k) for _, k in every]), ends_of(sizes), flat
 
 
 def stressed(stiffening: Stiffening, parts: Sequence[Part]) -> Stressed:
@@ -70,8 +68,8 @@ def stress_tables(stiffening: Stiffening | None, parts: Sequence[Part]) -> Stres
         sizes.append(modes.k.shape[1] if is_sparse else n * n)
         rows.append(none if not is_sparse or modes.indptr is None else modes.indptr.astype(int))
         columns.append(none if not is_sparse or modes.indices is None else modes.indices.astype(int))
-    return Stresses(_ends(sizes), P, _ends([len(x) for x in rows[1:]]), np.concatenate(rows),
-                    _ends([len(x) for x in columns[1:]]), np.concatenate(columns))  # fmt: skip
+    return Stresses(ends_of(sizes), P, ends_of([len(x) for x in rows[1:]]), np.concatenate(rows),
+                    ends_of([len(x) for x in columns[1:]]), np.concatenate(columns))  # fmt: skip
 
 
 def fewer_terms(
@@ -83,22 +81,9 @@ def fewer_terms(
     return left[:, kept] * size[kept], right[kept] @ k
 
 
-def forcing_of(
-    motion: RigidMotion, loads: Sequence[Float[np.ndarray, "T _ _"]], bodies: Sequence[int]
-) -> list[Forcing]:
-    """What the rigid-body motion does to all bodies."""
-    return [
-        Forcing(motion.R[:, k, : F.shape[2], : F.shape[2]], F) for k, F in zip(bodies, loads, strict=True)
-    ]
-
-
 def _dense(modes: StressModes, T: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "m z"]:
     """Tᵀ k T of all modes."""
     n = len(T)
     found = [modes.stiffness(s) for s in np.eye(len(modes.states))]
     every = [T.T @ (k.toarray() if sp.issparse(k) else k) @ T for k in found]
     return np.array(every).reshape(len(every), n * n)
-
-
-def _ends(sizes: Sequence[int]) -> np.ndarray:
-    return np.concatenate([[0], np.cumsum(np.array(sizes, int))])
