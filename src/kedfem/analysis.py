@@ -34,6 +34,7 @@ from kedfem.output.derived import (
 )
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.results import Peak, Results, add_notes, claimed, read_results
+from kedfem.results.additions import add_peaks, mark_doubtful
 from kedfem.results.audit import Account, Balance, balance_warning
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.envelope import highest, peaks
@@ -41,7 +42,6 @@ from kedfem.results.force_elements import measured_actions
 from kedfem.results.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
 from kedfem.results.singular_stress import doubtful
-from kedfem.results.writer import add_peaks, mark_doubtful
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene
 from kedfem.stepping import Watch, Watched, stepped

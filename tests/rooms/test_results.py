@@ -31,8 +31,9 @@ from kedfem.results import (
     replacing,
     write_csv,
 )
+from kedfem.results.additions import add_peaks, mark_doubtful
 from kedfem.results.layout import read_facts, seal, write_facts
-from kedfem.results.writer import add_peaks, drive_channel, mark_doubtful
+from kedfem.results.writer import drive_channel
 from kedfem.scene import scene_from
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -13,11 +13,12 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
 * Whatever the status, all rows up to the last :meth:`ResultsWriter.append` can be read.
 """
 
+from kedfem.results.additions import add_notes
 from kedfem.results.files import claimed, ready_folder, replacing
 from kedfem.results.reader import abandoned_rows, read_results, run_status
 from kedfem.results.records import Channel, Peak, Results
 from kedfem.results.table import write_csv
-from kedfem.results.writer import ResultsWriter, add_notes
+from kedfem.results.writer import ResultsWriter
 
 __all__ = [
     "Channel",

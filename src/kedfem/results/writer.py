@@ -1,7 +1,6 @@
 """Writing a results file while the analysis runs."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +13,7 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError, SolveError
 from kedfem.folders import own_part
+from kedfem.results.blocks import not_finite, require_channels
 from kedfem.results.files import ready_folder, reason, require_space
 from kedfem.results.layout import (
     CHUNK_ROWS,
@@ -28,7 +28,7 @@ from kedfem.results.layout import (
     write_text,
 )
 from kedfem.results.reader import read_results
-from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak
+from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel
 from kedfem.scene import Scene
 
 SPARE_SPACE = 1_000_000
@@ -167,8 +167,8 @@ class ResultsWriter:
         ValueError
             A channel is missing, unknown or of the wrong shape.
         """
-        self._check(len(time), values)
-        if (fault := _not_finite(time, values)) is not None:
+        require_channels(self.channels, len(time), values)
+        if (fault := not_finite(time, values)) is not None:
             row, said = fault
             if row:
                 self.append(time[:row], angle[:row], {name: block[:row] for name, block in values.items()})
@@ -266,14 +266,6 @@ class ResultsWriter:
         self.rows = self._before
         self._publish()
 
-    def _check(self, length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
-        """Names and shapes of a block."""
-        expected = {channel.name: (length, len(channel.columns)) for channel in self.channels}
-        found = {name: np.shape(block) for name, block in values.items()}
-        if found != expected:
-            wrong = sorted(set(expected.items()) ^ set(found.items()))
-            raise ValueError(f"values: must be the channels with their shapes, differs in {wrong}")
-
     def _block_space(self, length: int) -> int:
         """Bytes that a block of rows may add, in whole chunks."""
         width = 2 + sum(len(channel.columns) for channel in self.channels)
@@ -312,80 +304,3 @@ class ResultsWriter:
         if isinstance(error, BlockingIOError):
             return OutputError(f"{self.path}: must not be in use, got another run that is writing it")
         return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")
-
-
-def _not_finite(
-    time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]
-) -> tuple[int, str] | None:
-    """The first row that holds something that is not finite, and what to say of it."""
-    first = len(time)
-    said = ""
-    for name, block in values.items():
-        bad = ~np.isfinite(block).all(axis=1)
-        if bad.any() and (row := int(np.argmax(bad))) < first:
-            got = block[row][~np.isfinite(block[row])][0]
-            first, said = (
-                row,
-                f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step",
-            )
-    return (first, said) if said else None
-
-
-def mark_doubtful(path: Path, why: str) -> None:
-    """Say of a file that is whole that it means nothing, and why.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    with _changed(path) as file:
-        write_facts(file, {"status": "doubtful", "reason": why})
-
-
-def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
-    """Store the highest stress of each link, ``peaks/LINK``, in a file that is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    with _changed(path) as file:
-        for name, peak in peaks.items():
-            _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
-
-
-def _lay_peak(group: Any, peak: Peak) -> None:
-    write_facts(
-        group,
-        {
-            "von_mises [Pa]": peak.stress, "place [m]": peak.place, "node": peak.node, "step": peak.step,
-            "time [s]": peak.time, "drive [rad or m]": peak.angle, "near": peak.near, "link": peak.link,
-        }
-    )  # fmt: skip
-    if peak.away is not None:
-        _lay_peak(group.create_group("away"), peak.away)
-
-
-def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
-    """Store more facts about a run whose file is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
-    with _changed(path) as file:
-        write_facts(file["notes"], notes)
-
-
-@contextmanager
-def _changed(path: Path) -> Iterator[Any]:
-    """A file that is whole, opened to change its texts."""
-    try:
-        with opened(path, "r+") as file:
-            yield file
-            seal(file)
-    except (OSError, RuntimeError) as error:
-        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error

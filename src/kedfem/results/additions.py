@@ -1,0 +1,71 @@
+"""What is added to a results file after its rows: the verdict, peaks and notes."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from kedfem.errors import OutputError
+from kedfem.results.files import reason
+from kedfem.results.layout import PEAKS, opened, seal, write_facts
+from kedfem.results.records import Peak
+
+
+def mark_doubtful(path: Path, why: str) -> None:
+    """Say of a file that is whole that it means nothing, and why.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        write_facts(file, {"status": "doubtful", "reason": why})
+
+
+def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
+    """Store the highest stress of each link, ``peaks/LINK``, in a file that is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        for name, peak in peaks.items():
+            _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
+
+
+def _lay_peak(group: Any, peak: Peak) -> None:
+    write_facts(
+        group,
+        {
+            "von_mises [Pa]": peak.stress, "place [m]": peak.place, "node": peak.node, "step": peak.step,
+            "time [s]": peak.time, "drive [rad or m]": peak.angle, "near": peak.near, "link": peak.link,
+        }
+    )  # fmt: skip
+    if peak.away is not None:
+        _lay_peak(group.create_group("away"), peak.away)
+
+
+def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
+    """Store more facts about a run whose file is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        write_facts(file["notes"], notes)
+
+
+@contextmanager
+def _changed(path: Path) -> Iterator[Any]:
+    """A file that is whole, opened to change its texts."""
+    try:
+        with opened(path, "r+") as file:
+            yield file
+            seal(file)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error

@@ -1,0 +1,42 @@
+"""What a block of rows must be before it is written."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.results.records import Channel
+
+
+def require_channels(
+    channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]
+) -> None:
+    """Names and shapes of a block.
+
+    Raises
+    ------
+    ValueError
+        A channel is missing, unknown or of the wrong shape.
+    """
+    expected = {channel.name: (length, len(channel.columns)) for channel in channels}
+    found = {name: np.shape(block) for name, block in values.items()}
+    if found != expected:
+        wrong = sorted(set(expected.items()) ^ set(found.items()))
+        raise ValueError(f"values: must be the channels with their shapes, differs in {wrong}")
+
+
+def not_finite(
+    time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]
+) -> tuple[int, str] | None:
+    """The first row that holds something that is not finite, and what to say of it."""
+    first = len(time)
+    said = ""
+    for name, block in values.items():
+        bad = ~np.isfinite(block).all(axis=1)
+        if bad.any() and (row := int(np.argmax(bad))) < first:
+            got = block[row][~np.isfinite(block[row])][0]
+            first, said = (
+                row,
+                f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step",
+            )
+    return (first, said) if said else None
