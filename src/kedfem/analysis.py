@@ -34,14 +34,16 @@ from kedfem.output.derived import (
 )
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.results import Peak, Results, add_notes, claimed, read_results
-from kedfem.results.additions import add_peaks, mark_doubtful
-from kedfem.results.audit import Account, Balance, balance_warning
+from kedfem.results.additions import add_account, add_peaks, mark_doubtful
+from kedfem.results.audit import Account, balance_warning
+from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.envelope import highest, peaks
 from kedfem.results.force_elements import measured_actions
 from kedfem.results.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
 from kedfem.results.singular_stress import doubtful
+from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene
 from kedfem.stepping import Watch, Watched, stepped
@@ -102,6 +104,8 @@ def analyse(
     KedfemError
         With a message for the user; rows and frames up to there are kept and marked as interrupted.
     """
+    if scene.output.parquet:
+        require_parquet("output.parquet")
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
@@ -145,7 +149,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), errors))
     notices += budget_warning(found, asked)
     step = replace(step, errors=found.step or step.errors)
-    notes = attributes(found) | step.notes
+    notes = attributes(found) | step.notes | balance_notes(account.balance)
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
     if why := meaningless(found, account.balance, efforts.unworked, bool(scene.analysis.stiffening)):
@@ -158,6 +162,8 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
         write_frame(folder / WORST, envelope.worst.t, fields(scene, ready.model, recoveries, envelope.worst))
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)
+    add_account(folder / "results.h5", notices, clock.seconds)
+    results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
                account.balance, found, plain, step)  # fmt: skip
 

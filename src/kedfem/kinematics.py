@@ -1,7 +1,7 @@
 """The rigid mechanism on its own: motion, coordinates of joints, transmission angles, rigid inverse dynamics."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -25,9 +25,10 @@ from kedfem.output.plots import write_plots
 from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
+from kedfem.results.additions import add_account
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
+from kedfem.results.recorded import drive_channel
 from kedfem.results.rigid import RigidForces, rigid_forces
-from kedfem.results.writer import drive_channel
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
 from kedfem.stepping import Watch, frame_steps
 
@@ -92,6 +93,8 @@ def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
         *_missing(scene, linked, masses),
         *_transmission(results, recorded),
     )
+    add_account(target / "results.h5", warnings, clock.seconds)
+    results = replace(results, warnings=warnings, seconds=dict(clock.seconds))
     return Moved(target, results, recorded, clock.seconds, warnings)
 
 

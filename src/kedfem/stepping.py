@@ -24,9 +24,8 @@ from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.envelope import Envelope
-from kedfem.results.recorded import Recorded
+from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
-from kedfem.results.writer import drive_channel
 from kedfem.resume import Keeper, remove_state
 from kedfem.scene import Scene, time_grid, turn_steps
 

@@ -13,7 +13,8 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.report import run_tables
-from kedfem.results.audit import Account, Balance, balance_warning
+from kedfem.results.audit import Account, balance_warning
+from kedfem.results.balance import Balance
 from kedfem.scene import read_scene, scene_from
 from tests import scenes
 from tests.runs import quick

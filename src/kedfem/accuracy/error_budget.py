@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from kedfem.results import Channel
-from kedfem.results.audit import Balance
+from kedfem.results.balance import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "reduction", "frames")

@@ -402,6 +402,7 @@ def _say_where(folder: Path) -> None:
     for name, what in (
         ("results.h5", "time series"),
         ("results.csv", "the same as a table"),
+        ("results.parquet", "the same for pandas"),
         ("animation.pvd", "animation, open in ParaView"),
         ("plots", "plots"),
         ("envelope.vtu", "highest stresses over all steps, for ParaView"),

@@ -14,14 +14,14 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.vtu import LinkField, remove_animation, write_points
 from kedfem.output.words import clock, moment, stress_at
-from kedfem.results import Peak, Results, write_csv
+from kedfem.results import Peak, Results, write_csv, write_parquet
 from kedfem.results.envelope import Envelope
 from kedfem.results.reader import foreign
 from kedfem.results.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
-WORST, ENVELOPE = "worst.vtu", "envelope.vtu"
+WORST, ENVELOPE, PARQUET = "worst.vtu", "envelope.vtu", "results.parquet"
 
 
 def peak_warning(peak: Peak | None) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ def refuse_foreign(folder: Path) -> None:
     OutputError
     """
     file = folder / "results.h5"
-    names = [TABLE, PICTURE, MESH, WORST, ENVELOPE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
+    names = [TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]
     if found or foreign(file):
         wanted = f"output.folder: must be a folder of kedfem's results or one without {', '.join(found) or file.name}"
@@ -77,7 +77,7 @@ def refuse_foreign(folder: Path) -> None:
 
 def remove_derived(folder: Path) -> None:
     """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
-    for name in (TABLE, PICTURE, MESH, WORST, ENVELOPE):
+    for name in (TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE):
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
     remove_animation(folder, STEM)
@@ -87,6 +87,8 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
     """Table, plots and picture; a picture that cannot be drawn is a warning."""
     if scene.output.csv:
         write_csv(results, folder / TABLE)
+    if scene.output.parquet:
+        write_parquet(results, folder / PARQUET)
     if scene.output.plots:
         write_plots(results, folder / PLOTS)
     if not (scene.output.picture and peak):

@@ -11,7 +11,7 @@ from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
 from kedfem.report.plan import chosen_table
 from kedfem.results import Peak
-from kedfem.results.audit import Balance
+from kedfem.results.balance import Balance
 from kedfem.scene import Scene
 
 

@@ -17,7 +17,7 @@ from kedfem.results.additions import add_notes
 from kedfem.results.files import claimed, ready_folder, replacing
 from kedfem.results.reader import abandoned_rows, read_results, run_status
 from kedfem.results.records import Channel, Peak, Results
-from kedfem.results.table import write_csv
+from kedfem.results.table import write_csv, write_parquet
 from kedfem.results.writer import ResultsWriter
 
 __all__ = [
@@ -33,4 +33,5 @@ __all__ = [
     "replacing",
     "run_status",
     "write_csv",
+    "write_parquet",
 ]

@@ -1,13 +1,13 @@
-"""What is added to a results file after its rows: the verdict, peaks and notes."""
+"""What is added to a results file after its rows: the verdict, peaks, notes, warnings and timing."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.layout import PEAKS, opened, seal, write_facts
+from kedfem.results.layout import PEAKS, TIMING, WARNINGS, opened, seal, write_facts
 from kedfem.results.records import Peak
 
 
@@ -58,6 +58,21 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
     """
     with _changed(path) as file:
         write_facts(file["notes"], notes)
+
+
+def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float]) -> None:
+    """Store what the user is told of a run, and the seconds of each of its stages, in a file that is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        numbered = {f"warning {k}": text for k, text in enumerate(warnings, start=1)}
+        for name, facts in ((WARNINGS, numbered), (TIMING, seconds)):
+            file.pop(name, None)
+            write_facts(file.create_group(name), facts)
 
 
 @contextmanager

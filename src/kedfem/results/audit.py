@@ -26,7 +26,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.balance import Flow, carried_fields, fields_of, flow
+from kedfem.results.balance import Balance, Flow, carried_fields, fields_of, flow
 from kedfem.results.constraint_forces import ConstraintForces
 from kedfem.results.constraint_work import row_work
 from kedfem.results.force_elements import Measured
@@ -57,26 +57,6 @@ ENERGIES = (
 NO_PORTS = Attachment(
     np.zeros(0, int), np.zeros((0, 0)), 3, np.zeros((0, 3)), (), np.zeros(0, int), np.zeros((0, 0))
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """The residual at worst, of the largest energy or momentum that is exchanged.
-
-    Momentum is judged by that of all links or by what forces pass on in time, whichever is more: a lift that hardly moves
-    passes on its weight. Angular momentum is judged by the linear at the linkage's size at least, for it may vanish.
-
-    energy : of the integration [-]
-    neglected : energy that the neglected turning of K exchanges [-]
-    linear, angular : of the integration's momentum, about the world's origin [-]
-    turned : angular momentum that K's neglected turning brings in [-]
-    """
-
-    energy: float = 0.0
-    neglected: float = 0.0
-    linear: float = 0.0
-    angular: float = 0.0
-    turned: float = 0.0
 
 
 @dataclass

@@ -153,3 +153,34 @@ def _neglected(found: Fields, at: Nominal) -> tuple[Vectors, Scalars]:
 def _work(y: Float[np.ndarray, "k1 k S T"], rates: Float[np.ndarray, "k1 k S T"]) -> Float[np.ndarray, "S T"]:
     """Σ (1 ⊗ a + X Bᵀ) · y of nodal forces with these moments."""
     return np.asarray(np.einsum("ajst,ajst->st", y, rates))
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """The residual at worst, of the largest energy or momentum that is exchanged.
+
+    Momentum is judged by that of all links or by what forces pass on in time, whichever is more: a lift that hardly moves
+    passes on its weight. Angular momentum is judged by the linear at the linkage's size at least, for it may vanish.
+
+    energy : of the integration [-]
+    neglected : energy that the neglected turning of K exchanges [-]
+    linear, angular : of the integration's momentum, about the world's origin [-]
+    turned : angular momentum that K's neglected turning brings in [-]
+    """
+
+    energy: float = 0.0
+    neglected: float = 0.0
+    linear: float = 0.0
+    angular: float = 0.0
+    turned: float = 0.0
+
+
+def balance_notes(found: Balance) -> dict[str, float]:
+    """The balance as notes of a results file, all as parts of one."""
+    return {
+        "residual of energy": found.energy,
+        "residual of momentum": found.linear,
+        "residual of angular momentum": found.angular,
+        "neglected energy": found.neglected,
+        "neglected angular momentum": found.turned,
+    }

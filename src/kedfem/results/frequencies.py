@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.results.files import replacing
+from kedfem.results.table import DIGITS
 
 
 def write_frequencies(
@@ -24,4 +25,4 @@ def write_frequencies(
     header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
     with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerow(header)
-        np.savetxt(file, np.column_stack([t, place, values]), fmt="%.17g", delimiter=",")
+        np.savetxt(file, np.column_stack([t, place, values]), fmt=DIGITS, delimiter=",")

@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-FORMAT = 2
+FORMAT = 3
 """Version of the file's layout."""
 
 CHUNK_ROWS = 512
 """Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
 
-PEAKS = "peaks"
+PEAKS, WARNINGS, TIMING = "peaks", "warnings", "timing"
+ADDED = (PEAKS, WARNINGS, TIMING)
+"""Groups that come after the rows."""
+
 OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"
 CHECKSUM = 4  # bytes of a chunk
 
@@ -63,8 +66,12 @@ def write_text(group: Any, key: str, text: str) -> None:
 
 
 def read_facts(item: Any) -> dict[str, Any]:
-    """The attributes of an item as Python's own texts and numbers, and lists of texts."""
-    return {key: _plain(value) for key, value in item.attrs.items()}
+    """The attributes of an item as Python's own texts and numbers, and lists of texts.
+
+    Those by which HDF5 joins rows to dimensions are left alone: they are references of variable length.
+    """
+    plain = [key for key in item.attrs if item.attrs.get_id(key).dtype.kind not in "OV"]
+    return {key: _plain(item.attrs[key]) for key in plain}
 
 
 def read_text(item: Any) -> str:
@@ -110,12 +117,13 @@ def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n ..."]:
     OSError
         Numbers are not those that were written.
     ValueError
-        The list of chunks is not: HDF5 has no checksum of it, and a wrong one leaves gaps, or checks nothing.
+        The list of chunks is not: HDF5 has no checksum of it, and a wrong one leaves gaps, also where it
+        says that rows begin with the file, or checks nothing.
     """
     size = rows.dtype.itemsize * int(np.prod(rows.chunks)) + CHECKSUM
     for first in range(0, len(rows), rows.chunks[0]):
         chunk = rows.id.get_chunk_info_by_coord((first,) + (0,) * (rows.ndim - 1))
-        if chunk.byte_offset is None or (chunk.size, chunk.filter_mask) != (size, 0):
+        if not chunk.byte_offset or (chunk.size, chunk.filter_mask) != (size, 0):
             raise ValueError(f"rows of {rows.name} that are not those that were written")
     values: np.ndarray = rows[:n]
     values.flags.writeable = False
@@ -154,9 +162,16 @@ def _note_texts(file: Any) -> Iterator[str]:
     """What is said of the run."""
     yield from _said("", file)
     yield from _said("notes", file["notes"])
-    if PEAKS in file:
-        for name in sorted(file[PEAKS]):
-            yield from _said(name, file[PEAKS][name])
+    for name in ADDED:
+        if name in file:
+            yield from _all_said(file[name])
+
+
+def _all_said(group: Any) -> Iterator[str]:
+    """Of a group and all groups in it."""
+    yield from _said(group.name, group)
+    for name in sorted(group):
+        yield from _all_said(group[name])
 
 
 def _said(where: str, item: Any) -> Iterator[str]:

@@ -4,9 +4,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast, get_args
 
+import numpy as np
+from jaxtyping import Float
+
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.layout import FORMAT, PEAKS, all_rows, opened, read_facts, read_text, sealed, series
+from kedfem.results.layout import (
+    FORMAT,
+    PEAKS,
+    TIMING,
+    WARNINGS,
+    all_rows,
+    opened,
+    read_facts,
+    read_text,
+    sealed,
+    series,
+)
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results, Status
 
 WANTED = "a results file of kedfem"
@@ -101,7 +115,7 @@ def _refuse_foreign(file: Any, path: Path) -> None:
         raise OutputError(f"{path}: must be {WANTED}, got another HDF5 file")
     if int(layout) != FORMAT:
         got = f"layout {layout} of kedfem {read_facts(file)['kedfem_version']}"
-        raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT}, got {got}")
+        raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT}, got {got}: run the scene again")
 
 
 def _results(file: Any) -> Results:
@@ -115,7 +129,7 @@ def _results(file: Any) -> Results:
     return Results(
         time=all_rows(named.pop(TIME.name), n),
         angle=all_rows(drive, n),
-        channels={name: (_channel(name, rows), all_rows(rows, n)) for name, rows in named.items()},
+        channels={name: _recorded(name, rows, n) for name, rows in named.items()},
         status=_status(said["status"]),
         scene_json=read_text(file["scene/json"]),
         scene_toml=None if toml is None else read_text(toml),
@@ -124,7 +138,15 @@ def _results(file: Any) -> Results:
         version=said["kedfem_version"],
         drive=replace(position, description=read_facts(drive)["description"]),
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
+        warnings=_warnings(file),
+        seconds=read_facts(file[TIMING]) if TIMING in file else {},
     )
+
+
+def _warnings(file: Any) -> tuple[str, ...]:
+    """What the user was told, in its order."""
+    said = read_facts(file[WARNINGS]) if WARNINGS in file else {}
+    return tuple(said[key] for key in sorted(said, key=lambda key: int(key.rpartition(" ")[2])))
 
 
 def _status(found: str) -> Status:
@@ -145,6 +167,7 @@ def _peak(group: Any) -> Peak:
     )  # fmt: skip
 
 
-def _channel(name: str, rows: Any) -> Channel:
+def _recorded(name: str, rows: Any, n: int) -> tuple[Channel, Float[np.ndarray, "n c"]]:
     said = read_facts(rows)
-    return Channel(name, tuple(said["columns"]), said["unit"], said["frame"], said["description"])
+    channel = Channel(name, tuple(said["columns"]), said["unit"], said["frame"], said["description"])
+    return channel, all_rows(rows, n).reshape(n, len(channel.columns))

@@ -1,13 +1,14 @@
-"""A channel and where its rows come from."""
+"""A channel and where its rows come from, and what the position of a drive is called."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
-from kedfem.results.records import Channel
+from kedfem.results.records import ANGLE, TRAVEL, Channel
+from kedfem.scene import Scene
 
 Rows = Float[np.ndarray, "T c"]
 
@@ -18,3 +19,16 @@ class Recorded:
 
     channel: Channel
     rows: Callable[[Block], Rows]
+
+
+def drive_channel(scene: Scene) -> Channel:
+    """What the position of a scene's drive is called; of several drives that of the first."""
+    names = list(scene.driven_joints)
+    if not names:
+        return ANGLE
+    channel = TRAVEL if scene.joints[names[0]].kind == "prismatic" else ANGLE
+    if len(names) == 1:
+        return channel
+    return replace(
+        channel, description=f"{channel.description}, of {names[0]}, the first of {len(names)} drives"
+    )

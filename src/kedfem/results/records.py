@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -95,6 +95,10 @@ class Results:
         Why the run was interrupted or is doubtful, else empty.
     version
         The kedfem that wrote the file.
+    warnings
+        What the user was told; of a run that came to its end.
+    seconds
+        Stage → what it took [s]; of a run that came to its end.
     peaks
         Link → its highest stress over all steps; of a whole elastic run, of links that have stress.
     drive
@@ -112,3 +116,32 @@ class Results:
     version: str = ""
     peaks: Mapping[str, Peak] = field(default_factory=dict)
     drive: Channel = ANGLE
+    warnings: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def to_xarray(self) -> Any:
+        """All channels as an xarray.DataTree, which is laid out as the file: `tree["joints/B/force"].sel(xyz="x")`.
+
+        Every channel has the coordinates time, position of the drive and, of vectors and tensors, names of components;
+        `attrs` have units, long_name and frame.
+
+        Raises
+        ------
+        OutputError
+            xarray is not installed.
+        """
+        from kedfem.results.data_sets import as_data_tree
+
+        return as_data_tree(self)
+
+    def to_pandas(self) -> Any:
+        """All channels as a pandas.DataFrame over time [s]; columns have the names of `results.csv`.
+
+        Raises
+        ------
+        OutputError
+            pandas is not installed.
+        """
+        from kedfem.results.data_sets import as_data_frame
+
+        return as_data_frame(self)

@@ -1,20 +1,24 @@
-"""Results as a table for spreadsheets."""
+"""Results as a table for spreadsheets and data frames."""
 
 import csv
 from pathlib import Path
 
 import numpy as np
 
+from kedfem.results.data_sets import as_data_frame, columns_of, header
+from kedfem.results.extras import of_extra
 from kedfem.results.files import replacing
 from kedfem.results.records import Results
+
+DIGITS = "%.9g"
+"""Of numbers in tables: more than any result is exact to, half as long as what gives back the same float."""
 
 
 def write_csv(results: Results, path: Path) -> None:
     """Write all channels as comma-separated values, one row per step.
 
     The header names every column with its unit, e.g. ``probes/rocker_mid/stress von_mises [Pa]``;
-    numbers have the digits that give back the same float. A table of an unfinished run begins with a line
-    that says so.
+    numbers have nine significant digits. A table of an unfinished run begins with a line that says so.
 
     Parameters
     ----------
@@ -28,13 +32,34 @@ def write_csv(results: Results, path: Path) -> None:
     OutputError
         The file cannot be written.
     """
-    header = ["time [s]", f"{results.drive.name.replace('_', ' ')} [{results.drive.unit}]"]
-    blocks = [results.time[:, None], results.angle[:, None]]
-    for channel, values in results.channels.values():
-        header += [f"{channel.name} {column} [{channel.unit}]" for column in channel.columns]
-        blocks.append(values)
     with replacing(Path(path)) as part, part.open("w", encoding="utf-8", newline="") as file:
         if results.status != "complete":
             file.write(f"# not a whole run: {results.status} after {len(results.time)} steps\n")
-        csv.writer(file, lineterminator="\n").writerow(header)
-        np.savetxt(file, np.hstack(blocks), fmt="%.17g", delimiter=",")
+        csv.writer(file, lineterminator="\n").writerow(header(results))
+        np.savetxt(file, columns_of(results), fmt=DIGITS, delimiter=",")
+
+
+def write_parquet(results: Results, path: Path) -> None:
+    """Write the table of `write_csv` as Parquet, all digits kept, time as index; how the run ended is in its `attrs`.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written, or pandas or pyarrow is not installed.
+    """
+    require_parquet("output.parquet")
+    table = as_data_frame(results)
+    table.attrs = {"status": results.status, "reason": results.reason, "kedfem_version": results.version}
+    with replacing(Path(path)) as part:
+        table.to_parquet(part, engine="pyarrow")
+
+
+def require_parquet(where: str) -> None:
+    """What Parquet needs is installed.
+
+    Raises
+    ------
+    OutputError
+    """
+    for package in ("pandas", "pyarrow"):
+        of_extra(package, where)

@@ -1,7 +1,6 @@
 """Writing a results file while the analysis runs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from shutil import copyfile
@@ -14,11 +13,12 @@ from jaxtyping import Float
 from kedfem.errors import OutputError, SolveError
 from kedfem.folders import own_part
 from kedfem.results.blocks import not_finite, require_channels
+from kedfem.results.dimensions import lay_dimensions
 from kedfem.results.files import ready_folder, reason, require_space
 from kedfem.results.layout import (
+    ADDED,
     CHUNK_ROWS,
     FORMAT,
-    PEAKS,
     new_rows,
     opened,
     read_facts,
@@ -28,24 +28,10 @@ from kedfem.results.layout import (
     write_text,
 )
 from kedfem.results.reader import read_results
-from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel
-from kedfem.scene import Scene
+from kedfem.results.records import ANGLE, TIME, Channel
 
 SPARE_SPACE = 1_000_000
 """Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
-
-
-def drive_channel(scene: Scene) -> Channel:
-    """What the position of a scene's drive is called; of several drives that of the first."""
-    names = list(scene.driven_joints)
-    if not names:
-        return ANGLE
-    channel = TRAVEL if scene.joints[names[0]].kind == "prismatic" else ANGLE
-    if len(names) == 1:
-        return channel
-    return replace(
-        channel, description=f"{channel.description}, of {names[0]}, the first of {len(names)} drives"
-    )
 
 
 def installed_version() -> str:
@@ -178,7 +164,7 @@ class ResultsWriter:
             for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
                 rows = self._file[name]
                 rows.resize(self.rows + len(time), axis=0)
-                rows[self.rows :] = block
+                rows[self.rows :] = np.reshape(block, (len(time), *rows.shape[1:]))
             self._file.flush()
             self.rows += len(time)
             if not self._published:
@@ -221,7 +207,7 @@ class ResultsWriter:
             return  # not readable as results: it will be replaced
 
     def _lay_out(self) -> None:
-        """The empty file: scene, notes, one extendable dataset per channel with its units."""
+        """The empty file: scene, notes, one extendable dataset per channel with its units and dimensions."""
         version = installed_version()
         began = {
             "format": FORMAT,
@@ -236,10 +222,11 @@ class ResultsWriter:
             write_text(scene, key, text)
         write_facts(self._file.create_group("notes"), self._notes)
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
-            width = (len(channel.columns),) if channel.columns else ()
+            width = (len(channel.columns),) if len(channel.columns) > 1 else ()
             rows = new_rows(self._file, channel.name, width)
             said = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
             write_facts(rows, {**said, "columns": list(channel.columns) or [channel.name], "index": index})
+        lay_dimensions(self._file, self.drive, self.channels)
         seal(self._file)
 
     def _go_on(self) -> None:
@@ -257,7 +244,8 @@ class ResultsWriter:
         ):
             wanted = f"{self.path}: must hold the {self._before} rows of the run to be resumed"
             raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
-        self._file.pop(PEAKS, None)
+        for name in ADDED:
+            self._file.pop(name, None)
         for rows in found.values():
             rows.resize(self._before, axis=0)
         write_facts(self._file["notes"], self._notes)

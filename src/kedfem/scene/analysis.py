@@ -146,7 +146,9 @@ class Output(Record):
     folder: FileName | None = None
     """the folder of the results; `<scene>-results` beside the scene file if not given"""
     csv: StrictBool = False
-    """whether the results are also written as CSV"""
+    """whether the results are also written as CSV, with nine digits"""
+    parquet: StrictBool = False
+    """whether they are also written as Parquet; needs `pip install 'kedfem[data]'`"""
     plots: StrictBool = True
     """whether curves are plotted"""
     picture: StrictBool = True

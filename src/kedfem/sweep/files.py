@@ -10,6 +10,7 @@ import numpy as np
 
 from kedfem.results import replacing
 from kedfem.results.layout import opened
+from kedfem.results.table import DIGITS
 from kedfem.results.writer import installed_version
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.extremes import MAGNITUDE
@@ -60,7 +61,7 @@ def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> No
         table.writerow([*header, "message"])
         for k, row in enumerate(rows):
             values = [axis.values[k] if axis.numbers is None else f"{axis.numbers[k]:.15g}" for axis in axes]
-            extremes = [f"{x:.17g}" if math.isfinite(x) else "" for x in _numbers(row, units)]
+            extremes = [DIGITS % x if math.isfinite(x) else "" for x in _numbers(row, units)]
             change = "" if math.isnan(row.change) else f"{row.change:.3g}"
             table.writerow([*values, row.status, row.settled, change, *extremes, row.message])
 

@@ -1,0 +1,67 @@
+"""Dimensions and CF texts of a results file, by which xarray, Panoply and other readers of netCDF 4 know its channels.
+
+Dimensions are HDF5's dimension scales in the root group: `time`, and one for the columns of vectors and of tensors, with
+their names. kedfem itself reads neither scales nor the references to them: HDF5 keeps these where it checks nothing.
+
+Source: netCDF-4 file format; CF Metadata Conventions 1.11, sections 2.7 (groups), 3.1 (units), 3.2 (long_name),
+5 (coordinates).
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kedfem.results.layout import write_facts
+from kedfem.results.records import TIME, Channel
+
+CONVENTIONS = "CF-1.11"
+NAMED = {
+    ("x", "y", "z"): "xyz",
+    ("x", "y"): "xy",
+    ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises"): "stress_component",
+}
+
+
+def columns_dimension(columns: Sequence[str]) -> str:
+    """What the dimension of a channel's columns is called; "" of one column, which has none.
+
+    >>> columns_dimension(("x", "y", "z")), columns_dimension(("loads", "supports")), columns_dimension(("torque",))
+    ('xyz', 'loads_supports', '')
+    """
+    if len(columns) < 2:
+        return ""
+    return NAMED.get(tuple(columns), "_".join(columns))
+
+
+def cf_units(unit: str) -> str:
+    """A channel's unit as CF has it: 1 where there is none."""
+    return unit or "1"
+
+
+def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> None:
+    """Name rows and columns of all channels, which are there, with units and what they mean.
+
+    Parameters
+    ----------
+    drive : position of the drive, a coordinate beside time
+    """
+    import h5py
+
+    write_facts(file, {"Conventions": CONVENTIONS, "coordinates": drive.name})
+    file[TIME.name].make_scale(TIME.name)
+    for channel in channels:
+        name = columns_dimension(channel.columns)
+        if name and name not in file:
+            file.create_dataset(name, data=np.array(channel.columns, object), dtype=h5py.string_dtype())
+            write_facts(file[name], {"long_name": f"components {', '.join(channel.columns)}"})
+            file[name].make_scale(name)
+    for channel in (TIME, drive, *channels):
+        rows, said = file[channel.name], {"units": cf_units(channel.unit), "long_name": channel.description}
+        if channel.columns:
+            said["coordinates"] = drive.name
+        write_facts(rows, said)
+        if channel is not TIME:
+            rows.dims[0].attach_scale(file[TIME.name])
+        if name := columns_dimension(channel.columns):
+            rows.dims[1].attach_scale(file[name])
