@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 import kedfem
+from kedfem.results import read_results
+from kedfem.results.reference import told
 from kedfem.scene import read_scene, time_grid
 
 ROOT = Path(__file__).parents[1]
@@ -61,3 +63,6 @@ def test_an_example_runs_and_its_assertions_hold(name: str, tmp_path: Path) -> N
     assert done.returncode == 0, done.stderr
     assert done.stdout
     assert not done.stderr
+    for file in tmp_path.rglob("results.h5"):
+        channels = read_results(file).channels
+        assert [each for each, (channel, _) in channels.items() if not told(channel)] == []

@@ -1,0 +1,179 @@
+"""docs/results.md: every channel of a results file, its sign, frame and unit.
+
+Regenerate it with ``python -m kedfem.results.reference > docs/results.md``.
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+
+from kedfem.results.dimensions import columns_dimension
+from kedfem.results.records import Channel
+
+XYZ = ("x", "y", "z")
+STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
+FLAT = "of planar links x and y alone"
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What the reference says of channels.
+
+    path : their names; NAME is a name of the scene, a bar parts the last words that there may be
+    columns, unit, frame : as they are; of several units one for each word; frame "either" as the probe asks
+    text : meaning and sign
+    """
+
+    path: str
+    columns: tuple[str, ...]
+    unit: str
+    frame: str
+    text: str
+
+    def words(self) -> dict[str, str]:
+        """Last word of the path → unit."""
+        words, units = self.path.rpartition("/")[2].split("|"), self.unit.split("|")
+        return dict(zip(words, units * (len(words) // len(units)), strict=True))
+
+    def fits(self, channel: Channel) -> bool:
+        """Whether a channel is one of these: its name, columns, unit and frame."""
+        group = self.path.rpartition("/")[0]
+        kinds, slash, rest = group.partition("/")
+        paths = [f"{kind}{slash}{rest}/{word}" for kind in kinds.split("|") for word, unit in self.words().items()
+                 if unit == channel.unit]  # fmt: skip
+        named = any(re.fullmatch(re.escape(path).replace("NAME", "[^/]+"), channel.name) for path in paths)
+        framed = channel.frame == self.frame or (
+            self.frame == "either" and channel.frame in {"link", "world"}
+        )
+        return named and framed and _among(channel.columns, self.columns)
+
+
+def _among(found: tuple[str, ...], known: tuple[str, ...]) -> bool:
+    """Vectors may have fewer components; "*" is one column that is called as the path ends, but for `rigid_`."""
+    fewer = known == XYZ and 0 < len(found) < 3 and set(found) <= set(XYZ)
+    return found == known or fewer or (known == ("*",) and len(found) == 1)
+
+
+CHANNELS: dict[str, tuple[Told, ...]] = {
+    "Probes": (
+        Told("probes/NAME/displacement|velocity|acceleration", XYZ, "m|m/s|m/s^2", "either",
+             f"Elastic motion of the point against the rigid motion of its link; without a drive against the free motions held as drawn; {FLAT}."),
+        Told("probes/NAME/position|travel", XYZ, "m", "world",
+             f"Where the point is; how far it is from where it is drawn. Rigid and elastic motion together; {FLAT}."),
+        Told("probes/NAME/total_velocity|total_acceleration", XYZ, "m/s|m/s^2", "world",
+             f"Of rigid and elastic motion together; {FLAT}."),
+        Told("probes/NAME/deflection", XYZ, "m", "either",
+             f"From the chord of the link's joints, which goes with them, or the link's mean rigid motion, as the description says; {FLAT}."),
+        Told("probes/NAME/stress", STRESS, "Pa", "link",
+             "Axes of the link as drawn; tension is positive. xy, yz, zx are shear stresses, not twice; von_mises is never negative."),
+    ),
+    "Joints": (
+        Told("joints/NAME/force|rigid_force", XYZ, "N", "world",
+             "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid; it may "
+             "lack components that statics leave open."),
+        Told("joints/NAME/moment|rigid_moment", XYZ, "N m", "world",
+             "On the same link, about the joint's nominal point as it moves with the rigid motion, of a slot about the pin."),
+        Told("joints/NAME/angle|angle_about_NAME", ("angle",), "rad", "",
+             "Of the link named first against the other, from the reference position, by the right hand about the joint's axis, of "
+             "a universal joint about the axis in the link named; counted on over turns."),
+        Told("joints/NAME/travel|travel_1|travel_2|travel_3", ("travel",), "m", "",
+             "Of the link named first against the other along the joint's axis, from the reference position."),
+    ),
+    "Drive": (
+        Told("drive/torque|rigid_torque|force|rigid_force", ("*",), "N m|N m|N|N", "world",
+             "What the drive exerts on its link along the driven joint's axis; times the drive's rate it is the power that the drive gives, "
+             "positive where it drives."),
+        Told("drive/NAME/torque|rigid_torque|force|rigid_force", ("*",), "N m|N m|N|N", "world",
+             "The same, where there are several drives, of the drive of that joint."),
+    ),
+    "Gears, motors, springs and limits": (
+        Told("gears/NAME/torque", ("torque",), "N m", "world",
+             "On the link that the first joint's turn is of, about its axis."),
+        Told("motors|springs|limits/NAME/angle|travel", ("*",), "rad|m", "",
+             "Coordinate of their joint, from the reference position."),
+        Told("motors/NAME/speed", ("speed",), "rad/s", "", "Rate of a hinge's angle."),
+        Told("motors/NAME/speed", ("speed",), "m/s", "", "Rate of a slide's travel."),
+        Told("motors|springs|limits/NAME/torque|force", ("*",), "N m|N", "",
+             "Along the coordinate: positive where it pushes angle or travel up. Of a spring between two points with its damper: its pull, "
+             "positive in tension."),
+        Told("springs/NAME/length", ("length",), "m", "", "Distance of its points."),
+    ),
+    "Energy": (
+        Told("energy/kinetic|strain", ("*",), "J", "", "Of all links; strain energy of springs in joints too."),
+        Told("energy/work", ("loads", "supports"), "J", "",
+             "Done on the links since the beginning: by loads, motors and springs; by the drive and other supports."),
+        Told("energy/dissipated", ("dissipated",), "J", "", "What damping took since the beginning; it grows."),
+        Told("energy/neglected|residual", ("*",), "J", "",
+             "Work that the equation neglects on bent links; what is left of the balance, the integration's error."),
+    ),
+    "Rigid motion (`kedfem kinematics`)": (
+        Told("links/NAME/position|velocity|acceleration", XYZ, "m|m/s|m/s^2", "world",
+             "Of the centre of mass, of a link without mass its first joint."),
+        Told("joints/NAME/position|velocity|acceleration", XYZ, "m|m/s|m/s^2", "world",
+             "Of the joint's point on the link that the description names; joints to the ground have none."),
+        Told("probes/NAME/position|velocity|acceleration", XYZ, "m|m/s|m/s^2", "world", "Of the probe's point."),
+        Told("links/NAME/rotation|angular_velocity|angular_acceleration", XYZ, "rad|rad/s|rad/s^2", "world",
+             "In space: rotation vector from the reference position, of 0 to π; its rates ω and α."),
+        Told("links/NAME/rotation", ("angle",), "rad", "",
+             "In a plane: angle about the normal that the description names, counted on over turns."),
+        Told("links/NAME/angular_velocity|angular_acceleration", ("rate",), "rad/s|rad/s^2", "", "In a plane: about the same normal."),
+        Told("links/NAME/transmission_angle", ("angle",), "rad", "",
+             "Between coupler and driven link, 0 to π; best at π/2."),
+    ),
+}  # fmt: skip
+INTRODUCTION = """\
+# Results
+
+`results.h5` holds time series: `time` [s], `drive_angle` [rad] or `drive_travel` [m] from the reference position, of several
+drives the first one's, and the channels below, each with `units`, `long_name` and `frame` (`world`, or `link`: axes of the
+link as drawn, which go with it). NAME is a name of the scene; all units are SI. xarray, Panoply and other readers of
+netCDF 4 open the file: dimension `time`, and of vectors and tensors one with the names of their components (below, in
+brackets). Energies apart, nothing is summed up over time.
+
+| group | attributes |
+|---|---|
+| `/` | `status` (`complete`, `doubtful`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
+| `/notes` | what the run said of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), residuals of energy and momentum |
+| `/warnings`, `/timing` | what the user was told; seconds of each stage; both of a run that came to its end |
+| `/peaks/LINK` | highest von Mises stress over all steps, its place as drawn, time, step and drive; `away` from places where it means little |
+| `/scene` | the scene that was analysed, as `json` and `toml` |
+
+`results.csv` (`output.csv = true`) has all channels with nine digits, `results.parquet` (`output.parquet = true`, needs
+`pip install 'kedfem[data]'`) with all. From Python: [python.md](python.md).
+
+The page is made by `python -m kedfem.results.reference > docs/results.md`.
+"""
+
+
+def results_page() -> str:
+    """The text of docs/results.md."""
+    parts = [INTRODUCTION]
+    for title, every in CHANNELS.items():
+        lines = [
+            f"## {title}\n",
+            "| channel | columns | unit | frame | meaning and sign |",
+            "|---|---|---|---|---|",
+        ]
+        parts.append("\n".join([*lines, *map(_line, every)]) + "\n")
+    return "\n".join(parts)
+
+
+def _line(each: Told) -> str:
+    group, _, _ = each.path.rpartition("/")
+    kinds, slash, rest = group.partition("/")
+    first, *others = each.words()
+    names = [f"{kind}{slash}{rest}/{first}" for kind in kinds.split("|")] + others
+    dimension = columns_dimension(each.columns)
+    columns = f"{', '.join(each.columns)} (`{dimension}`)" if dimension else ""
+    units = ", ".join(dict.fromkeys(each.unit.split("|")))
+    frame = {"either": "link or world", "": "–"}.get(each.frame, each.frame)
+    return f"| {', '.join(f'`{name}`' for name in names)} | {columns} | {units} | {frame} | {each.text} |"
+
+
+def told(channel: Channel) -> list[Told]:
+    """What the reference says of a channel: of a run, of the rigid motion or of both; empty where it is unknown."""
+    return [each for every in CHANNELS.values() for each in every if each.fits(channel)]
+
+
+if __name__ == "__main__":
+    sys.stdout.write(results_page())
