@@ -14,6 +14,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -147,10 +148,15 @@ def ran(raw: Raw, folder: Path) -> str:
     return "accepted"
 
 
-def run_scenes(tally: Tally, count: int, seed: int, folder: Path, names: tuple[str, ...] = QUICK) -> None:
-    """Whole short runs of scenes whose numbers are others."""
+def run_scenes(
+    tally: Tally, count: int, seed: int, folder: Path, names: tuple[str, ...] = QUICK, seconds: float = inf
+) -> None:
+    """Whole short runs of scenes whose numbers are others; no more are begun after so many seconds."""
+    began = time.monotonic()
     every = {name: short(example(name)) for name in names}
     for number in range(count):
+        if time.monotonic() - began > seconds:
+            break
         rng = random.Random(f"run {seed} {number}")
         name = rng.choice(sorted(every))
         raw = nudged(every[name], rng)
@@ -208,13 +214,14 @@ def main() -> None:
     for name in ("scenes", "texts", "runs", "files"):
         parser.add_argument(f"--{name}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=inf, help="after which no more runs are begun")
     given = parser.parse_args()
     tally = Tally()
     np.seterr(all="ignore")
     with TemporaryDirectory() as folder:
         validate_scenes(tally, given.scenes, given.seed)
         read_texts(tally, given.texts, given.seed, Path(folder))
-        run_scenes(tally, given.runs, given.seed, Path(folder))
+        run_scenes(tally, given.runs, given.seed, Path(folder), seconds=60 * given.minutes)
         if given.files:
             read_files(tally, given.files, given.seed, Path(folder))
     print(tally.page())  # noqa: T201 - a command
