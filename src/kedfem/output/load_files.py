@@ -1,0 +1,117 @@
+"""Files of loads for suppliers: a table for each joint and drive, a summary, polar diagrams of bearing loads."""
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.output.plots import figure_saved
+from kedfem.output.units import prefixed
+from kedfem.results import Results, replacing
+from kedfem.results.loads import DriveLoad, JointLoad, facing
+from kedfem.results.table import DIGITS
+
+XYZ = "xyz"
+Columns = dict[str, Float[np.ndarray, " T"]]
+
+
+def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
+    """A joint's load over time as CSV: in the world's axes, in each link's, magnitude, axial and bearing load, speed.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    first, second = load.links
+    columns: Columns = {f"on {first}, world {c} [N]": load.world[:, k] for k, c in enumerate(XYZ)}
+    for link, inside in zip(load.links, load.inside, strict=False):
+        columns |= {f"on {link}, its axes {c} [N]": inside[:, k] for k, c in enumerate(XYZ)}
+    columns["magnitude [N]"] = load.magnitude
+    some = {f"axial on {first} [N]": load.axial, "bearing load [N]": load.bearing}
+    some[f"speed of {first} against {second} [rad/s]"] = load.rate
+    columns |= {name: x for name, x in some.items() if x is not None}
+    _write(path, columns, results, rows)
+
+
+def write_drive_load(path: Path, load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
+    """A drive's torque or force, rate and power over time as CSV.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    torque = load.unit == "N m"
+    columns: Columns = {f"{'torque' if torque else 'force'} [{load.unit}]": load.effort}
+    if load.rate is not None and load.power is not None:
+        columns |= {f"rate [{'rad/s' if torque else 'm/s'}]": load.rate, "power [W]": load.power}
+    _write(path, columns, results, rows)
+
+
+def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
+    drive = f"{results.drive.name.replace('_', ' ')} [{results.drive.unit}]"
+    every = {"time [s]": results.time, drive: results.angle} | columns
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow(every)
+        np.savetxt(file, np.column_stack([x[rows] for x in every.values()]), fmt=DIGITS, delimiter=",")
+
+
+def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
+    """One line a joint or drive, empty where a number is not known.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    names = list(dict.fromkeys(name for found in every.values() for name in found))
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow([what, *names])
+        for key, found in every.items():
+            values = [found.get(name, np.nan) for name in names]
+            table.writerow([key, *("" if np.isnan(x) else DIGITS % x for x in values)])
+
+
+def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:
+    """Polar diagram of a hinge's radial load, as each of its links bears it in its own axes; whether there is one.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    if load.axis is None or not load.inside or load.bearing is None:
+        return False
+    e1, e2 = facing(load.axis)
+    divisor, unit = prefixed(float(load.bearing[rows].max()), "N")
+    with figure_saved(
+        path, f"Joint {load.joint}: radial load ({unit}) about axis {_vector(load.axis)}"
+    ) as figure:
+        sides = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
+        for ax, link, force in zip(sides, load.links, load.inside, strict=True):
+            a, b = force[rows] @ e1, force[rows] @ e2
+            angle, size = np.arctan2(b, a), np.hypot(a, b) / divisor
+            k = int(size.argmax())
+            ax.plot(
+                angle,
+                size,
+                linewidth=1.2,
+                marker="o" if np.ptp(np.column_stack([a, b]), axis=0).max() == 0 else "",
+            )
+            ax.plot(angle[k], size[k], "o", color="C3", label=f"peak {size[k]:.4g} {unit}")
+            ax.set_ylim(0.0, 1.1 * max(float(size.max()), 1e-300))
+            ax.set_title(f"on {link}, in its axes: 0° is {_vector(e1)}, 90° {_vector(e2)}", fontsize=10)
+            ax.legend(loc="upper left", bbox_to_anchor=(-0.05, -0.02), frameon=False)
+            ax.set_rlabel_position(22.5)
+    return True
+
+
+def _vector(x: Float[np.ndarray, "3"]) -> str:
+    for k, name in enumerate(XYZ):
+        if abs(abs(x[k]) - 1.0) < 1e-9:
+            return f"−{name}" if x[k] < 0 else name
+    return f"({', '.join(f'{c + 0.0:.3g}' for c in np.round(x, 9))})"

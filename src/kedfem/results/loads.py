@@ -1,0 +1,264 @@
+"""Loads of joints and drives as suppliers of bearings and motors ask for them: link axes, mean by a power, peak, rms.
+
+Equivalent bearing load [ISO 281, and catalogues of the makers]: bearings of constant load P live P^−p revolutions, so one
+of varying load lives as with P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p), ω the speed of shaft against housing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.motion.constraints import cross
+from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.rigid import RigidMotion
+from kedfem.results.records import Results
+from kedfem.scene import Joint, Scene
+
+BALL, ROLLER = 3.0, 10.0 / 3.0
+"""Exponents of bearing lives, ISO 281: point and line contact."""
+
+HINGES = ("revolute", "cylindrical", "screw")
+TOLD = 3  # components of a force that is told whole
+Vectors = Float[np.ndarray, "T 3"]
+Scalars = Float[np.ndarray, " T"]
+
+
+@dataclass(frozen=True, slots=True)
+class JointLoad:
+    """The load of a joint over time.
+
+    joint, kind : its name; elastic or rigid: whose links the force is of
+    links : the link that `world` acts on, and the other
+    world : (T, 3) force on the first link [N]
+    inside : (T, 3) each: force that each link bears, in its own axes, as drawn in the reference position [N]; empty where
+        the motion is not known
+    axis : (3,) of a hinge, as drawn; None of other joints
+    rate : (T,) speed of one link against the other [rad/s]; None where the motion is not known
+    """
+
+    joint: str
+    kind: str
+    links: tuple[str, str]
+    world: Vectors
+    inside: tuple[Vectors, ...] = ()
+    axis: Float[np.ndarray, "3"] | None = None
+    rate: Scalars | None = None
+
+    @property
+    def magnitude(self) -> Scalars:
+        """(T,) [N]."""
+        return np.asarray(np.linalg.norm(self.world, axis=1))
+
+    @property
+    def axial(self) -> Scalars | None:
+        """(T,) on the first link along a hinge's axis, with sign [N]; None where axis or motion is not known."""
+        return None if self.axis is None or not self.inside else np.asarray(self.inside[0] @ self.axis)
+
+    @property
+    def bearing(self) -> Scalars | None:
+        """(T,) what a bearing's life depends on [N]: of a hinge the radial load, of a ball all; None of other joints."""
+        if self.kind == "spherical":
+            return self.magnitude
+        if (axial := self.axial) is None or self.axis is None:
+            return None
+        return np.asarray(np.linalg.norm(self.inside[0] - np.outer(axial, self.axis), axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLoad:
+    """What a drive exerts.
+
+    joint : that it drives
+    effort : (T,) torque [N m], of a slide force [N], as `unit` says
+    rate : (T,) of the joint [rad/s or m/s]; None where the motion is not known
+    """
+
+    joint: str
+    unit: str
+    effort: Scalars
+    rate: Scalars | None
+
+    @property
+    def power(self) -> Scalars | None:
+        """(T,) [W], positive where it drives."""
+        return None if self.rate is None else self.effort * self.rate
+
+
+def mean_over(t: Scalars, x: Scalars) -> float:
+    """Mean over time by the trapezoidal rule; of one instant its value."""
+    if len(t) < 2:
+        return float(x.mean()) if len(x) else float("nan")
+    return float(np.trapezoid(x, t) / (t[-1] - t[0]))
+
+
+def rms(t: Scalars, x: Scalars) -> float:
+    """Root of the mean square over time."""
+    return float(np.sqrt(mean_over(t, x**2)))
+
+
+def equivalent_load(t: Scalars, P: Scalars, rate: Scalars, p: float) -> float:
+    """P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p) [N]; nan where nothing turns.
+
+    Parameters
+    ----------
+    t : (T,) [s]
+    P : (T,) load, not negative [N]
+    rate : (T,) speed of shaft against housing [rad/s]
+    p : 3 for ball bearings, 10/3 for roller bearings
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> round(equivalent_load(t, np.full(11, 50.0), np.full(11, 3.0), 3), 9)
+    50.0
+    """
+    turned = mean_over(t, np.abs(rate))
+    largest = float(P.max(initial=0.0))
+    if not turned > 0 or not largest > 0:
+        return float("nan") if not turned > 0 else 0.0
+    return float(largest * (mean_over(t, (P / largest) ** p * np.abs(rate)) / turned) ** (1 / p))
+
+
+def in_axes(x: Vectors, R: Float[np.ndarray, "T 3 3"]) -> Vectors:
+    """World vectors in the axes of a frame R."""
+    return np.asarray((x[:, None] @ R)[:, 0])
+
+
+def joint_loads(
+    scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
+) -> list[JointLoad]:
+    """Of all joints whose whole force the results tell, elastic if they have it, else that of rigid links.
+
+    Parameters
+    ----------
+    linked, motion : the scene's rigid motion at the rows of the results; None where it is not known
+    """
+    out = []
+    for name, joint in scene.joints.items():
+        for key in ("force", "rigid_force"):
+            channel, force = results.channels.get(f"joints/{name}/{key}", (None, None))
+            if channel is None or force is None or len(channel.columns) != TOLD:
+                continue
+            links = acted_links(name, joint, channel.description)
+            out.append(_load(name, joint, links, force, (linked, motion)))
+            break
+    return out
+
+
+def _load(
+    name: str, joint: Joint, links: tuple[str, str], force: Vectors,
+    moved: tuple[Linkage | None, RigidMotion | None],
+) -> JointLoad:  # fmt: skip
+    linked, motion = moved
+    if linked is None or motion is None:
+        return JointLoad(name, joint.kind, links, force)
+    one, other = (linked.bodies.index(link) for link in links)
+    inside = in_axes(force, motion.R[:, one]), in_axes(-force, motion.R[:, other])
+    rate = np.linalg.norm(motion.omega[:, one] - motion.omega[:, other], axis=1)
+    axis = joint_axis(joint) if joint.kind in HINGES else None
+    return JointLoad(name, joint.kind, links, force, inside, axis, rate)
+
+
+def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
+    """The link that a joint's force acts on, and the one that it is from, as its channel's description says.
+
+    Raises
+    ------
+    ValueError
+        It says neither.
+    """
+    one, other = joint.links
+    for on, by in ((one, other), (other, one)):
+        starts = [
+            f"force of joint {name} on {a} {on} from {b}{by}"
+            for a in ("link", "slider")
+            for b in ("", "slider ")
+        ]
+        if any(
+            description == start or description.startswith((f"{start} ", f"{start};")) for start in starts
+        ):
+            return on, by
+    raise ValueError(f"joint {name}: no link is said that the force acts on, in {description!r}")
+
+
+def drive_loads(
+    scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
+) -> list[DriveLoad]:
+    """Of all drives whose effort the results tell, elastic if they have it, else that of rigid links."""
+    out = []
+    for name in scene.driven_joints:
+        several = f"{name}/" if len(scene.driven_joints) > 1 else ""
+        keys = [f"drive/{several}{rigid}{what}" for rigid in ("", "rigid_") for what in ("torque", "force")]
+        found = next((results.channels[key] for key in keys if key in results.channels), None)
+        if found is not None:
+            rate = (
+                None if linked is None or motion is None else joint_rate(scene.joints[name], linked, motion)
+            )
+            out.append(DriveLoad(name, found[0].unit, found[1][:, 0], rate))
+    return out
+
+
+def joint_rate(joint: Joint, linked: Linkage, motion: RigidMotion) -> Scalars:
+    """(T,) rate of a hinge's angle [rad/s] or a slide's travel [m/s], of the link that moves against the other."""
+    one, other = (linked.bodies.index(link) for link in moving_pair(joint))
+    axis = motion.R[:, other] @ joint_axis(joint)
+    if joint.kind != "prismatic":
+        return np.asarray(((motion.omega[:, one] - motion.omega[:, other]) * axis).sum(axis=1))
+    arm = motion.R[:, one] @ np.asarray(joint.at)
+    at = motion.p[:, one] + arm
+    v = motion.v[:, one] + cross(motion.omega[:, one], arm)
+    v = v - motion.v[:, other] - cross(motion.omega[:, other], at - motion.p[:, other])
+    return np.asarray((v * axis).sum(axis=1))
+
+
+def last_turns(results: Results, turns: float | None) -> Bool[np.ndarray, " T"]:
+    """The rows of the last so many turns of the drive; all, where it is not said."""
+    if turns is None:
+        return np.ones(len(results.time), bool)
+    gone = np.abs(results.angle - results.angle[-1])
+    later = np.cumsum((gone > 2 * np.pi * turns * (1 + 1e-9))[::-1])[::-1] == 0
+    return np.asarray(later)
+
+
+def facing(axis: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Unit vectors e1, e2 with e1 × e2 = axis, e1 as near to x as can be, about x itself to y."""
+    start = np.eye(3)[1 if abs(axis[0]) > 1 - 1e-6 else 0]
+    e1 = start - (start @ axis) * axis
+    e1 /= np.linalg.norm(e1)
+    return e1, np.cross(axis, e1)
+
+
+def summary(load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> Mapping[str, float]:
+    """Peak with its time and drive, mean and rms of the magnitude, largest axial and radial load, equivalent loads."""
+    t, size = results.time[rows], load.magnitude[rows]
+    k, none = int(size.argmax()), float("nan")
+    bearing, axial = load.bearing, load.axial
+    out = {
+        "peak [N]": float(size[k]), "time of peak [s]": float(t[k]),
+        f"drive at peak [{results.drive.unit}]": float(results.angle[rows][k]),
+        "mean [N]": mean_over(t, size), "rms [N]": rms(t, size),
+        "largest bearing load [N]": none if bearing is None else float(bearing[rows].max()),
+        "largest axial [N]": none if axial is None else float(np.abs(axial[rows]).max()),
+    }  # fmt: skip
+    for name, p in (("ball", BALL), ("roller", ROLLER)):
+        known = bearing is not None and load.rate is not None
+        P = equivalent_load(t, bearing[rows], load.rate[rows], p) if known else none  # type: ignore[index]
+        out[f"equivalent, {name} bearing [N]"] = P
+    return out
+
+
+def drive_summary(load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> Mapping[str, float]:
+    """Largest effort with its time and drive, rms, mean; largest, mean and rms power."""
+    t, effort = results.time[rows], load.effort[rows]
+    k, none = int(np.abs(effort).argmax()), float("nan")
+    power = None if load.power is None else load.power[rows]
+    return {
+        f"largest [{load.unit}]": float(effort[k]), "time of largest [s]": float(t[k]),
+        f"drive at largest [{results.drive.unit}]": float(results.angle[rows][k]),
+        f"mean [{load.unit}]": mean_over(t, effort), f"rms [{load.unit}]": rms(t, effort),
+        "largest power [W]": none if power is None else float(power[np.abs(power).argmax()]),
+        "mean power [W]": none if power is None else mean_over(t, power),
+        "rms power [W]": none if power is None else rms(t, power),
+    }  # fmt: skip
