@@ -16,6 +16,7 @@ from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
+from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.cost import factor_words
 from kedfem.dynamics.levels import level_steps
@@ -61,6 +62,7 @@ class Run:
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     sizes : plain sizes of the scene, for a look at its units
     step : what is known of its step's error
+    steady : what is known of a steady motion
     """
 
     folder: FilePath
@@ -75,6 +77,7 @@ class Run:
     budget: Budget | None = None
     sizes: Sizes | None = None
     step: StepEstimate | None = None
+    steady: Steady | None = None
 
     @property
     def peaks(self) -> Mapping[str, Peak]:
@@ -149,10 +152,14 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), errors))
     notices += budget_warning(found, asked)
     step = replace(step, errors=found.step or step.errors)
+    steady = steady_of(scene, solvers)
+    notices += steady_warning(steady)
     notes = attributes(found) | step.notes | balance_notes(account.balance)
+    notes |= steady.notes if steady else {}
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
-    if why := meaningless(found, account.balance, efforts.unworked, bool(scene.analysis.stiffening)):
+    why = meaningless(found, account.balance, efforts.unworked, bool(scene.analysis.stiffening))
+    if why := unstable(steady) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
     peak = highest(results.peaks)
@@ -165,7 +172,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     add_account(folder / "results.h5", notices, clock.seconds)
     results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
-               account.balance, found, plain, step)  # fmt: skip
+               account.balance, found, plain, step, steady)  # fmt: skip
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:

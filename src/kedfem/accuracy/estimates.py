@@ -155,6 +155,8 @@ def spanned(scene: Scene, model: Model) -> Scene:
     elements = scene.springs or scene.limits
     compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not elements
     most = SPAN if compiled else SLOW
+    if scene.analysis.kind == "steady":
+        return with_analysis(scene, stability=False)
     if grid.steps <= most:
         return scene
     return with_analysis(

@@ -90,7 +90,8 @@ class Plan:
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     """The plan of a scene that leaves something open; None of one that asks for plain defaults.
 
-    Of solid and plane links that move freely the step alone: they are not reduced; each trial is as dear as a run.
+    Of solid and plane links that move freely the step alone: they are not reduced; each trial is as dear as a run. The
+    plan of a steady motion is that of the motion from the start on, over its period.
 
     Raises
     ------
@@ -99,6 +100,9 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     """
     if scene.analysis.accuracy == "quick" or not anything_open(scene):
         return None
+    if scene.analysis.kind == "steady":
+        plan = plan_for(with_analysis(scene, kind="transient"), stage)
+        return plan and replace(plan, scene=with_analysis(plan.scene, kind="steady"))
     if not scene.driven_joints and not beams_only(scene) and not open_step(scene):
         return None
     return planned(scene, stage)

@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.accuracy.variants import shortened
+from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.bases import bases
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
@@ -141,7 +141,7 @@ def reduced(
         ]
 
     stage("error of the reduction")
-    beginning = replace(full, scene=shortened(full.scene))
+    beginning = replace(full, scene=shortened(with_analysis(full.scene, kind="transient")))
     Q, estimate = _settled(beginning, parts, first, tolerance, chosen, given)
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)

@@ -133,8 +133,9 @@ def leveled(
     scenes, done = level_scenes(scene), marks.done
     begins = any(mark.state is None for mark in marks.levels)
     start = started(scenes[-1], linkage, along, model, solvers[-1]) if begins else None
-    for mark in marks.levels:
-        mark.start = start
+    for mark, own, solver in zip(marks.levels, scenes, solvers, strict=True):
+        apart = begins and scene.analysis.kind == "steady" and solver is not solvers[-1]
+        mark.start = started(own, linkage, along, model, solver) if apart else start
     schemes = [generalised_alpha(time_grid(each).step, each.analysis.rho_inf) for each in scenes]
     streams = [
         _Stream(transient(each, linkage, along, model, solver, mark), scheme, mark)

@@ -23,6 +23,8 @@ from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
+from kedfem.dynamics.system.period_map import PeriodMap
+from kedfem.dynamics.system.periodic import periodic
 from kedfem.dynamics.system.start import from_links
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
@@ -134,7 +136,10 @@ def _corotational(
 
     state, since, length = mark.state, mark.step, block_length(model)
     if state is None:
-        state = mark.start if isinstance(mark.start, State) else solver.begin(motion_at)
+        begins = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
+        if not isinstance(begins, State):
+            raise ValueError("a march must begin with a state of the system, got states of links")
+        state = begins
         drawn = motion_at(np.zeros(1))
         links, exerted = solver.first(state, forcings(model, drawn), motion_at)
         yield Block(0, drawn, links, exerted=exerted)
@@ -157,13 +162,29 @@ def _corotational(
 
 
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
-    """How the elastic motion begins: at rest, or quasi-static.
+    """How the elastic motion begins: at rest, quasi-static, or with the steady state of the solver's own steps.
 
     Raises
     ------
     SolveError
-        If no quasi-static deflection is found.
+        If no quasi-static deflection is found, or no steady state.
     """
+    start = _begun(scene, linkage, along, model, solver)
+    if scene.analysis.kind != "steady":
+        return start
+    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
+        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
+
+    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
+        return rigid_motion(linkage, along, t, path_parameter(scene, t))
+
+    over = PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
+    solver.steady = periodic(over, scene.analysis.stability, solver.watch)
+    return solver.steady.state
+
+
+def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
+    """As `started`, of a motion that begins as it is told to; of a steady one the search for it begins there."""
     if isinstance(solver, CorotationalSteps):
         return solver.begin(lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)))
     if not isinstance(solver, SystemSteps):

@@ -11,6 +11,7 @@ from kedfem.errors import MotionError
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
 from kedfem.motion.linkage import GROUND, passive_rows, scene_centre, scene_size
 from kedfem.motion.newton import cross_matrix, rotation
+from kedfem.motion.period import over_one_period
 from kedfem.motion.redrawn import Shift, redrawn
 from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import Poses, features, jacobian, residuals
@@ -41,7 +42,21 @@ class Assembly:
 
 
 def assembled(scene: Scene) -> tuple[Scene, Assembly]:
-    """A scene with all joints closed, and what that took; the scene itself where no links are drawn apart.
+    """A scene as it is analysed: with all joints closed, and what that took; of a steady motion over its period.
+
+    Raises
+    ------
+    MotionError
+        Joints that cannot be closed.
+    SceneError
+        A steady motion that has no period.
+    """
+    closed, assembly = _closed(scene)
+    return over_one_period(closed), assembly
+
+
+def _closed(scene: Scene) -> tuple[Scene, Assembly]:
+    """A scene with all joints closed; the scene itself where no links are drawn apart.
 
     Links are moved as rigid bodies, with all that is on them: of all motions that close the rows of joints and couplings
     those of the least Σ |d|²/size² + |θ|², d the displacement of the mean of a link's joints, θ its turn. The drive's

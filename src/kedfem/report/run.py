@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.accuracy.error_budget import Budget, percent
+from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
 from kedfem.report.plan import chosen_table
@@ -40,7 +41,22 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         spent.add_row(stage, f"{seconds:.2f}")
     errors = [] if done.budget is None else [budget_table(done.budget)]
     stress = [stress_table(scene, done.peaks)] if done.peaks else []
-    return [*before, table, *stress, *errors, *balance, spent]
+    steady = [] if done.steady is None else [steady_table(done.steady)]
+    return [*before, table, *stress, *steady, *errors, *balance, spent]
+
+
+def steady_table(found: Steady) -> Table:
+    """Period, and how vibrations about a steady motion die away."""
+    table = Table(title="Steady motion", show_header=False)
+    n = f"{found.revolutions:.6g}"
+    turns = f", {n} revolution{'s' * (n != '1')} of the drive" if found.revolutions else ""
+    table.add_row("period", f"{with_prefix(found.period, 's')}{turns}")
+    table.add_row("found in", f"{found.marches} marches over a period; the last leaves {found.residual:.1g}")
+    if found.growth is not None:
+        left = f"{100 * found.growth:.4g} % is left after a period"
+        settles = f", 1 % after {found.periods:,} of them" if found.periods and found.periods > 1 else ""
+        table.add_row("least damped vibration", f"{left}{settles}{': unstable' * found.unstable}")
+    return table
 
 
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:

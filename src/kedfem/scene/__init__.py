@@ -34,7 +34,7 @@ from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSecti
 from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
 from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
 from kedfem.scene.stops import AngleLimit, Limit, TravelLimit
-from kedfem.scene.timing import TimeGrid, time_grid, turn_steps
+from kedfem.scene.timing import TimeGrid, cycle, time_grid, turn_steps
 
 __all__ = [
     "DIRECTED",
@@ -101,6 +101,7 @@ __all__ = [
     "by_constraint_equations",
     "corotational",
     "corotational_links",
+    "cycle",
     "drive_angle",
     "factor_table",
     "inertia_tensor",

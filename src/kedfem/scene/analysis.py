@@ -39,6 +39,12 @@ def accuracy_or_quick(value: object) -> float | str:
 class Analysis(Record):
     """How long, in which steps, from which state."""
 
+    kind: Literal["transient", "steady"] = "transient"
+    """transient: the motion from the start on; steady: the motion that repeats itself with the drive and the loads, found
+    directly and written over one period, which is as many turns of the drive as it takes, or `end_time` where the
+    drive does not turn at a constant speed, or there are several"""
+    stability: StrictBool = True
+    """of a steady motion: whether it is found out by how much vibrations about it grow or fall in a period"""
     revolutions: Positive | None = None
     """revolutions of the drive; for drives that turn at a constant speed, or speed up to one"""
     end_time: PositiveTime | None = None

@@ -152,6 +152,15 @@ REFUSALS = (
         'be combined with frames = "co-rotational"', "rigid-body ones begin as the drive moves them",
         "{given} with rigid-body ones",
         'take frames = "co-rotational"') for key in ("initial_speeds", "initial_motions")),
+    Refusal("analysis", {"kind": ("steady",), "drive": ("none",)}, "{where}.kind", "be combined with a drive as 'steady'",
+        "a mechanism that moves freely has no period", "'steady' without one", "give a drive, or take 'transient'"),
+    Refusal("analysis", {"kind": ("steady",), "solver": ("monolithic",)}, "{where}.solver", "be 'condensed' for a steady "
+        "motion", "the monolithic solver marches from a start", "'monolithic'", "leave it out"),
+    Refusal("analysis", {"kind": ("steady",), "rho_inf": ("1",)}, "{where}.rho_inf", "be less than 1 for a steady motion",
+        "vibrations that a step cannot resolve would have no end", "1", "take 0.95"),
+    *(Refusal("analysis", {"kind": ("steady",), "start": (key,)}, f"{{where}}.{key}", "be left out of a steady motion",
+        "which does not depend on how it began", "{given}", "leave it out, or take kind = 'transient'")
+        for key in ("initial_speeds", "initial_motions", "initial_deflection")),
     Refusal("analysis", {"start": ("initial_deflection",), "stiffening": ("on",)}, "{where}.initial_deflection",
         "not be combined with analysis.stiffening", "whose start knows no forces that are let go", "{given}",
         'take frames = "co-rotational", which know all of it'),

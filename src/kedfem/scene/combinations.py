@@ -143,6 +143,7 @@ def analysis(parts: Parts) -> Iterator[Told]:
     if parts.limits:
         yield "analysis", limited(parts), {**words, "elements": shown(list(parts.limits))}
     yield "analysis", {"drive": ""}, words
+    yield from steady(parts, words)
     if entry.word("frames"):
         yield "analysis", only(frames=str(entry.word("frames"))), words
     if entry.word("initial"):
@@ -166,6 +167,23 @@ def analysis(parts: Parts) -> Iterator[Told]:
         words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
         words["key"] = "ratio" if damping.has("ratio") else "alpha"
         yield "damping", {"damping": "in proportion to mass"}, words
+
+
+def steady(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
+    """What a steady motion is combined with."""
+    entry = parts.analysis
+    if entry.word("kind") != "steady":
+        return
+    facts = only(kind="steady")
+    yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, words
+    for key in ("initial_speeds", "initial_motions", "initial_deflection"):
+        given = entry.raw.get(key)
+        if isinstance(given, Mapping) and given:
+            yield (
+                "analysis",
+                {**facts, "start": key, "drive": "", "rho_inf": ""},
+                {**words, "given": shown(list(given))},
+            )
 
 
 def limited(parts: Parts) -> dict[str, str]:

@@ -39,7 +39,8 @@ def options(hint: Any) -> list[Any]:
 def kind_of(model: type[BaseModel]) -> str | None:
     """The word in the `kind` key of a record that is one of several."""
     field = model.model_fields.get("kind")
-    return field.default if field is not None and isinstance(field.default, str) else None
+    one = field is not None and len(get_args(field.annotation)) == 1
+    return str(field.default) if field is not None and one and isinstance(field.default, str) else None
 
 
 def length_of(hint: Any) -> int:

@@ -13,7 +13,7 @@ from kedfem.scene.laws import table_noise
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
 from kedfem.scene.shapes import Bar, Cad, MeshFile, Part
-from kedfem.scene.timing import turning_speed
+from kedfem.scene.timing import cycle, turning_speed
 
 ROUGH = 0.05  # share of a table's acceleration that may be noise
 
@@ -70,7 +70,7 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
         return
     if analysis.has("revolutions") and analysis.has("end_time"):
         yield analysis.fault("revolutions", "cannot be combined with end_time, got both")
-    if not analysis.has("revolutions") and not analysis.has("end_time"):
+    if not analysis.has("revolutions") and not analysis.has("end_time") and not _repeats(parts):
         key, wanted = (
             ("revolutions", "is required, or end_time [s]")
             if parts.driven
@@ -90,6 +90,13 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
     elif drives:
         got = f"{len(parts.all_drives)} drives"
         yield from steps_faults(parts, got, "one drive that goes on turning", "several drives")
+
+
+def _repeats(parts: Parts) -> bool:
+    """Whether a steady motion is asked for of a drive whose law says after which time it repeats itself."""
+    drives = [drive.record for drive in parts.all_drives]
+    known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
+    return parts.analysis.word("kind") == "steady" and known
 
 
 def open_fidelity_faults(parts: Parts) -> Iterator[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kedfem.scene.drives import ConstantSpeed, MotionLaw, Ramp
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp
 from kedfem.scene.laws import drive_angle
 
 if TYPE_CHECKING:
@@ -47,6 +47,18 @@ def scene_speed(scene: Scene) -> float:
     return 0.0 if slides else turning_speed(scene.motion)
 
 
+def cycle(motion: MotionLaw | None) -> float | None:
+    """Time [s] after which a drive's law repeats itself, a whole turn apart or not; None if it does not.
+
+    A ramp repeats itself once it has sped up.
+    """
+    if isinstance(motion, (ConstantSpeed, Ramp)):
+        return 2.0 * math.pi / abs(motion.speed) if motion.speed else None
+    if isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is not None:
+        return motion.rise + motion.dwell + motion.return_time + motion.dwell_after
+    return None
+
+
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
     """Time [s] at which a drive that goes on turning has made so many turns."""
     angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
@@ -68,14 +80,25 @@ def time_grid(scene: Scene) -> TimeGrid:
     """Step and number of steps of a scene's analysis.
 
     With ``steps_per_revolution`` the step is the turn at the drive's final speed, divided, and the last step may
-    pass the end; ``step`` is shortened so that a whole number reaches the end.
+    pass the end; ``step`` is shortened so that a whole number reaches the end. A steady motion has an even number of
+    steps, shortened so.
     """
     analysis, motion = scene.analysis, scene.motion
+    steady = analysis.kind == "steady"
     end = analysis.end_time
     if motion is not None and analysis.revolutions is not None:
         end = time_of_revolutions(motion, analysis.revolutions)
+    if end is None and steady:
+        end = cycle(motion)
     if end is None:
         raise ValueError("an analysis needs turns or an end time")
+    grid = _grid(scene, end)
+    return TimeGrid(end / (steps := grid.steps + grid.steps % 2), steps) if steady else grid
+
+
+def _grid(scene: Scene, end: float) -> TimeGrid:
+    """Equal steps up to an end, or a little beyond."""
+    analysis = scene.analysis
     if analysis.step is not None:
         steps = max(1, math.ceil(end / analysis.step - 1e-9))
         return TimeGrid(end / steps, steps)

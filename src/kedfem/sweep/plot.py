@@ -15,6 +15,7 @@ PANELS = (
     ("joints/", "N", "joint force (N)", 1.0),
     ("drive/", "N m", "drive torque (N m)", 1.0),
     ("drive/", "N", "drive force (N)", 1.0),
+    ("steady/", "1", "vibrations:\nleft after a period", 1.0),
 )
 
 

@@ -25,6 +25,7 @@ from kedfem.sweep.keys import with_values
 
 SETTLED = 0.01  # what the last two turns may differ by
 STRESS = "stress/{}/peak"
+GROWTH = "steady/growth"
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,14 +182,19 @@ def _ran(job: Job) -> Row:
     for name, peak in run.peaks.items():
         found[STRESS.format(name)] = ("Pa", (peak.stress, math.nan, math.nan, peak.time))
     turn = turn_steps(scene)
+    if run.steady is not None:
+        if run.steady.growth is not None:
+            found[GROWTH] = ("1", (run.steady.growth, math.nan, math.nan, math.nan))
+        return Row(results.status, results.reason, run.steady.residual, extremes=found)
     settled = change(results, turn * time_grid(scene).step) if turn else math.nan
     return Row(results.status, results.reason, settled, extremes=found)
 
 
 def _since(scene: Scene, last: float) -> float:
-    """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns."""
+    """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns
+    and of a steady motion."""
     turn, grid = turn_steps(scene), time_grid(scene)
-    if turn is None:
+    if turn is None or scene.analysis.kind == "steady":
         return -0.5 * grid.step
     if last * turn > grid.steps + 0.5:
         said = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"

@@ -28,6 +28,7 @@ from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.internal import own
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, displacements, march, ready
+from kedfem.dynamics.system.periodic import Periodic, Watch
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
@@ -70,6 +71,8 @@ class CorotationalSteps:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme, tolerance)
         self.factorisations, self.eased, self.sweeps = len(self.ready.parts), 0, 0
+        self.steady: Periodic | None = None
+        self.watch: Watch = lambda marched: None
         points = system.model.joints is not model.joints  # of force elements, beside those of joints
         self.elements = [f"motors.{name}" for name in scene.motors]
         self.elements += [f"springs.{name}" for name in scene.springs]

@@ -27,6 +27,7 @@ from kedfem.dynamics.system.instant import Motion
 from kedfem.dynamics.system.literal import Now
 from kedfem.dynamics.system.literal_steps import literal_march, oracle
 from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.periodic import Periodic, Watch
 from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
@@ -107,6 +108,8 @@ class SystemSteps:
     ) -> None:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme)
+        self.steady: Periodic | None = None
+        self.watch: Watch = lambda marched: None
         self.oracle = oracle(self.ready) if literal else None
         self.stiffening = system.stiffening
         self.factorisations = len(self.ready.parts)

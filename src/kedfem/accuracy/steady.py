@@ -1,0 +1,102 @@
+"""What a run of a steady motion knows of it: its period, how it was found, and whether vibrations about it die away."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, log
+
+import numpy as np
+
+from kedfem.dynamics.levels import level_weights
+from kedfem.dynamics.system.periodic import Periodic
+from kedfem.dynamics.transient import Steps
+from kedfem.scene import Scene, time_grid, turn_steps
+
+GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
+SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
+SETTLED = 0.01  # what is left of a vibration that has died away
+
+
+@dataclass(frozen=True, slots=True)
+class Steady:
+    """A steady motion.
+
+    period : [s]; revolutions : of the drive in it, 0 of one that does not go on turning
+    marches : periods that were marched to find it, at all levels in time
+    residual : what a period leaves of the size of its state, at worst of all levels
+    growth : by which a period multiplies the least damped vibration, combined of all levels; None if not asked for
+    certain : whether that was found to the tolerance
+    """
+
+    period: float
+    revolutions: float
+    marches: int
+    residual: float
+    growth: float | None
+    certain: bool
+
+    @property
+    def unstable(self) -> bool:
+        """Whether a vibration grows from period to period."""
+        return self.growth is not None and self.growth > 1 + GROWS
+
+    @property
+    def periods(self) -> int | None:
+        """After which a vibration has fallen to SETTLED; None where none falls, or it is not known."""
+        if self.growth is None or self.growth >= 1 - GROWS:
+            return None
+        return max(1, ceil(log(SETTLED) / log(max(self.growth, 1e-300))))
+
+    @property
+    def notes(self) -> dict[str, str | float]:
+        """As a results file keeps them."""
+        known = {} if self.growth is None else {"steady growth in a period": self.growth}
+        return {
+            "steady period [s]": self.period, "steady revolutions": self.revolutions,
+            "steady marches": float(self.marches), "steady residual": self.residual, **known,
+        }  # fmt: skip
+
+
+def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
+    """What the solvers of all levels found; None of another motion."""
+    found = [x for x in (getattr(each, "steady", None) for each in solvers) if isinstance(x, Periodic)]
+    if not found:
+        return None
+    turn, grid, growth = turn_steps(scene), time_grid(scene), None
+    if all(len(each.multipliers) for each in found):
+        weights = level_weights(len(found), scene.analysis.rho_inf)
+        growth = float(np.exp(weights @ np.log([max(each.growth, 1e-300) for each in found])))
+    return Steady(
+        found[0].period, grid.steps / turn if turn else 0.0, sum(each.marches for each in found),
+        max(each.residual for each in found), growth, all(each.certain for each in found),
+    )  # fmt: skip
+
+
+def unstable(steady: Steady | None) -> str:
+    """Why a machine does not run as its steady motion says; empty if it does, or nothing is known of that."""
+    if steady is None or steady.growth is None or not steady.unstable:
+        return ""
+    return (
+        f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
+        f"of {steady.period:.4g} s, until something else limits it"
+    )
+
+
+def steady_warning(steady: Steady | None) -> tuple[str, ...]:
+    """What the user should know."""
+    if steady is None or steady.growth is None:
+        return ()
+    if why := unstable(steady):
+        return (f"{why}; take another speed, or more damping outside the moving links",)
+    out = []
+    if steady.growth > SLOW:
+        left = f"{steady.periods:,} periods" if steady.periods else "ever"
+        out.append(
+            f"steady motion: vibrations about it hardly die away ({100 * (1 - steady.growth):.2g} % in a period): a "
+            f"machine would ring for {left}; give the scene its damping"
+        )
+    if not steady.certain:
+        out.append(
+            "steady motion: how fast vibrations about it die away is known roughly only "
+            f"(about {100 * steady.growth:.3g} % is left after a period): many are damped alike"
+        )
+    return tuple(out)

@@ -1,0 +1,163 @@
+"""The map of a period: the state with which a march begins, as a vector, to that with which it ends.
+
+All that a step remembers is one vector, but for Anderson acceleration's memory, which only saves iterations, and the
+time. The size of a vector is √(u K u + ω² u M u + v M v), ω = 2π/T: everything else of a state follows from displacements
+and rates, but for what numerical damping makes vanish.
+
+Sums of states of a linear system are states of it. With co-rotational frames what follows from displacements by other
+than linear functions is found anew (`possible`): strains, how far points have turned, coordinates. A march would
+keep what these are off by for ever.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.system.arrays import State, copied
+from kedfem.dynamics.system.instant import TURN, Flat, Instant, Motion, turned
+from kedfem.dynamics.system.internal import own, remembered
+from kedfem.dynamics.system.march import Ready, march
+from kedfem.motion.rigid import RigidMotion
+
+CARRIED = (
+    "u", "v", "a", "F", "f", "damped", "momentum", "seen", "Q", "angle", "strain", "direction", "turn", "port_force",
+    "z", "e", "turned", "bearing", "multiplier",
+)  # fmt: skip
+BLOW, SHORTEST = (
+    0.05,
+    8.0,
+)  # of the period, and steps at least, that a blow lasts: it excites what these resolve
+ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole turns
+
+
+class PeriodMap:
+    """A march over one period, again and again.
+
+    Parameters
+    ----------
+    start : any state of the system, where a search begins
+    period : whole number of steps [s]
+    length : time points whose history is held at once
+
+    marches : periods so far; largest : largest energy of deformation in the last of them, twice [J]
+    """
+
+    def __init__(self, of: Ready, start: State, motion_at: Motion, period: float, length: int) -> None:
+        self.of, self.motion_at, self.linear = of, motion_at, of.c.single
+        self.marches, self.largest, self.start = 0, 0.0, copied(start)
+        self._steps = steps = round(period / of.c.h)
+        t = of.c.h * np.arange(1, steps + 1)
+        self._parts = [motion_at(t[k : k + length]) for k in range(0, steps, length)]
+        sizes = [getattr(start, name).size for name in CARRIED]
+        ends = np.concatenate([[0], np.cumsum(sizes)])
+        self._at = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(CARRIED)}
+        self.period, self._omega = period, TURN / period
+        self._now = Instant(of, motion_at, 0.0)
+
+    def vector(self, state: State) -> Flat:
+        """A state as a vector."""
+        return np.concatenate([getattr(state, name).ravel() for name in CARRIED])
+
+    def state(self, x: Flat) -> State:
+        """A vector as the state at the beginning of the period."""
+        like = copied(self.start)
+        for name in CARRIED:
+            getattr(like, name)[...] = x[self._at[name]].reshape(getattr(like, name).shape)
+        for name in ("time", "pairs", "products", "last", "counts"):
+            getattr(like, name)[...] = 0.0
+        return like
+
+    def __call__(self, x: Flat, blow: Sequence[Float[np.ndarray, "n d"]] | None = None) -> Flat:
+        """The vector after a period.
+
+        Parameters
+        ----------
+        blow : forces on all links, world components [N], that swell up and down at the beginning of the period
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        state, self.largest, done = self.state(x), 0.0, 0
+        between = None if self.linear else self.motion_at
+        for part in self._parts:
+            loads = None if blow is None else self._struck(part, blow, done)
+            state, found = march(self.of, state, part, between, loads=loads)
+            self.largest = max(self.largest, 2 * float(found.energy.sum(axis=1).max()))
+            done += len(part.t)
+        self.marches += 1
+        return self.vector(state)
+
+    def _struck(
+        self, part: RigidMotion, blow: Sequence[Float[np.ndarray, "n d"]], done: int
+    ) -> list[Float[np.ndarray, "T n d"]]:
+        over = max(BLOW * self._steps, SHORTEST)
+        pulse = np.where((k := done + 1 + np.arange(len(part.t))) < over, np.sin(np.pi * k / over) ** 2, 0.0)
+        every = zip(forcings(self.of.system.model, part), blow, strict=True)
+        return [each.F + pulse[:, None, None] * more for each, more in every]
+
+    def change(self, after: Flat, before: Flat) -> Flat:
+        """The difference of two vectors; angles that have gone on by whole turns are the same."""
+        out = np.asarray(after - before)
+        for name in ANGLES:
+            here = self._at[name]
+            out[here] -= TURN * np.round(out[here] / TURN)
+        return out
+
+    def possible(self, x: Flat) -> Flat:
+        """A vector whose displacements were added up, with what follows from them."""
+        if self.linear:
+            return x
+        state, was, now = self.state(x), self.state(x), self._now
+        for k, each in enumerate(now.inside(state.u, state.v)):
+            remembered(self.of, k, each, state)
+        state.f[:], state.damped[:], state.strain[1:] = was.f, was.damped, was.strain[1:]
+        for first, last in zip(self.of.bodies.at, self.of.bodies.at[1:], strict=False):
+            rates = slice(2 * first + last, 3 * last)  # of (3, N) per body: all but the first N
+            state.seen[rates] = was.seen[rates]
+        z = now.interface(state.u)
+        state.z[0, now.always.number] = z
+        state.e[0] = now.coordinates(np.stack([z, 0 * z, 0 * z]))[0]
+        state.turned[:] = turned(now, z)
+        return self.vector(state)
+
+    def products(self, basis: Sequence[Flat], x: Flat) -> Flat:
+        """u K u₁ + ω² u M u₁ + v M v₁ of vectors with another [J]; links are as stiff as they are drawn."""
+        u, _, Mu, Mv = self._moving(x)
+        dual = self._forced(u) + self._omega**2 * Mu
+        return np.array([y[self._at["u"]] @ dual + y[self._at["v"]] @ Mv for y in basis])
+
+    def size(self, x: Flat) -> float:
+        """√ of twice the energy of a vector [J^½]."""
+        return float(np.sqrt(max(self.products([x], x)[0], 0.0)))
+
+    def frequency(self, *shapes: Flat) -> float:
+        """At which a vibration of these shapes swings, from its energies [Hz]."""
+        moving = [self._moving(x) for x in shapes]
+        strained = sum(float(u @ self._forced(u)) for u, _, _, _ in moving)
+        moved = sum(float(u @ Mu) for u, _, Mu, _ in moving)
+        return float(np.sqrt(max(strained, 0.0) / moved) / TURN) if moved > 0.0 else 0.0
+
+    def _forced(self, u: Flat) -> Flat:
+        """R K0 Rᵀ u of all bodies, R at the beginning of the period."""
+        out = np.zeros_like(u)
+        for k, (K, R) in enumerate(zip(self._now.always.still.K, self._now.R, strict=True)):
+            d, here = int(self.of.bodies.components[k]), own(self.of, k)
+            turn = R[:d, :d]
+            out[here] = (turn @ (K @ (turn.T @ u[here].reshape(d, -1)).ravel()).reshape(d, -1)).ravel()
+        return out
+
+    def _moving(self, x: Flat) -> tuple[Flat, Flat, Flat, Flat]:
+        """u, v, M u, M v; coordinates of dense bodies have unit mass."""
+        u, v, m = (x[self._at[name]] for name in ("u", "v", "momentum"))
+        Mu, Mv, bodies = u.copy(), v.copy(), self.of.bodies
+        for k in np.flatnonzero(bodies.dense == 0):
+            first, last = int(bodies.at[k]), int(bodies.at[k + 1])
+            N = last - first
+            Mu[first:last], Mv[first:last] = (
+                m[3 * first : 3 * first + N],
+                m[3 * first + N : 3 * first + 2 * N],
+            )
+        return u, v, Mu, Mv

@@ -1,0 +1,174 @@
+"""The period of a motion: the time after which linkage, drives and loads are where they were."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from kedfem.errors import SceneError
+from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.path import MOST_TURNS, Path, path
+from kedfem.scene import (
+    ConstantSpeed,
+    Drive,
+    Factor,
+    MotionLaw,
+    Ramp,
+    Scene,
+    Table,
+    cycle,
+    drive_angle,
+    path_parameter,
+)
+
+WHOLE = 1e-9  # of a period: how near whole multiples must be
+SAME = 1e-6  # of a table's range: how near its end must be to its beginning
+
+
+def over_one_period(scene: Scene) -> Scene:
+    """A scene of a steady motion with the end of its analysis after one period; any other scene as it is.
+
+    A drive that speeds up turns at its final speed: the steady motion is that after it has.
+
+    Raises
+    ------
+    SceneError
+        Where something does not repeat itself, or the scene states another end.
+    MotionError
+    """
+    if scene.analysis.kind != "steady":
+        return scene
+    scene = _sped_up(scene)
+    base = cycle(scene.motion) or scene.analysis.end_time
+    if base is None:
+        raise SceneError("analysis.end_time: is required [s], the period of the steady motion, got nothing")
+    rigid = linkage(scene)
+    count, time = _periods(scene, rigid, base)
+    stated, turns = scene.analysis.revolutions, isinstance(scene.motion, ConstantSpeed) and _turns(scene)
+    if stated is not None and abs(stated - count) > WHOLE * count:
+        said = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
+        raise SceneError(f"analysis.revolutions: {said}")
+    end = scene.analysis.end_time
+    if end is not None and abs(end - time) > WHOLE * time:
+        said = f"must be left out, or the period of the steady motion, {time:.9g} [s], got {end:.9g}"
+        raise SceneError(f"analysis.end_time: {said}")
+    keys = (
+        {"revolutions": float(count), "end_time": None} if turns else {"revolutions": None, "end_time": time}
+    )
+    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=keys)})
+
+
+def _sped_up(scene: Scene) -> Scene:
+    """The scene with constant speeds in place of ramps to them."""
+
+    def later(drive: Drive) -> Drive:
+        ramp = drive.motion
+        if not isinstance(ramp, Ramp):
+            return drive
+        return drive.model_copy(update={"motion": ConstantSpeed(speed=ramp.speed)})
+
+    drives = {name: later(drive) for name, drive in scene.drives.items()}
+    return scene.model_copy(update={"drive": scene.drive and later(scene.drive), "drives": drives})
+
+
+def _turns(scene: Scene) -> bool:
+    return all(scene.joints[name].kind != "prismatic" for name in scene.driven_joints)
+
+
+def _periods(scene: Scene, rigid: Linkage, base: float) -> tuple[int, float]:
+    """How many times the base the period is, and the period [s]."""
+    faults = list(_never(scene))
+    if faults:
+        raise SceneError(faults)
+    along = path(rigid, *_range(scene, base))
+    reasons: list[str] = []
+    for count in range(1, MOST_TURNS + 1):
+        reasons = list(_open(scene, along, count * base))
+        if not reasons:
+            return count, count * base
+        if cycle(scene.motion) is None:
+            break
+    raise SceneError(reasons)
+
+
+def _range(scene: Scene, base: float) -> tuple[float, float]:
+    """Least and greatest place on the linkage's path in as many periods as are tried; it ends where it returns."""
+    if cycle(scene.motion) is None:
+        most = base if len(scene.driven_joints) < 2 else (MOST_TURNS + 1) * base
+    else:
+        most = (MOST_TURNS + 1) * base if isinstance(scene.motion, ConstantSpeed) else base
+    tau = path_parameter(scene, np.linspace(0.0, most, 64 * (1 + round(most / base))))[0]
+    return min(0.0, float(tau.min())), max(0.0, float(tau.max()))
+
+
+def _never(scene: Scene) -> Iterator[str]:
+    """What can have no period."""
+    where = "must have a period with analysis.kind = 'steady'"
+    for name, drive in scene.driven_joints.items():
+        if not isinstance(drive.motion, Table) and cycle(drive.motion) is None:
+            yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
+    for name, load in scene.loads.items():
+        factor = load.factor
+        if factor.over == "time" and factor.period is None and not _constant(factor):
+            yield f"loads.{name}.factor: {where}, got a table over time without one: give it its period"
+    for name, motor in scene.motors.items():
+        if motor.curve.over == "time" and len(set(motor.curve.value)) > 1:
+            yield f"motors.{name}: {where}, got a table over time: make it a load"
+
+
+def _constant(factor: Factor) -> bool:
+    return len(set(factor.value)) < 2
+
+
+def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
+    """What is not where it was after a time."""
+    gone = float(np.ptp(path_parameter(scene, np.array([0.0, time]))[0]))
+    laws = {name: drive.motion for name, drive in scene.driven_joints.items()}
+    for name, motion in laws.items():
+        if isinstance(motion, Table):
+            yield from _open_table(name, motion, time)
+    returned = along.periodic and _whole(gone, along.period)
+    if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, Table)):
+        yield (
+            f"analysis.kind: 'steady' must be of a linkage that returns, got one that is elsewhere after {time:.6g} s"
+        )
+    for name, load in scene.loads.items():
+        factor = load.factor
+        if _constant(factor):
+            continue
+        if factor.over == "time" and factor.period is not None and not _whole(time, factor.period):
+            yield f"loads.{name}.factor.period: must be a part of the motion's period, got {factor.period:.6g} s"
+        if factor.over == "angle" and gone:
+            if factor.period is None:
+                yield (
+                    f"loads.{name}.factor.period: is required with analysis.kind = 'steady' and a drive that goes on "
+                    "turning, got nothing"
+                )
+            elif not _whole(gone, factor.period):
+                yield (
+                    f"loads.{name}.factor.period: must be a part of the motion's period, got "
+                    f"{math.degrees(factor.period):.6g} deg"
+                )
+
+
+def _gone(motion: MotionLaw, time: float) -> bool:
+    """Whether a drive is elsewhere after a time."""
+    angle = drive_angle(motion, np.linspace(0.0, time, 65))[0]
+    return bool(abs(angle[-1] - angle[0]) > SAME * np.ptp(angle))
+
+
+def _open_table(name: str, motion: Table, time: float) -> Iterator[str]:
+    """A table of motion that does not end as it begins."""
+    angle, rate, _ = drive_angle(motion, np.linspace(0.0, time, 65))
+    for what, over in (("angle or travel", angle), ("speed", rate)):
+        if abs(over[-1] - over[0]) > SAME * np.ptp(over):
+            yield (
+                f"the drive of joint {name!r}: must end the period with the {what} with which it begins, got "
+                f"{over[0]:.6g} and {over[-1]:.6g}"
+            )
+
+
+def _whole(x: float, of: float) -> bool:
+    """Whether a number is a whole multiple of another."""
+    count = x / of
+    return round(count) != 0 and abs(count - round(count)) < WHOLE * max(1.0, abs(count))

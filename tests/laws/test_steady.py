@@ -1,0 +1,297 @@
+"""Steady motions: what a march settles to, whatever joints, links, frames, laws and drives there are; multipliers.
+
+A link that a drive turns at Ω about its own axis has constant coefficients in its frame, δ = R y:
+
+    M y'' + (2 Ω M J + C0) y' + (K0 + Ω² M J²) y = 0,   J y = ω/Ω × y
+
+so that the multipliers of a turn are exp(λ T) with the eigenvalues λ of that. In modes of the clamped link.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.steady import Steady, steady_of
+from kedfem.analysis import analyse
+from kedfem.dynamics.frozen import Frozen
+from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.system.build import system_of
+from kedfem.errors import KedfemError, SolveError
+from kedfem.links.record import mass_times
+from kedfem.motion.newton import cross_matrix
+from kedfem.motion.period import over_one_period
+from kedfem.motion.rigid import rigid_motion
+from kedfem.results import read_results
+from kedfem.scene import path_parameter, scene_from
+from tests.moving import inverted
+from tests.partners import chain
+from tests.scenes import bar, constant_speed, example, four_bar
+
+Raw = dict[str, Any]
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "oblique": (0.48, -0.6, 0.64)}
+DAMPED = {"ratio": 0.1, "frequencies": [20, 400]}
+
+
+def states(ready: Prepared) -> tuple[np.ndarray, Steady | None]:
+    """Displacements and port forces of all links over time, and what is known of the steady motion."""
+    solvers = level_steps(ready.scene, ready.model)
+    blocks = [
+        np.concatenate(
+            [np.concatenate([x.u.reshape(len(x.u), -1), 1e-9 * x.port_forces.reshape(len(x.u), -1)], axis=1)
+             for x in block.links], axis=1
+        )
+        for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers)
+    ]  # fmt: skip
+    return np.concatenate(blocks), steady_of(ready.scene, solvers)
+
+
+def steady(raw: Raw, **analysis: Any) -> tuple[Prepared, np.ndarray, Steady]:
+    """A scene as a steady motion."""
+    given = {k: v for k, v in raw["analysis"].items() if k not in ("revolutions", "end_time", "initial")}
+    scene = over_one_period(
+        scene_from({**raw, "analysis": {**given, "accuracy": "quick", "kind": "steady", **analysis}})
+    )
+    ready = meshed(scene)
+    found, of = states(ready)
+    assert of is not None
+    return ready, found, of
+
+
+def off(raw: Raw, turns: int, of: np.ndarray, ready: Prepared) -> float:
+    """What the last of some periods differs by from a steady one, of its peak, when a march begins at rest."""
+    analysis = {**ready.scene.analysis.model_dump(exclude_unset=True), "kind": "transient"}
+    span = {key: turns * analysis[key] for key in ("revolutions", "end_time") if analysis.get(key)}
+    keys = {k: v for k, v in {**analysis, **span}.items() if v is not None and v != {}}
+    keys.setdefault("accuracy", "quick")
+    marched, _ = states(meshed(scene_from({**raw, "analysis": keys})))
+    last = marched[-len(of) :]
+    return float(np.abs(last - of).max() / np.abs(of).max())
+
+
+def beams(**more: Any) -> Raw:
+    raw = example("four_bar_beams")
+    raw["analysis"] = {"accuracy": "quick", "steps_per_revolution": 180, "kind": "steady"}
+    return {**raw, "damping": DAMPED, **more}
+
+
+def planar(fidelity: str, **more: Any) -> Raw:
+    """A four-bar of steel."""
+    link = {**bar(fidelity=fidelity), **more.pop("link", {})}
+    return {
+        **four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")), "damping": DAMPED,
+        "analysis": {"steps_per_revolution": 120, "rho_inf": 0.8}, **more,
+    }  # fmt: skip
+
+
+FOUR_STROKE = {
+    "kind": "force", "link": "coupler", "at": "B", "vector": [0, -500],
+    "factor": {"over": "angle", "at": [0, 1.0, 2.0], "value": [0, 1, 0], "period": "720 deg"},
+}  # fmt: skip
+SPRING = {
+    "kind": "spring", "between": [{"link": "rocker", "at": "C"}, {"link": "ground", "at": [0.5, 0.5]}],
+    "stiffness": 2e4, "damping": 20.0,
+}  # fmt: skip
+SWING = {"kind": "cycloidal", "angle": 0.3, "rise": 0.03, "return_time": 0.03, "dwell_after": 0.02}
+
+
+def geared() -> Raw:
+    """Two arms under gravity that a pair of wheels couples 20 : 30: back after three turns of the first."""
+    arm = {"fidelity": "beam", "material": "steel"}
+    shape = {"kind": "bar", "width": 0.01, "thickness": 0.01}
+    at = {"one": 0.0, "two": 1.0}
+    return {
+        "links": {name: {**arm, "shape": {**shape, "between": [[x, 0], [x + 0.3, 0]]}} for name, x in at.items()},
+        "joints": {
+            joint: {"kind": "revolute", "links": ["ground", link], "at": [at[link], 0]}
+            for joint, link in (("A", "one"), ("B", "two"))
+        },
+        "gears": {"pair": {"joints": ["A", "B"], "teeth": [20, 30]}}, "gravity": [0, -9.81],
+        "drive": {"joint": "A", "motion": constant_speed("120 rpm")}, "damping": DAMPED,
+        "analysis": {"steps_per_revolution": 60, "rho_inf": 0.8},
+    }  # fmt: skip
+
+
+def swinging(joint: str, kinds: tuple[str, str] = ("beam", "beam")) -> Raw:
+    """A chain with a joint, whose crank swings to and fro."""
+    raw = chain(joint, kinds)
+    raw["drive"]["motion"] = SWING
+    return {**raw, "damping": DAMPED, "analysis": {"step": 5e-4, "rho_inf": 0.8}}
+
+
+CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
+    "planar beams": (beams(), {}, 12),
+    "levels in time": (beams(), {"extrapolation_levels": 2}, 12),
+    "co-rotational": (planar("beam"), {"frames": "co-rotational"}, 10),
+    "stiffening": (planar("beam"), {"stiffening": True}, 10),
+    "four strokes": (beams(loads={"gas": FOUR_STROKE}), {}, 8),
+    "a spring": (planar("beam", springs={"s": SPRING}), {}, 10),
+    "a spring, co-rotational": (planar("beam", springs={"s": SPRING}), {"frames": "co-rotational"}, 10),
+    "a block on an arm": ({**inverted(revolutions=None), "damping": DAMPED}, {"steps_per_revolution": 120}, 6),
+    "plane links, reduced": (
+        planar("plane", link={"reduced": True, "mesh": {"elements": [8, 1]}}), {"reduction_tolerance": 1e-2}, 6,
+    ),
+    "plane links": (planar("plane", link={"mesh": {"elements": [8, 1]}}), {}, 6),
+    "gears": (geared(), {}, 4),
+    "a screw": (swinging("screw"), {}, 8),
+    "a universal joint": (swinging("universal"), {}, 8),
+    "solids": (swinging("spherical", ("solid", "solid")), {}, 14),
+}  # fmt: skip
+
+
+QUICK = ("planar beams", "a spring, co-rotational", "a screw")
+
+
+@pytest.mark.parametrize(
+    "name", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in CASES]
+)
+def test_a_steady_motion_is_what_a_march_settles_to(name: str) -> None:
+    raw, analysis, turns = CASES[name]
+    ready, found, of = steady(raw, **analysis)
+    assert of.residual < 1e-6
+    assert_allclose(found[-1], found[0], atol=1e-6 * np.abs(found).max())
+    assert off(raw, turns, found, ready) < 1e-6
+
+
+def spun(axis: Any, ratio: float, section: tuple[float, float], **more: Any) -> Raw:
+    """A bar that is turned about its own axis at so many times its first frequency of bending."""
+    way = np.asarray(AXES[axis])
+    shape = {
+        "kind": "bar",
+        "between": [[0, 0, 0], (0.5 * way).tolist()],
+        "width": section[0],
+        "thickness": section[1],
+    }
+    joint = {"kind": "revolute", "links": ["ground", "shaft"], "at": [0, 0, 0], "axis": way.tolist()}
+    return {
+        "links": {"shaft": {"fidelity": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 2}}},
+        "joints": {"A": joint}, "drive": {"joint": "A", "motion": constant_speed(ratio)},
+        "analysis": {"steps_per_revolution": 360, "extrapolation_levels": 2}, **more,
+    }  # fmt: skip
+
+
+def clamped(raw: Raw, axis: Any, modes: int = 14) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frequencies [rad/s] of a clamped link, and M J and M J² in its modes."""
+    ready = meshed(
+        over_one_period(
+            scene_from({**raw, "analysis": {**raw["analysis"], "kind": "steady", "accuracy": "quick"}})
+        )
+    )
+    at = rigid_motion(ready.linkage, ready.path, np.zeros(1), path_parameter(ready.scene, np.zeros(1)))
+    found = Frozen(system_of(ready.scene, ready.linkage, ready.path), modes, 0).at(at)
+    shapes, J = found.shapes[0], cross_matrix(np.asarray(AXES[axis]))
+    heavy = np.array([mass_times(ready.model.links[0].mass, x) for x in shapes]).reshape(len(shapes), -1)
+    once, twice = ((shapes @ turn.T).reshape(len(shapes), -1) for turn in (J, J @ J))
+    return found.omega, heavy @ once.T, heavy @ twice.T
+
+
+def largest_multiplier(
+    omega: np.ndarray, speed: float, MJ: np.ndarray, MJJ: np.ndarray, beta: float
+) -> float:
+    """In a turn at a speed [rad/s]."""
+    n, K = len(omega), np.diag(omega**2)
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-K - speed**2 * MJJ, -beta * K - 2 * speed * MJ]])
+    return float(np.exp(np.linalg.eigvals(A).real.max() * 2 * np.pi / speed))
+
+
+@pytest.mark.parametrize(
+    ("axis", "ratio", "section", "zeta"),
+    [
+        ("oblique", 1.5, (0.003, 0.003), 0.02),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in (
+            ("x", 1.1, (0.012, 0.01), 0.0), ("y", 1.15, (0.012, 0.01), 0.0), ("oblique", 1.05, (0.012, 0.01), 0.0),
+            ("z", 0.9, (0.003, 0.003), 0.02), ("x", 2.0, (0.003, 0.003), 0.02),
+        )),
+    ],
+)  # fmt: skip
+def test_multipliers_of_a_shaft_that_spins(axis: str, ratio: float, section: Any, zeta: float) -> None:
+    """Unstable between its two frequencies where it is not round; above them where its own damping turns with it."""
+    omega, MJ, MJJ = clamped(spun(axis, 100.0, section), axis)
+    beta = 2 * zeta / omega[0]
+    speed = float(ratio * omega[0])
+    raw = spun(axis, speed, section, **({"damping": {"beta": beta}} if zeta else {}))
+    of = steady(raw)[2]
+    exact = largest_multiplier(omega, speed, MJ, MJJ, beta)
+    assert_allclose(of.growth, exact, rtol=1e-6)
+    assert of.unstable == (exact > 1 + 1e-6)
+    if section[0] == section[1]:  # both frequencies are one, so that growth is known from them alone
+        published = {0.9: 0.98613910, 1.5: 1.04274486, 2.0: 1.06476769}
+        assert_allclose(of.growth, published[ratio], rtol=2e-6)
+
+
+@pytest.mark.long
+def test_a_multiplier_of_one_level_has_its_order() -> None:
+    omega, MJ, MJJ = clamped(spun("x", 100.0, (0.012, 0.01)), "x")
+    speed = float(1.1 * omega[0])
+    exact = largest_multiplier(omega, speed, MJ, MJJ, 0.0)
+    errors = []
+    for steps in (360, 720, 1440):
+        raw = spun("x", speed, (0.012, 0.01))
+        raw["analysis"] = {"steps_per_revolution": steps}
+        errors.append(abs(np.log(steady(raw)[2].growth / exact)))
+    slopes = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[0] < 1e-3
+    assert np.all((slopes > 1.9) & (slopes < 2.1))
+
+
+def test_the_period_is_that_of_the_loads_and_of_the_gears() -> None:
+    assert steady(beams(loads={"gas": FOUR_STROKE}))[2].revolutions == pytest.approx(2)
+    assert steady(geared())[2].revolutions == pytest.approx(3)
+    over = {**FOUR_STROKE, "factor": {"over": "time", "at": [0, 0.02], "value": [0, 1], "period": 0.15}}
+    assert steady(beams(loads={"gas": over}))[2].revolutions == pytest.approx(3)
+
+
+def test_a_ramp_counts_as_the_speed_that_it_leads_to() -> None:
+    ramp = {"kind": "ramp", "speed": "600 rpm", "time": 0.3}
+    raw = beams()
+    with_ramp = {**raw, "drive": {**raw["drive"], "motion": ramp}}
+    assert_allclose(steady(with_ramp)[1], steady(raw)[1], atol=1e-15)
+
+
+def test_an_unstable_motion_is_doubtful_and_says_by_how_much_it_grows(tmp_path: Path) -> None:
+    raw = spun("y", 230.0, (0.012, 0.01))
+    nothing = {"plots": False, "picture": False, "animation": False, "folder": str(tmp_path / "out")}
+    raw["analysis"] = {"kind": "steady", "accuracy": "quick", "steps_per_revolution": 180}
+    run = analyse(scene_from({**raw, "output": nothing}))
+    results = read_results(tmp_path / "out" / "results.h5")
+    assert run.steady is not None
+    assert results.status == "doubtful"
+    assert f"grows by {100 * (run.steady.growth - 1):.3g} %" in results.reason
+    assert results.notes["steady growth in a period"] == run.steady.growth > 1.5
+    assert len(results.time) == 181
+
+
+def refused(raw: Raw, **analysis: Any) -> str:
+    with pytest.raises(KedfemError) as error:
+        steady(raw, **analysis)
+    return str(error.value)
+
+
+def test_what_has_no_period_is_refused() -> None:
+    raw = beams()
+    free = {**{key: value for key, value in raw.items() if key != "drive"}, "analysis": {"step": 1e-3}}
+    assert "moves freely has no period" in refused({**free, "damping": {"beta": 1e-4}}, end_time=0.1)
+    once = {"over": "time", "at": [0, 1], "value": [0, 1]}
+    assert "over time without one" in refused({**raw, "loads": {"gas": {**FOUR_STROKE, "factor": once}}})
+    odd = {**FOUR_STROKE["factor"], "period": 1.0, "at": [0, 0.5, 0.9]}
+    assert "a part of the motion's period" in refused(
+        {**raw, "loads": {"gas": {**FOUR_STROKE, "factor": odd}}}
+    )
+    assert "the 1 of the period" in refused(raw, revolutions=3)
+    rise = {**raw, "drive": {**raw["drive"], "motion": {"kind": "cycloidal", "angle": 1.0, "rise": 0.1}}}
+    assert "must have a period" in refused({**rise, "analysis": {"step": 1e-3}}, end_time=0.2)
+
+
+def test_a_spring_that_is_wound_up_is_refused() -> None:
+    wound = {"kind": "torsion", "joint": "B", "stiffness": 1.0}
+    assert "goes on turning" in refused(planar("beam", springs={"s": wound}))
+
+
+def test_a_search_that_does_not_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kedfem.dynamics.system.periodic.NEWTON", 1)
+    monkeypatch.setattr("kedfem.dynamics.system.periodic.MIXINGS", 2)
+    with pytest.raises(SolveError, match="does not converge: a period still leaves"):
+        steady(planar("beam", damping={"beta": 1e-6}), frames="co-rotational")
