@@ -31,16 +31,17 @@ from kedfem.output.derived import (
     peak_warning,
     refuse_foreign,
     write_derived,
-    write_envelope,
 )
+from kedfem.output.stress_files import Extremes, write_envelope, write_top
 from kedfem.output.vtu import write_cells, write_frame
-from kedfem.results import Peak, Results, add_notes, claimed, read_results
+from kedfem.results import Channel, Peak, Results, add_notes, claimed, read_results
 from kedfem.results.additions import add_account, add_peaks, mark_doubtful
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.envelope import highest, peaks
+from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.force_elements import measured_actions
+from kedfem.results.hot_spots import hot_spots
 from kedfem.results.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
 from kedfem.results.singular_stress import doubtful
@@ -164,7 +165,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
         results = replace(results, status="doubtful", reason=why)
     peak = highest(results.peaks)
     notices += peak_warning(peak)
-    write_envelope(folder, envelope, doubts)
+    _highest_stresses(scene, folder, results.drive, envelope, doubts)
     if envelope.worst is not None:
         write_frame(folder / WORST, envelope.worst.t, fields(scene, ready.model, recoveries, envelope.worst))
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
@@ -173,6 +174,16 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
                account.balance, found, plain, step, steady)  # fmt: skip
+
+
+def _highest_stresses(
+    scene: Scene, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]
+) -> None:
+    """The envelope of stresses, and the top ten of each link."""
+    named = f"{drive.name.replace('_', ' ')} [{drive.unit}]"
+    extremes = Extremes(envelope.links(), envelope.when(), doubts, named)
+    write_envelope(folder, extremes, scene.output.csv)
+    write_top(folder, hot_spots(extremes.found, extremes.when, doubts), named)
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:

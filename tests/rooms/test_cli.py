@@ -177,7 +177,7 @@ def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
     assert long in "".join(re.findall(r"^│ (\S+) +│", said.out, re.MULTILINE))  # folded, not cut
     assert "Arm [bold]nose[/nose]" in said.out  # a title is text, not markup
     named = re.findall(r"^(\S*arm-results/\S+)  ", said.out, re.MULTILINE)
-    assert {Path(name).name for name in named} == {"results.h5", "animation.pvd", "envelope.vtu"}
+    assert {Path(name).name for name in named} == {"results.h5", "animation.pvd", "envelope.vtu", "peaks.csv"}
     results = read_results(arm.with_name("arm-results") / "results.h5")
     assert (results.status, len(results.time)) == ("complete", 361)
 
@@ -456,12 +456,15 @@ def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
     assert run_kedfem("run", arm).code == 0
     assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == [
         "envelope.vtu",
+        "peaks.csv",
         "results.h5",
         "worst.vtu",
     ]
 
 
-@pytest.mark.parametrize("name", ["results.csv", "worst.png", "animation.pvd", "envelope.vtu", "results.h5"])
+@pytest.mark.parametrize(
+    "name", ["results.csv", "worst.png", "animation.pvd", "envelope.vtu", "peaks.csv", "results.h5"]
+)
 def test_files_that_are_not_kedfems_are_left_alone(run_kedfem: Command, arm: Path, name: str) -> None:
     """A scene may name any folder for its results: what others keep there under such names stays."""
     arm.write_text(arm.read_text("utf-8").replace("[output]", '[output]\nfolder = "mine"'), encoding="utf-8")

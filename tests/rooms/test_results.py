@@ -461,7 +461,7 @@ def test_three_runs_at_once_leave_one_whole_result(tmp_path: Path) -> None:
     assert all("must not be in use, got another run" in words for words in refused)
     assert read_results(tmp_path / "scene-results" / "results.h5").status == "complete"
     left = sorted(p.name for p in (tmp_path / "scene-results").iterdir())
-    assert left == ["envelope.vtu", "results.h5", "worst.vtu"]
+    assert left == ["envelope.vtu", "peaks.csv", "results.h5", "worst.vtu"]
 
 
 def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path: Path) -> None:

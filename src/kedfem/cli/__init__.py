@@ -408,6 +408,7 @@ def _say_where(folder: Path) -> None:
         ("animation.pvd", "animation, open in ParaView"),
         ("plots", "plots"),
         ("envelope.vtu", "highest stresses over all steps, for ParaView"),
+        ("peaks.csv", "top ten of each link"),
         ("worst.png", "picture of the highest stress"),
         ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
     ):

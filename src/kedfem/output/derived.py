@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.errors import OutputError
@@ -12,16 +10,18 @@ from kedfem.links.recovery import StressRecovery
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
-from kedfem.output.vtu import LinkField, remove_animation, write_points
+from kedfem.output.stress_files import ENVELOPE, POINTS, TOP
+from kedfem.output.vtu import LinkField, remove_animation
 from kedfem.output.words import clock, moment, stress_at
 from kedfem.results import Peak, Results, write_csv, write_parquet
-from kedfem.results.envelope import Envelope
 from kedfem.results.reader import foreign
 from kedfem.results.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
-WORST, ENVELOPE, PARQUET = "worst.vtu", "envelope.vtu", "results.parquet"
+WORST, PARQUET = "worst.vtu", "results.parquet"
+WHOLE = (TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP)
+"""Files of a run that the next one replaces."""
 
 
 def peak_warning(peak: Peak | None) -> tuple[str, ...]:
@@ -31,24 +31,6 @@ def peak_warning(peak: Peak | None) -> tuple[str, ...]:
     said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
     away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
     return (said + away,)
-
-
-def write_envelope(folder: Path, envelope: Envelope, doubts: list[list[str]]) -> None:
-    """Highest stresses at every point and when they occur, on the links as drawn, for ParaView."""
-    every = envelope.links()
-    time = envelope.when()[0]
-    drawn = [each.recovery.at_points((each.recovery.link.full or each.recovery.link).X) for each in every]
-    parts = [
-        (each.link, points, each.recovery.cells, each.recovery.cell_type)
-        for each, points in zip(every, drawn, strict=True)
-    ]
-    stress = np.concatenate([each.stress for each in every], axis=1)
-    when = np.where(np.isnan(stress), np.nan, time[np.concatenate([each.step for each in every], axis=1)])
-    values: dict[str, np.ndarray] = {}
-    for k, name in enumerate(("highest von Mises", "largest principal", "smallest principal")):
-        values |= {f"{name} stress [Pa]": stress[k], f"time of {name} stress [s]": when[k]}
-    values["depends on mesh or joint"] = np.array([float(bool(x)) for each in doubts for x in each])
-    write_points(folder / ENVELOPE, parts, values)
 
 
 def fields(
@@ -67,7 +49,7 @@ def refuse_foreign(folder: Path) -> None:
     OutputError
     """
     file = folder / "results.h5"
-    names = [TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
+    names = [*WHOLE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]
     if found or foreign(file):
         wanted = f"output.folder: must be a folder of kedfem's results or one without {', '.join(found) or file.name}"
@@ -77,7 +59,7 @@ def refuse_foreign(folder: Path) -> None:
 
 def remove_derived(folder: Path) -> None:
     """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
-    for name in (TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE):
+    for name in WHOLE:
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
     remove_animation(folder, STEM)

@@ -197,11 +197,8 @@ class Envelope:
         for i, (link, recovery) in enumerate(zip(names, self.recoveries, strict=True)):
             points = recovery.points
             if i >= len(self._modes) or self._modes[i] is None:
-                out.append(
-                    LinkEnvelope(
-                        link.name, recovery, np.full((3, points), np.nan), np.zeros((3, points), int)
-                    )
-                )
+                nothing = np.full((3, points), np.nan), np.zeros((3, points), int)
+                out.append(LinkEnvelope(link.name, recovery, *nothing))
                 continue
             stress = self._stress[i].reshape(3, -1, points)  # both fibres of a planar beam
             chosen = stress.argmax(axis=1)[:, None]
@@ -281,7 +278,13 @@ def highest(every: Mapping[str, Peak]) -> Peak | None:
 def _peak(
     each: LinkEnvelope, when: Float[np.ndarray, "2 T"], among: np.ndarray, words: Sequence[str] | None
 ) -> Peak:
-    node = int(np.where(among, each.stress[VON_MISES], -1.0).argmax())
+    return peak_at(each, when, int(np.where(among, each.stress[VON_MISES], -1.0).argmax()), words)
+
+
+def peak_at(
+    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], node: int, words: Sequence[str] | None
+) -> Peak:
+    """The highest von Mises stress of one point of a link, and when it is."""
     step = int(each.step[VON_MISES, node])
     link = each.recovery.link
     place = each.recovery.at_points((link.full or link).X)[node]

@@ -138,6 +138,10 @@ brackets). Energies apart, nothing is summed up over time.
 | `/peaks/LINK` | highest von Mises stress over all steps, its place as drawn, time, step and drive; `away` from places where it means little |
 | `/scene` | the scene that was analysed, as `json` and `toml` |
 
+`peaks.csv` has the ten highest von Mises stresses of each link over all steps, each at least 2 % of the link's size from
+those before, with place as drawn, time, drive and what is near; `envelope.csv` (`output.csv = true`) and `envelope.vtu`
+have the highest von Mises and extreme principal stresses of every point, each with its time and drive.
+
 `results.csv` (`output.csv = true`) has all channels with nine digits, `results.parquet` (`output.parquet = true`, needs
 `pip install 'kedfem[data]'`) with all. From Python: [python.md](python.md).
 
