@@ -14,6 +14,7 @@ from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.levels import leveled
+from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.marks import Marks
 from kedfem.dynamics.model import segments, ways
 from kedfem.dynamics.transient import Steps
@@ -96,6 +97,9 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         keeper.prepared(ready)
         keeper.put_back(memories)
         refuse_without(frames)
+    for each in solvers:
+        if not isinstance(each, LiteralSteps):
+            each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
     written = ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
     )

@@ -60,6 +60,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
         "frames": "rigid-body",
         **analysis,
     }
+    raw["analysis"] = {key: value for key, value in raw["analysis"].items() if value is not None}
     return scene_from(raw, folder)
 
 
@@ -114,6 +115,16 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
     resumed = analyse(ended, resumes=True)
     assert_same(whole, content(resumed))
     assert not (ended.results_folder / STATE).exists()
+
+
+@pytest.mark.parametrize("levels", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_a_resumed_steady_motion_knows_what_the_search_for_it_found(tmp_path: Path, levels: int) -> None:
+    given = {"kind": "steady", "revolutions": None, "extrapolation_levels": levels}
+    whole = content(analyse(turning(tmp_path / "whole", **given)))
+    ended = turning(tmp_path / "ended", **given)
+    ended_early(ended, 0.6)
+    assert_same(whole, content(analyse(ended, resumes=True)))
+    assert whole["notes"]["steady growth in a period"] > 0.1
 
 
 @pytest.mark.parametrize("at", [pytest.param(0.1, marks=pytest.mark.long), 0.7])

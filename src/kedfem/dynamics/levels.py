@@ -24,6 +24,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.frames import mean_rotations
 from kedfem.dynamics.history import Block, LinkHistory, exerted_together, joined
+from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.marks import Mark, Marks
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.ports import turned_vectors
@@ -127,6 +128,8 @@ def leveled(
     for each, mark in zip(solvers, marks.levels, strict=True):
         if isinstance(each, CorotationalSteps):
             each.eased = mark.eased
+        if not isinstance(each, LiteralSteps):
+            each.steady = mark.steady
     if len(solvers) == 1:
         yield from _single(scene, linkage, along, model, solvers[0], marks)
         return

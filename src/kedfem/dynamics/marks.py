@@ -16,6 +16,7 @@ class Mark:
     step : number of the block's first time point
     state : of the solver before it; None before the first time point
     eased : steps of the solver so far whose tolerance was eased
+    steady : what the solver found of a steady motion; None of another
     kept : whether anybody stores it
     start : the state at t = 0, where the march begins there, if it is known
     last : δ'' and the balance's acceleration before it of each link, where levels are combined
@@ -25,9 +26,10 @@ class Mark:
     state: Any = None
     eased: int = 0
     last: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    steady: Any = None
     kept: bool = False
     start: Any = None
-    REMEMBERED: ClassVar = ("step", "state", "eased", "last")
+    REMEMBERED: ClassVar = ("step", "state", "eased", "last", "steady")
 
     def set(self, step: int, state: Any, solver: Any) -> None:
         """The march begins a block; a state that its solver uses up is copied, if anybody stores it.
@@ -36,6 +38,7 @@ class Mark:
         """
         if self.kept:
             self.step, self.eased = step, int(getattr(solver, "eased", 0))
+            self.steady = getattr(solver, "steady", None)
             self.state = state if isinstance(state, State) else deepcopy(state)
 
 
