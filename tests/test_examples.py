@@ -19,7 +19,7 @@ SOURCE = Path(kedfem.__file__).parents[1]
 EXAMPLES = sorted(path.parent.name for path in (ROOT / "examples").glob("*/run.py"))
 
 
-GENERATED = ("*-results", "*-kinematics", "*-accuracy", "*-mesh", "*-sweep")
+GENERATED = ("*-results", "*-kinematics", "*-accuracy", "*-mesh", "*-sweep", "*-frequencies")
 
 
 def test_nothing_generated_is_committed() -> None:
