@@ -80,7 +80,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     envelope = Envelope(model, watched.recoveries, watched.stresses_since)
-    seen = watcher(ready)
+    seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
     notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}

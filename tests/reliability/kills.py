@@ -1,7 +1,8 @@
 """Kills, shared folders and full disks: `python -m tests.reliability.kills --moments 100 --seed 1`.
 
-A run of `kedfem run` in a process of its own is ended at a random moment, by SIGKILL or SIGTERM; then it goes on, and its
-rows must be those of a run that nobody disturbed, bit by bit. Needs a system with these signals.
+A run of `kedfem run` in a process of its own is ended at a random moment of each of its phases in turn, by SIGKILL or
+SIGTERM; then it goes on, and its rows must be those of a run that nobody disturbed, bit by bit. Needs a system with
+these signals.
 """
 
 import argparse
@@ -25,11 +26,12 @@ import numpy as np
 from kedfem.errors import OutputError
 from kedfem.folders import PART
 from kedfem.results import Results, read_results
+from tests.reliability.phases import PHASES, TOLD, at_work, begun, spans
 
 SCENE = """
 [links.crank]
 material = "steel"
-fidelity = "solid"
+fidelity = "FIDELITY"
 shape = { kind = "plate_link", between = [[0, 0], [0.1, 0]], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
 mesh = { size = 0.006 }
 [joints.A]
@@ -49,18 +51,24 @@ plots = false
 picture = false
 animation = { frames_per_revolution = 60 }
 """
+ROOT = Path(__file__).parents[2]
 LONGEST = 300.0  # seconds that one run may take
+POLL = 2e-4  # seconds between two looks at what a run is at
 ORPHANS = 5.0  # seconds after which nothing of a killed run may be there
 FOUND, REFUSED, DOUBTFUL, ENDED = 0, 2, 4, 130
 
 
 @dataclass
 class Ground:
-    """Where runs are tried: a scene, the rows that it has, and what its whole run takes [s]."""
+    """Where runs are tried: a scene, the rows that it has, and what its whole run takes [s].
+
+    phases : phase → beginnings and lengths [s] of all times that the whole run is in it
+    """
 
     folder: Path
     rows: Results
     takes: float
+    phases: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     counts: Counter[str] = field(default_factory=Counter)
     findings: list[str] = field(default_factory=list)
 
@@ -75,9 +83,10 @@ def started(folder: Path, *more: str, cache: Path | None = None, **how: Any) -> 
     """`kedfem run` in a process of its own."""
     environment = os.environ | {
         "KEDFEM_CACHE": str(cache) if cache else "off", "OMP_NUM_THREADS": "1", "COLUMNS": "200",
-        "KEDFEM_TRIED": str(folder),
+        "KEDFEM_TRIED": str(folder), TOLD: str(folder / "phases"),
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)]),
     }  # fmt: skip
-    command = [sys.executable, "-m", "kedfem", "run", "scene.toml", *more]
+    command = [sys.executable, "-m", "tests.reliability.phases", "run", "scene.toml", *more]
     return subprocess.Popen(
         command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how
     )
@@ -100,17 +109,19 @@ def finished(running: "subprocess.Popen[str]") -> tuple[int, str]:
     return running.returncode, out + err
 
 
-def ready(folder: Path, steps: int = 6000, levels: int = 1) -> Ground:
-    """The scene, and its undisturbed run, twice: the first one compiles."""
+def ready(folder: Path, steps: int = 6000, levels: int = 1, fidelity: str = "solid") -> Ground:
+    """The scene, and its undisturbed run, twice on a cold cache: the first one compiles."""
     folder.mkdir(parents=True, exist_ok=True)
-    text = SCENE.replace("STEPS", str(steps)).replace("LEVELS", str(levels))
+    text = SCENE.replace("STEPS", str(steps)).replace("LEVELS", str(levels)).replace("FIDELITY", fidelity)
     (folder / "scene.toml").write_text(text, encoding="utf-8")
     for _ in range(2):
-        began = time.monotonic()
-        code, said = finished(started(folder))
+        (folder / "phases").unlink(missing_ok=True)
+        cache, began = new_cache(folder / "cache"), time.monotonic()
+        code, said = finished(started(folder, "--states", "0.05", cache=cache))
         if code not in {FOUND, DOUBTFUL}:
             raise RuntimeError(said)
-    return Ground(folder, read_results(folder / "scene-results" / "results.h5"), time.monotonic() - began)
+    took, rows = time.monotonic() - began, read_results(folder / "scene-results" / "results.h5")
+    return Ground(folder, rows, took, {phase: spans(folder / "phases", phase) for phase in PHASES})
 
 
 def new_place(ground: Ground, name: str) -> Path:
@@ -166,13 +177,26 @@ def torn(folder: Path) -> str:
     return ""
 
 
-def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> None:
-    """One run, ended at a part of its time, and gone on with."""
+def come(
+    ground: Ground, running: "subprocess.Popen[str]", folder: Path, phase: str, rng: random.Random
+) -> None:
+    """Wait for a random moment of one of the times that a run is in a phase; of the whole run, where it is "any"."""
+    if phase == "any":
+        time.sleep(rng.uniform(0.1, 1.0) * ground.takes)
+        return
+    which = rng.randrange(len(ground.phases[phase]))
+    while begun(folder / "phases", phase) <= which and running.poll() is None:
+        time.sleep(POLL)
+    time.sleep(rng.random() * ground.phases[phase][which][1])
+
+
+def killed(ground: Ground, number: signal.Signals, phase: str, name: str, seed: int = 1) -> None:
+    """One run, ended in a phase, and gone on with."""
     folder = new_place(ground, name)
     cache = new_cache(folder / "cache")
     running = started(folder, "--states", "0.05", cache=cache, start_new_session=True)
     try:
-        time.sleep(moment * ground.takes)
+        come(ground, running, folder, phase, random.Random(f"kill {seed} {name}"))
         ended = running.poll() is None
         if ended:
             running.send_signal(number)
@@ -180,8 +204,7 @@ def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> 
     finally:
         if running.poll() is None:
             running.kill()
-    stage = _stage(folder) if ended else "after the end"
-    what = f"{number.name} {stage}"
+    what = f"{number.name} {_stage(folder) if ended else 'after the end'}"
     wrong = f"a traceback: {said[said.index('Traceback') :][:900]}" if "Traceback" in said else ""
     if ended and number == signal.SIGTERM and code not in {ENDED, FOUND, DOUBTFUL, -number}:
         wrong = f"exit code {code}: {said[-300:]}"
@@ -201,13 +224,8 @@ def killed(ground: Ground, number: signal.Signals, moment: float, name: str) -> 
 
 
 def _stage(folder: Path) -> str:
-    """How far a run had come."""
-    results = folder / "scene-results"
-    if (results / "state.kept").exists():
-        return "while stepping, with a state"
-    if (results / "results.h5").exists():
-        return "while stepping, before a state"
-    return "before the first rows"
+    """What a run was at as it ended, the innermost of its phases."""
+    return next((phase for phase in PHASES if at_work(folder / "phases", phase)), "between phases")
 
 
 def together(ground: Ground, count: int, shared: str) -> None:
@@ -267,11 +285,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--levels", type=int, default=1)
     given = parser.parse_args()
-    rng = random.Random(f"kills {given.seed}")
     with TemporaryDirectory() as folder:
-        ground = ready(Path(folder) / "whole", levels=given.levels)
+        ground = ready(Path(folder) / "solid" / "whole", levels=given.levels)
+        reduced = ready(Path(folder) / "reduced" / "whole", levels=given.levels, fidelity="reduced")
+        reduced.counts, reduced.findings = ground.counts, ground.findings
         for k in range(given.moments):
-            killed(ground, signal.SIGKILL if k % 2 else signal.SIGTERM, rng.uniform(0.1, 1.0), f"k{k}")
+            phase = ("any", *PHASES)[k // 2 % (1 + len(PHASES))]
+            of = reduced if phase == "writing the cache" else ground  # of solids nothing is kept
+            killed(of, signal.SIGKILL if k % 2 else signal.SIGTERM, phase, f"k{k}", given.seed)
         for count in (2, 5):
             for shared in ("folder", "cache"):
                 together(ground, count, shared)

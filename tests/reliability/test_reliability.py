@@ -11,7 +11,7 @@ import pytest
 from kedfem.errors import KedfemError
 from kedfem.processes import memory_held, most_memory
 from kedfem.scene import scene_from
-from tests.reliability import endurance, fuzz, kills
+from tests.reliability import endurance, fuzz, kills, phases
 from tests.reliability.mutations import damaged, mutated, nudged, places
 from tests.rooms.test_bad_scenes import GOOD
 
@@ -87,12 +87,24 @@ def test_many_scenes_and_files(tmp_path: Path) -> None:
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 def test_killed_runs_go_on_to_equal_rows(tmp_path: Path) -> None:
     ground = kills.ready(tmp_path / "whole", steps=1500)
-    for number, moment in ((signal.SIGKILL, 0.7), (signal.SIGTERM, 0.8)):
-        kills.killed(ground, number, moment, number.name)
+    for number, phase in ((signal.SIGKILL, "writing frames"), (signal.SIGTERM, "factoring")):
+        kills.killed(ground, number, phase, number.name)
     kills.together(ground, 2, "folder")
     kills.short_of(ground, "quota", 100_000)
     assert not ground.findings, ground.findings
     assert sum(ground.counts.values()) == 6
+
+
+def test_phases_are_told_with_their_lengths(tmp_path: Path) -> None:
+    """Two frames, and a third that never ended."""
+    file = tmp_path / "phases"
+    file.write_text(
+        "".join(f"writing frames\t{x}\t{t}\n" for x, t in zip("+-+-+", (1, 3, 5, 6, 9), strict=True))
+    )
+    assert phases.spans(file, "writing frames") == [(1.0, 2.0), (5.0, 1.0)]
+    assert phases.begun(file, "writing frames") == 3
+    assert phases.at_work(file, "writing frames")
+    assert not phases.at_work(file, "meshing")
 
 
 def test_growth_is_told_from_what_swings() -> None:

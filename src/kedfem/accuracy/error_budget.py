@@ -7,7 +7,7 @@ from kedfem.results import Channel
 from kedfem.results.balance import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
-SOURCES = ("mesh", "step", "reduction", "frames")
+SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
@@ -19,7 +19,7 @@ LEAST = 0.005  # what no run warns of
 class Share:
     """One part of the error.
 
-    source : mesh, step, reduction or frames
+    source : mesh, step, reduction, frames or rounding
     errors : kind of channel → estimated error, of the channel's largest value, at the worst instant of the worst channel
     how : what the estimate was made from, in words
     remedy : what would lower it, in words; what usually does if not given
@@ -141,6 +141,7 @@ REMEDIES = {
     "excites vibration beyond any step needs a smoother one, or damping",
     "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",
     "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
+    "rounding": 'links that are much stiffer than all others as fidelity = "rigid"',
 }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ takes a fraction. Their channels are compared as `histories` does: what two step
 
 * **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`).
 * **Mesh of beams**: twice the elements, in the same step.
+* **Rounding**: what a link's matrices leave of its rigid motion (`accuracy.rounding`).
 * **Meshes of solid and plane links**: their indicator η (`links.indicator`). Compliance errs by about 2 η², so the
   companion is run with links that much softer; stress errs besides by a part of η itself.
 """
@@ -22,12 +23,14 @@ from kedfem.accuracy.histories import Histories, counted, extent, histories, rel
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
+from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
 from kedfem.accuracy.variants import refined, with_analysis, with_links
 from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.transient import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
 from kedfem.links.record import Link
@@ -78,19 +81,24 @@ class Seen:
     strained: Strained
     geometric: GeometricError
     running: StepError
-    REMEMBERED: ClassVar = ("strained", "geometric", "running")
+    rounding: Rounding
+    REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
         self.strained.add(block)
         self.geometric.add(block)
         self.running.add(block)
+        self.rounding.add(block)
 
 
-def watcher(ready: Prepared) -> Seen:
-    """A watcher of a prepared scene's steps."""
+def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
+    """A watcher of a prepared scene's steps, as its solvers take them; of its links alone without any."""
     return Seen(
-        Strained(ready.model), GeometricError(ready.model, ready.scene.analysis.stiffening), step_error(ready)
+        Strained(ready.model),
+        GeometricError(ready.model, ready.scene.analysis.stiffening),
+        step_error(ready),
+        Rounding.of(ready.model, solvers),
     )
 
 
@@ -118,7 +126,9 @@ def budget(
     kinds = wanted(ready)
     small = companion(ready)
     limits = list(_limits(ready, found))
-    shares: list[Share | None] = [reduction_share(reduction), frames_share(seen.geometric, kinds)]
+    shares: list[Share | None] = [
+        reduction_share(reduction), frames_share(seen.geometric, kinds), seen.rounding.share(kinds),
+    ]  # fmt: skip
     if small is None:
         shares += [
             _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step),
@@ -131,7 +141,8 @@ def budget(
     try:
         base = histories(small) if ran is None or not own else replace(ran, size=extent(ready.model))
         counts = by_kind(counted(base))
-        shares[1] = frames_share(seen.geometric, [kind for kind in kinds if kind in counts])
+        here = [kind for kind in kinds if kind in counts]
+        shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
         known = known or step_errors(small, base)
         shares.append(_step_share({name: error for name, error in known.items() if name in counted(base)}))
         shares.append(_mesh_share(small, base, eta))

@@ -1,0 +1,143 @@
+"""What rounding costs, measured on each link's own matrices: forces that a rigid motion of the link should not need.
+
+A link that is much stiffer than its neighbours moves as they let it, nearly as a rigid body. Its stiffness times that
+motion is zero only as far as its numbers go: what is left, some eps |K0| |δ|, is a force that nothing balances, and grows
+with the stiffness, while the forces of the linkage do not. Most of it comes from the stiffness condensed onto ports,
+
+    S W Φ − c_M Yᵀ M Φ        zero but for rounding, Φ the rigid motions of the link: K0 Φ = 0 there
+
+which the factored step uses; of the literal solver it is K0 Φ. Both are found once, as the march begins. Over a run they
+are multiplied with the link's rigid motion at each time; the largest, of the largest force at a port, is the estimate.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.error_budget import Share
+from kedfem.dynamics.dense import coordinates
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.system.arrays import Coefficients
+from kedfem.dynamics.system.sparse import Part, SparsePart, momentum
+from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.transient import Steps
+from kedfem.links.record import Link, in_space, mass_times
+
+NOTICED = 1e-5  # of the forces: what is less is not told; scenes of links of one stiffness have 1e-9
+LEFT = {"beam": 2.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 16.0}
+"""Times what S leaves: errors of two- and four-link scenes are a tenth to ten times that (test_rounding)."""
+NODAL = 8.0  # of what K0 leaves: the literal solver's factor loses more than its matrix (measured, 5 to 17)
+INSTANTS = 64  # of a block that are looked at
+
+
+def rigid_motions(link: Link) -> Float[np.ndarray, "n d r"]:
+    """Translations along, and small turns about, the axes in which a link moves, as states of it."""
+    planar = link.kind in {"beam", "plane"}
+    X, out = link.X * [1.0, 1.0, 0.0] if planar else link.X, []
+    for c in range(2 if planar else 3):
+        out.append(np.zeros((link.n, link.d)))
+        out[-1][:, c] = link.one
+    for e in np.eye(3)[2 if planar else 0 :]:
+        turn = np.zeros((link.n, link.d))
+        turn[:, : min(link.d, 2 if planar else 3)] = np.cross(e, X)[:, : 2 if planar else 3]
+        if link.kind == "beam":
+            turn[:, 2] = link.one
+        out.append(turn)
+    return np.stack(out, axis=2)
+
+
+def rigid_part(link: Link) -> Float[np.ndarray, "r N"]:
+    """What takes the rigid motions out of a state, the nearest in the norm of the mass."""
+    every = rigid_motions(link)
+    flat = every.reshape(link.unknowns, -1)
+    weighed = [mass_times(link.mass, np.ascontiguousarray(x)).ravel() for x in np.moveaxis(every, 2, 0)]
+    return np.asarray(np.linalg.pinv(np.stack(weighed) @ flat) @ np.stack(weighed))
+
+
+def condensed_defect(link: Link, part: Part, c: Coefficients) -> Float[np.ndarray, "q r"]:
+    """Forces at ports that each rigid motion of a link leaves by rounding in its condensed stiffness [N/m, N/rad]."""
+    out = []
+    for motion in np.moveaxis(rigid_motions(link), 2, 0):
+        if isinstance(part, SparsePart):
+            x = motion.T.ravel()
+            Mx = momentum(link, x)
+        else:
+            x = Mx = coordinates(link, part, motion).ravel()
+        out.append((part.S @ (part.W @ x) - c.c_M * (part.Y.T @ Mx)) / c.c_K)
+    return np.stack(out, axis=1)
+
+
+def nodal_defect(link: Link) -> Float[np.ndarray, "r r"]:
+    """Sums of the nodal forces that each rigid motion leaves by rounding in K0, root of squares [N/m, N/rad]."""
+    flat = rigid_motions(link).reshape(link.unknowns, -1)
+    forces = (link.K0 @ flat).reshape(link.n, link.d, -1)
+    forces = np.moveaxis(in_space(link, np.moveaxis(forces, 2, 0)), 0, 2)
+    return np.diag(np.sqrt((forces**2).sum(axis=(0, 1))))
+
+
+@dataclass
+class Rounding:
+    """Of each link with a rigid-body frame: what a rigid motion leaves, and the largest such force so far [N].
+
+    forces : the same link by link; largest : at any port of any link [N]
+    """
+
+    model: Model
+    defects: list[Float[np.ndarray, "_ r"] | None]
+    parts: list[Float[np.ndarray, "r _"] | None]
+    forces: Float[np.ndarray, " L"]
+    largest: float = 0.0
+    REMEMBERED: ClassVar = ("forces", "largest")
+
+    @classmethod
+    def of(cls, model: Model, solvers: Sequence[Steps]) -> "Rounding":
+        """Of the links of a model, as its solver factored them; co-rotational frames take rigid motion away first."""
+        solver = solvers[0] if solvers else None
+        condensed = isinstance(solver, SystemSteps) and solver.oracle is None
+        defects: list[np.ndarray | None] = []
+        for k, link in enumerate(model.links):
+            if link.fit is not None or link.rigid:
+                defects.append(None)
+            elif condensed and isinstance(solver, SystemSteps):
+                left = condensed_defect(link, solver.ready.parts[k], solver.ready.c)
+                defects.append(LEFT[link.kind] * left)
+            else:
+                defects.append(NODAL * nodal_defect(link))
+        parts = [
+            None if x is None else rigid_part(link) for x, link in zip(defects, model.links, strict=True)
+        ]
+        return cls(model, defects, parts, np.zeros(len(model.links)))
+
+    def add(self, block: Block) -> None:
+        """Look at the steps of a block."""
+        some = slice(None, None, max(1, len(block) // INSTANTS))
+        for k, (defect, part) in enumerate(zip(self.defects, self.parts, strict=True)):
+            history = block.links[k]
+            self.largest = max(self.largest, float(np.abs(history.port_forces).max(initial=0.0)))
+            if defect is None or part is None or not defect.size:
+                continue
+            g = history.g[some]
+            left = np.abs(g.reshape(len(g), -1) @ part.T) @ np.abs(defect).T
+            self.forces[k] = max(self.forces[k], float(left.max(initial=0.0)))
+
+    @property
+    def relative(self) -> float:
+        """The largest such force of a link, of the largest force at a port [-]."""
+        return float(self.forces.max(initial=0.0)) / self.largest if self.largest else 0.0
+
+    def share(self, kinds: Sequence[str]) -> Share | None:
+        """Its part of the error; None where it is next to nothing."""
+        if not self.relative > NOTICED:
+            return None
+        link = self.model.links[int(self.forces.argmax())].name
+        how = f"link {link} is so stiff beside its neighbours that its numbers do not tell a rigid motion from a strain"
+        return Share(
+            "rounding",
+            dict.fromkeys(kinds, self.relative),
+            how,
+            f'{how}; take fidelity = "rigid" for it, or its true stiffness and larger elements',
+        )
