@@ -95,6 +95,8 @@ SPRING = {
     "kind": "spring", "between": [{"link": "rocker", "at": "C"}, {"link": "ground", "at": [0.5, 0.5]}],
     "stiffness": 2e4, "damping": 20.0,
 }  # fmt: skip
+SOFT = {"alloy": {"density": 2796, "youngs_modulus": 2.5e10, "shear_modulus": 9.5e9}}
+FAST = {"joint": "A", "motion": constant_speed("450 rpm")}
 SWING = {"kind": "cycloidal", "angle": 0.3, "rise": 0.03, "return_time": 0.03, "dwell_after": 0.02}
 
 
@@ -126,6 +128,9 @@ CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
     "planar beams": (beams(), {}, 12),
     "levels in time": (beams(), {"extrapolation_levels": 2}, 12),
     "co-rotational": (planar("beam"), {"frames": "co-rotational"}, 10),
+    "co-rotational, bent far": (
+        beams(materials=SOFT, damping={"ratio": 0.02, "frequencies": [20, 200]}, drive=FAST), {"frames": "co-rotational"}, 40,
+    ),
     "stiffening": (planar("beam"), {"stiffening": True}, 10),
     "four strokes": (beams(loads={"gas": FOUR_STROKE}), {}, 8),
     "a spring": (planar("beam", springs={"s": SPRING}), {}, 10),
@@ -142,7 +147,7 @@ CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
 }  # fmt: skip
 
 
-QUICK = ("planar beams", "a spring, co-rotational", "a screw")
+QUICK = ("planar beams", "co-rotational, bent far", "a screw")
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,7 @@ def _solved(steps: _Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
         if left <= allowed or H[j + 1, j] <= REPEATS * np.abs(H[: j + 2, : j + 1]).max():
             break
         basis.append(w / H[j + 1, j])
-    values, shapes = np.linalg.eig(H[: j + 1, : j + 1])
+    values, shapes = np.linalg.eig(H[: j + 1, : j + 1].astype(complex))
     nearest = int(np.abs(values).argmin())
     if abs(values[nearest]) < REPEATS:
         raise SolveError(_resonant(map_, [sum(c * v for c, v in zip(part, basis, strict=False))
@@ -224,7 +224,7 @@ def _multipliers(steps: _Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray,
     found, certain = np.zeros(0, complex), False
     for j in range(MULTIPLIERS):
         w, H[: j + 2, j] = _orthogonal(map_, basis, steps.product(x, y, basis[j], by))
-        values, shapes = np.linalg.eig(H[: j + 1, : j + 1])
+        values, shapes = np.linalg.eig(H[: j + 1, : j + 1].astype(complex))
         order = np.argsort(-np.abs(values))
         off = H[j + 1, j] * np.abs(shapes[j, order]) / np.linalg.norm(shapes[:, order], axis=0)
         found = values[order]
