@@ -129,7 +129,8 @@ CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
     "levels in time": (beams(), {"extrapolation_levels": 2}, 12),
     "co-rotational": (planar("beam"), {"frames": "co-rotational"}, 10),
     "co-rotational, bent far": (
-        beams(materials=SOFT, damping={"ratio": 0.02, "frequencies": [20, 200]}, drive=FAST), {"frames": "co-rotational"}, 40,
+        beams(materials=SOFT, damping={"ratio": 0.02, "frequencies": [20, 200]}, drive=FAST),
+        {"frames": "co-rotational"}, 40,
     ),
     "stiffening": (planar("beam"), {"stiffening": True}, 10),
     "four strokes": (beams(loads={"gas": FOUR_STROKE}), {}, 8),
