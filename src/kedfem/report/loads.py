@@ -9,25 +9,35 @@ from rich.text import Text
 from kedfem.loads import Loads
 from kedfem.output.words import with_prefix
 
+SHORT = {
+    "drive at peak": "at", "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
+    "equivalent, roller bearing": "roller", "drive at largest": "at", "largest power": "peak power",
+}  # fmt: skip
+NOTHING = 1e-9  # of the largest of its row and unit
+
 
 def loads_tables(found: Loads) -> list[Table]:
     """Peak, mean and equivalent loads of joints; torque and power of drives."""
-    out = [
-        _table("Loads of joints; equivalent: mean by the power of the bearing's life", "joint", found.joints)
-    ]
-    return [*out, _table("Drives", "drive", found.drives)] if found.drives else out
+    joints = _table("Loads of joints", "joint", found.joints)
+    joints.caption = "radial, axial: largest; ball, roller: equivalent load for the life of such a bearing"
+    return [joints, _table("Drives", "drive", found.drives)] if found.drives else [joints]
 
 
 def _table(title: str, what: str, every: Mapping[str, Mapping[str, float]]) -> Table:
     table = Table(title=Text(title))
-    table.add_column(what)
+    table.add_column(what, overflow="fold")
     names = list(dict.fromkeys(name for row in every.values() for name in row))
+    if any(name.startswith("drive at") for name in names):
+        names = [name for name in names if not name.startswith("time of")]
     for name in names:
-        table.add_column(name.rpartition(" [")[0], justify="right")
+        label = name.rpartition(" [")[0]
+        table.add_column(SHORT.get(label, label), justify="right", overflow="fold")
     for key, row in every.items():
-        table.add_row(key, *(_number(row.get(name, np.nan), name) for name in names))
+        table.add_row(key, *(_number(row, name) for name in names))
     return table
 
 
-def _number(x: float, name: str) -> str:
-    return with_prefix(x, name.rpartition(" [")[2].removesuffix("]"))
+def _number(row: Mapping[str, float], name: str) -> str:
+    x, unit = row.get(name, np.nan), name.rpartition(" [")[2]
+    largest = max((abs(value) for other, value in row.items() if other.endswith(unit)), default=0.0)
+    return "≈ 0" if abs(x) < NOTHING * largest else with_prefix(x, unit.removesuffix("]"))

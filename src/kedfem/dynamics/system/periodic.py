@@ -2,7 +2,8 @@
 
 x = P(x) by Newton's method. Each of its linear systems, (I − Φ) d = P(x) − x with Φ the derivative of P, is solved by
 GMRES: a product with Φ is one more march over the period, so that it takes as many marches as there are vibrations that a
-period does not damp away. Of a linear system P is affine, and one such solution is all.
+period does not damp away. Of a linear system P is affine, and one such solution is all. Of others Anderson mixing of P
+comes first: it takes a march for each vibration where Newton's method takes one again in each of its solutions.
 
 Multipliers, the eigenvalues of Φ, are found by Arnoldi's method from a state that a random blow has left, so that
 vibrations show which the loads do not excite: by its largest magnitude a vibration grows, or falls, in a period
@@ -21,18 +22,22 @@ from kedfem.dynamics.system.period_map import PeriodMap
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring
 from kedfem.errors import SolveError
 
-CLOSED = 1e-9  # what a period may leave of the size of a state
-ENOUGH = 1e-6  # what is taken where nothing less is found
-INNER = 0.1  # of that: what GMRES leaves
+CLOSED, ENOUGH = (
+    1e-9,
+    1e-6,
+)  # what a period may leave of the size of a state; what is taken where nothing less is found
+ROUGH = 0.3  # of the tolerance of iterations: what a period may leave where steps iterate
+NEWTON, KRYLOV, INNER = 12, 300, 0.1  # solutions; marches of one; what it may leave, of what a period may
+MIXINGS, PATIENCE, DEPTH = 60, 8, 30  # of Anderson: marches, those without gain, those that it remembers
 SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
-NEWTON, KRYLOV = 12, 300
-MIXINGS, PATIENCE, DEPTH = 60, 8, 30
-ROUGH = 0.3  # of the tolerance of iterations
 REPEATS = (
-    1e-7  # |1 − μ| below which a vibration repeats itself with the period, and nothing says how large it is
+    1e-7  # |1 − μ| of a vibration that repeats itself with the period, so that nothing says how large it is
 )
-SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems and of others
-MULTIPLIERS = 80  # marches for them, at most
+MULTIPLIERS, SURE, ABOUT = (
+    80,
+    1e-7,
+    1e-3,
+)  # marches at most; residuals of linear systems' multipliers, and of others
 Watch = Callable[[int], None]
 """Told of the periods that were marched so far."""
 
@@ -135,7 +140,7 @@ def _fixed(steps: _Watched, x: Flat) -> tuple[Flat, Flat]:
 
 
 def _mixed(steps: _Watched, x: Flat, y: Flat) -> tuple[Flat, Flat]:
-    """x and P(x) nearer to one another, by Anderson mixing: a march for each vibration, where Newton takes them again.
+    """x and P(x) nearer to one another, by Anderson mixing.
 
     Until a period leaves as little as it must, or no march of the last PATIENCE has led nearer.
     """
