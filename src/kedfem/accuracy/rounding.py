@@ -29,7 +29,7 @@ from kedfem.links.record import Link, in_space, mass_times
 
 NOTICED = 1e-5  # of the forces: what is less is not told; scenes of links of one stiffness have 1e-9
 LEFT = {"beam": 2.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 16.0}
-"""Times what S leaves: errors of two- and four-link scenes are a tenth to ten times that (test_rounding)."""
+"""Times what S leaves: in the mean of a two- or four-link scene errors are a tenth to ten times that (test_rounding)."""
 NODAL = 8.0  # of what K0 leaves: the literal solver's factor loses more than its matrix (measured, 5 to 17)
 INSTANTS = 64  # of a block that are looked at
 
