@@ -22,22 +22,15 @@ from kedfem.dynamics.system.period_map import PeriodMap
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring
 from kedfem.errors import SolveError
 
-CLOSED, ENOUGH = (
-    1e-9,
-    1e-6,
-)  # what a period may leave of the size of a state; what is taken where nothing less is found
+CLOSED = 1e-9  # what a period may leave of the size of a state
+ENOUGH = 1e-6  # what is taken where nothing less is found
 ROUGH = 0.3  # of the tolerance of iterations: what a period may leave where steps iterate
 NEWTON, KRYLOV, INNER = 12, 300, 0.1  # solutions; marches of one; what it may leave, of what a period may
 MIXINGS, PATIENCE, DEPTH = 60, 8, 30  # of Anderson: marches, those without gain, those that it remembers
 SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
-REPEATS = (
-    1e-7  # |1 − μ| of a vibration that repeats itself with the period, so that nothing says how large it is
-)
-MULTIPLIERS, SURE, ABOUT = (
-    80,
-    1e-7,
-    1e-3,
-)  # marches at most; residuals of linear systems' multipliers, and of others
+REPEATS = 1e-7  # |1 − μ| of a vibration that repeats itself with the period
+MULTIPLIERS = 80  # marches for them, at most
+SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others
 Watch = Callable[[int], None]
 """Told of the periods that were marched so far."""
 
