@@ -20,6 +20,7 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.frozen import Frozen
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.transient import started
 from kedfem.errors import KedfemError, SolveError
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
@@ -49,13 +50,15 @@ def states(ready: Prepared) -> tuple[np.ndarray, Steady | None]:
     return np.concatenate(blocks), steady_of(ready.scene, solvers)
 
 
+def as_steady(raw: Raw, **analysis: Any) -> Raw:
+    """A scene that asks for its steady motion."""
+    given = {k: v for k, v in raw["analysis"].items() if k not in ("revolutions", "end_time", "initial")}
+    return {**raw, "analysis": {**given, "accuracy": "quick", "kind": "steady", **analysis}}
+
+
 def steady(raw: Raw, **analysis: Any) -> tuple[Prepared, np.ndarray, Steady]:
     """A scene as a steady motion."""
-    given = {k: v for k, v in raw["analysis"].items() if k not in ("revolutions", "end_time", "initial")}
-    scene = over_one_period(
-        scene_from({**raw, "analysis": {**given, "accuracy": "quick", "kind": "steady", **analysis}})
-    )
-    ready = meshed(scene)
+    ready = meshed(over_one_period(scene_from(as_steady(raw, **analysis))))
     found, of = states(ready)
     assert of is not None
     return ready, found, of
@@ -243,6 +246,7 @@ def test_a_multiplier_of_one_level_has_its_order() -> None:
     assert np.all((slopes > 1.9) & (slopes < 2.1))
 
 
+@pytest.mark.long
 def test_the_period_is_that_of_the_loads_and_of_the_gears() -> None:
     assert steady(beams(loads={"gas": FOUR_STROKE}))[2].revolutions == pytest.approx(2)
     assert steady(geared())[2].revolutions == pytest.approx(3)
@@ -294,6 +298,43 @@ def test_what_has_no_period_is_refused() -> None:
 def test_a_spring_that_is_wound_up_is_refused() -> None:
     wound = {"kind": "torsion", "joint": "B", "stiffness": 1.0}
     assert "goes on turning" in refused(planar("beam", springs={"s": wound}))
+
+
+def shaken(speed: float) -> Raw:
+    """A bar that turns under gravity, without damping."""
+    return {
+        "links": {"arm": bar(fidelity="beam", mesh={"elements": 1})}, "gravity": [0, -9.81],
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": constant_speed(speed)},
+        "analysis": {"steps_per_revolution": 48, "rho_inf": 0.999},
+    }  # fmt: skip
+
+
+def test_an_undamped_resonance_is_refused_and_its_frequency_named() -> None:
+    """In its frame the bar's first frequency is √(ω² − Ω²), and gravity turns with Ω: at Ω = ω/√2 they meet.
+
+    ρ∞ is so near to one that what steps make of accelerations and forces themselves does not die away in a period.
+    """
+    omega = clamped(shaken(300.0), "z", 2)[0][0]
+
+    def apart(share: float) -> float:
+        """How far the nearest multiplier is from one."""
+        raw = shaken(share * omega)
+        ready = meshed(over_one_period(scene_from(as_steady(raw))))
+        solver = level_steps(ready.scene, ready.model)[0]
+        started(ready.scene, ready.linkage, ready.path, ready.model, solver)
+        return float(np.abs(solver.steady.multipliers - 1).min())
+
+    below, above = 0.701, 0.704  # the steps' own frequency is a little less
+    share = below + (above - below) * apart(below) / (apart(below) + apart(above))
+    for near in (-2e-5, 6e-5):
+        largest = np.abs(steady(shaken((share + near) * omega))[1]).max()
+        assert_allclose(largest * apart(share + near), 1.5e-3, rtol=0.05)  # grows as it comes nearer
+    assert_allclose(share, 1 / np.sqrt(2), rtol=0.01)
+    said = refused(shaken(share * omega))
+    assert "a resonance without damping" in said
+    named = float(said.split("about ")[1].split(" Hz")[0])
+    assert_allclose(named, omega / 2 / np.pi, rtol=0.01)
 
 
 def test_a_search_that_does_not_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from kedfem.scene import Scene, time_grid, turn_steps
 
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
+KNOWN = 1e-3  # error of the state that is not worth a word
 SETTLED = 0.01  # what is left of a vibration that has died away
 
 
@@ -45,6 +46,11 @@ class Steady:
         if self.growth is None or self.growth >= 1 - GROWS:
             return None
         return max(1, ceil(log(SETTLED) / log(max(self.growth, 1e-300))))
+
+    @property
+    def error(self) -> float:
+        """What the residual adds up to in all periods to come, of the state; 0 where it is not known how it falls."""
+        return self.residual / max(1 - self.growth, GROWS) if self.growth is not None else 0.0
 
     @property
     def notes(self) -> dict[str, str | float]:
@@ -93,6 +99,11 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
         out.append(
             f"steady motion: vibrations about it hardly die away ({100 * (1 - steady.growth):.2g} % in a period): a "
             f"machine would ring for {left}; give the scene its damping"
+        )
+    if steady.error > KNOWN:
+        out.append(
+            f"steady motion: it is known to about {100 * steady.error:.2g} % only: a period leaves {steady.residual:.1g} "
+            "of it, and vibrations hardly die away: give the scene its damping, or smaller steps"
         )
     if not steady.certain:
         out.append(

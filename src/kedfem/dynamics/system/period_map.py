@@ -2,7 +2,7 @@
 
 All that a step remembers is one vector, but for Anderson acceleration's memory, which only saves iterations, and the
 time. The size of a vector is √(u K u + ω² u M u + v M v), ω = 2π/T: everything else of a state follows from displacements
-and rates, but for what numerical damping makes vanish.
+and rates, but for what numerical damping makes vanish, which counts a little (`weighed`).
 
 Sums of states of a linear system are states of it. With co-rotational frames what follows from displacements by other
 than linear functions is found anew (`possible`): strains, how far points have turned, coordinates. A march would
@@ -29,6 +29,8 @@ BLOW, SHORTEST = (
     0.05,
     8.0,
 )  # of the period, and steps at least, that a blow lasts: it excites what these resolve
+SWUNG = ("a", "port_force", "bearing", "multiplier")  # in which steps alternate, by ρ∞ less from step to step
+HIDDEN = 1e-4
 ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole turns
 
 
@@ -54,6 +56,7 @@ class PeriodMap:
         ends = np.concatenate([[0], np.cumsum(sizes)])
         self._at = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(CARRIED)}
         self.period, self._omega = period, TURN / period
+        self._weights: dict[str, float] = {}
         self._now = Instant(of, motion_at, 0.0)
 
     def vector(self, state: State) -> Flat:
@@ -123,15 +126,35 @@ class PeriodMap:
         state.turned[:] = turned(now, z)
         return self.vector(state)
 
+    def weighed(self, like: Flat) -> None:
+        """Count accelerations and forces too, as far as the method's own swing in them is not damped away in a period.
+
+        By HIDDEN of the energy that a vector has, where they are as large as there.
+        """
+        self._weights = {}
+        energy = self.size(like) ** 2
+        for name in SWUNG:
+            here = like[self._at[name]]
+            if (most := float(here @ here)) > 0.0:
+                self._weights[name] = HIDDEN * energy / most
+
     def products(self, basis: Sequence[Flat], x: Flat) -> Flat:
-        """u K u₁ + ω² u M u₁ + v M v₁ of vectors with another [J]; links are as stiff as they are drawn."""
-        u, _, Mu, Mv = self._moving(x)
-        dual = self._forced(u) + self._omega**2 * Mu
-        return np.array([y[self._at["u"]] @ dual + y[self._at["v"]] @ Mv for y in basis])
+        """u K u₁ + ω² u M u₁ + v M v₁ of vectors with another, and what is `weighed` [J]; links are as stiff as drawn."""
+        dual = self._energy(x)
+        dual += [(self._at[name], weight * x[self._at[name]]) for name, weight in self._weights.items()]
+        return np.array([sum(y[here] @ each for here, each in dual) for y in basis])
 
     def size(self, x: Flat) -> float:
         """√ of twice the energy of a vector [J^½]."""
+        return float(np.sqrt(max(sum(x[here] @ each for here, each in self._energy(x)), 0.0)))
+
+    def whole(self, x: Flat) -> float:
+        """√ of the product of a vector with itself [J^½]."""
         return float(np.sqrt(max(self.products([x], x)[0], 0.0)))
+
+    def _energy(self, x: Flat) -> list[tuple[slice, Flat]]:
+        u, _, Mu, Mv = self._moving(x)
+        return [(self._at["u"], self._forced(u) + self._omega**2 * Mu), (self._at["v"], Mv)]
 
     def frequency(self, *shapes: Flat) -> float:
         """At which a vibration of these shapes swings, from its energies [Hz]."""

@@ -23,12 +23,13 @@ from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring
 from kedfem.errors import SolveError
 
 CLOSED = 1e-9  # what a period may leave of the size of a state
-ENOUGH = 1e-6  # what is taken where nothing less is found
+ENOUGH, LOOSE = 1e-8, 1e-6  # what is taken where nothing less is found, of linear systems and of others
 ROUGH = 0.3  # of the tolerance of iterations: what a period may leave where steps iterate
 NEWTON, KRYLOV, INNER = 12, 300, 0.1  # solutions; marches of one; what it may leave, of what a period may
 MIXINGS, PATIENCE, DEPTH = 60, 8, 30  # of Anderson: marches, those without gain, those that it remembers
 SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
-REPEATS = 1e-7  # |1 − μ| of a vibration that repeats itself with the period
+REPEATS = 1e-4  # |1 − μ| of a vibration that repeats itself with the period
+WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
 MULTIPLIERS = 80  # marches for them, at most
 SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others
 Watch = Callable[[int], None]
@@ -112,13 +113,15 @@ def _fixed(steps: _Watched, x: Flat) -> tuple[Flat, Flat]:
     map_, last = steps.map, np.inf
     y = steps(x)
     _refuse_windings(map_, x, y)
+    map_.weighed(y)
     x, y = y, steps(y)  # a period damps most vibrations away
     if not map_.linear:
         x, y = _mixed(steps, x, y)
     for _ in range(NEWTON):
         r, scale = map_.change(y, x), _scale(map_, y)
         left = map_.size(r)
-        if left <= _closed(map_) * scale or (left <= ENOUGH * scale and left > 0.5 * last):
+        enough = (ENOUGH if map_.linear else LOOSE) * scale
+        if left <= _closed(map_) * scale or (left <= enough and left > 0.5 * last):
             return x, y
         if not np.isfinite(left):
             break
@@ -168,7 +171,7 @@ def _solved(steps: _Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
     SolveError
         If a vibration repeats itself with the period.
     """
-    map_, beta = steps.map, steps.map.size(r)
+    map_, beta = steps.map, steps.map.whole(r)
     by = beta if map_.linear else SMALL * scale
     allowed = (
         INNER * _closed(map_) * scale if map_.linear else max(INNER * _closed(map_) * scale, SMALL * beta)
@@ -181,7 +184,7 @@ def _solved(steps: _Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
         e[0] = beta
         d = np.linalg.lstsq(H[: j + 2, : j + 1], e, rcond=None)[0]
         left = float(np.linalg.norm(H[: j + 2, : j + 1] @ d - e))
-        if left <= allowed or H[j + 1, j] <= REPEATS * np.abs(H[: j + 2, : j + 1]).max():
+        if left <= allowed or H[j + 1, j] <= WHOLE * np.abs(H[: j + 2, : j + 1]).max():
             break
         basis.append(w / H[j + 1, j])
     values, shapes = np.linalg.eig(H[: j + 1, : j + 1].astype(complex))
@@ -199,7 +202,7 @@ def _orthogonal(of: PeriodMap, basis: Sequence[Flat], w: Flat) -> tuple[Flat, Fl
         c = of.products(basis, w)
         h[:-1] += c
         w = w - np.einsum("i,ij->j", c, np.asarray(basis))
-    h[-1] = of.size(w)
+    h[-1] = of.whole(w)
     return w, h
 
 
@@ -213,7 +216,8 @@ def _multipliers(steps: _Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray,
     if not map_.linear and map_.size(v) > 0.0:
         blow = [each * (SMALL * scale / map_.size(v)) for each in blow]
         v = map_.change(steps(x, blow), y)
-    size = map_.size(v)
+    map_.weighed(v)
+    size = map_.whole(v)
     if not size > 0.0:
         return np.zeros(1, complex), True
     by = scale or 1.0
@@ -229,17 +233,18 @@ def _multipliers(steps: _Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray,
         if j >= 2 and off[0] <= tolerance * max(abs(found[0]), tolerance):
             good = off <= max(tolerance, 1e-4) * np.maximum(np.abs(found), tolerance)
             return found[good], True
-        if H[j + 1, j] <= 1e-12:
+        if H[j + 1, j] <= WHOLE:
             return found, True
         basis.append(w / H[j + 1, j])
     return found[:1], certain
 
 
 def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:
-    f = of.frequency(*shapes)
+    """What repeats itself with the period, so that nothing says how large it is."""
     return (
-        "analysis.kind: must be a motion whose vibrations die away for a steady state, got a natural vibration of about "
-        f"{f:.4g} Hz that repeats itself with the period and is not damped: give it damping, or another speed"
+        "analysis.kind: must be a motion whose vibrations die away for a steady motion, got a resonance without "
+        f"damping: a natural vibration of about {of.frequency(*shapes):.4g} Hz repeats itself with the period of "
+        f"{of.period:.6g} s; give it damping, or another speed"
     )
 
 
