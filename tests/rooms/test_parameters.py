@@ -122,7 +122,7 @@ def test_what_an_expression_comes_to(text: str, wanted: float, unit: str) -> Non
         ({"links.arm.shape.width": "=r + 1 s"}, "links.arm.shape.width", ["mixes units", "'mm'", "'s'"]),
         ({"links.arm.shape.width": "=r*r"}, "links.arm.shape.width", ["a length", "another kind"]),
         ({"links.arm.shape.width": "=-r"}, "links.arm.shape.width", ["positive", "=-r", "-25 mm"]),
-        ({"links.arm.shape.width": "=" + "r+" * 100 + "r"}, "links.arm.shape.width", ["at most 200"]),
+        ({"links.arm.shape.width": "=" + "r+" * 500 + "r"}, "links.arm.shape.width", ["at most 1000"]),
         ({"links.arm.shape.width": "=r.real"}, "links.arm.shape.width", ["'.'"]),
         ({"links.arm.shape.width": "=3 r"}, "links.arm.shape.width", ["write 3*r"]),
         ({"links.arm.shape.width": "=r*mm"}, "links.arm.shape.width", ["'mm'", "follows its number"]),
@@ -172,6 +172,11 @@ def test_a_parameter_with_a_fault_is_named_where_it_is_used() -> None:
 
 def test_titles_are_no_expressions() -> None:
     assert scene_from(raw({"title": "=r"})).title == "=r"
+
+
+def test_a_long_expression_is_worked_out() -> None:
+    found = evaluated("r+" * 499 + "r", Parameters({"r": "1 mm"}))
+    assert found.m_as("m") == pytest.approx(0.5, rel=1e-12)
 
 
 def test_parameters_may_be_many_and_chained() -> None:

@@ -16,7 +16,7 @@ from typing import Any
 from kedfem.scene.units import crossed, revolutions, unit_of, unit_registry
 from kedfem.scene.wording import shown, unknown_name
 
-LONGEST_EXPRESSION = 200  # letters
+LONGEST_EXPRESSION = 1000  # letters
 MOST_POWER = 9.0  # exponents that are reckoned with, either sign
 NUMBER_HERE = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", re.ASCII)
 WORD_HERE = re.compile(r"[^\W\d]\w*|[°%]")
@@ -135,6 +135,16 @@ class _Walk:
     known: Mapping[str, Any]
 
     def of(self, node: ast.AST) -> Any:
+        later: list[ast.BinOp] = []  # of a long sum or product, whose parts stand one within the other
+        while isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            later.append(node)
+            node = node.left
+        value = self._of_one(node)
+        for each in reversed(later):
+            value = self._combined(type(each.op), value, self.of(each.right))
+        return value
+
+    def _of_one(self, node: ast.AST) -> Any:
         match node:
             case ast.Name(id=name):
                 return self._named(name)
@@ -144,8 +154,6 @@ class _Walk:
                 return self.of(operand)
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
                 return finite(power(self.of(left), self.of(right)))
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
-                return self._combined(type(op), self.of(left), self.of(right))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if arguments:
                 return finite(called(name, [self.of(each) for each in arguments]))
         raise SyntaxError
