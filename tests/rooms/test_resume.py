@@ -1,11 +1,15 @@
 """Runs that were ended from outside go on from their stored state to the same rows, peaks, frames and estimates."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from kedfem.accuracy.histories import Histories, relative_errors
 from kedfem.analysis import Run, analyse
 from kedfem.dynamics import nominal, transient
 from kedfem.errors import OutputError, SceneError
@@ -115,6 +119,42 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
     resumed = analyse(ended, resumes=True)
     assert_same(whole, content(resumed))
     assert not (ended.results_folder / STATE).exists()
+
+
+KERNELS = {"OPENBLAS_CORETYPE", "NUMBA_CPU_NAME"}
+ELSEWHERE = """
+import sys
+from pathlib import Path
+from kedfem.analysis import analyse
+from kedfem.dynamics import nominal, transient
+from tests.rooms.test_resume import turning
+nominal.POINTS = transient.POINTS = 16
+run = analyse(turning(Path(sys.argv[1]), frames=sys.argv[2], extrapolation_levels=2), resumes=True)
+print(max(run.step.errors.values()))
+"""
+
+
+@pytest.mark.long
+@pytest.mark.kernels
+@pytest.mark.parametrize(("frames", "within"), [("rigid-body", 1e-10), ("co-rotational", None)])
+def test_a_run_goes_on_on_another_machine(tmp_path: Path, frames: str, within: float | None) -> None:
+    """With the kernels of another processor: as without an interruption to rounding, or to the step's own error."""
+    whole = analyse(turning(tmp_path / "whole", frames=frames, extrapolation_levels=2))
+    ended = turning(tmp_path / "ended", frames=frames, extrapolation_levels=2)
+    ended_early(ended, 0.6)
+    given = {name: value for name, value in os.environ.items() if name not in KERNELS}
+    others = {} if KERNELS & os.environ.keys() else {"OPENBLAS_CORETYPE": "Prescott"}
+    other = {**given, **others, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "ended"), frames]
+    done = subprocess.run(command, env=other, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    if within is None:
+        assert whole.step is not None
+        within = max(whole.step.errors.values())
+    resumed = read_results(ended.results_folder / "results.h5")
+    assert resumed.status == whole.results.status
+    off = relative_errors(*(Histories(x.time, x.channels) for x in (resumed, whole.results)))
+    assert max(off.values()) < within
 
 
 @pytest.mark.parametrize("levels", [1, pytest.param(2, marks=pytest.mark.long)])
