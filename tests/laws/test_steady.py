@@ -85,8 +85,8 @@ def planar(fidelity: str, **more: Any) -> Raw:
     """A four-bar of steel."""
     link = {**bar(fidelity=fidelity), **more.pop("link", {})}
     return {
-        **four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")), "damping": DAMPED,
-        "analysis": {"steps_per_revolution": 120, "rho_inf": 0.8}, **more,
+        **four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")), "damping": {"beta": 1e-6},
+        "analysis": {"steps_per_revolution": 120, "rho_inf": 0.95}, **more,
     }  # fmt: skip
 
 
@@ -98,6 +98,8 @@ SPRING = {
     "kind": "spring", "between": [{"link": "rocker", "at": "C"}, {"link": "ground", "at": [0.5, 0.5]}],
     "stiffness": 2e4, "damping": 20.0,
 }  # fmt: skip
+MOTOR = {"joint": "D", "torque": {"over": "speed", "at": [-10, 10], "value": [50, -50]}}
+STOP = {"kind": "angle", "joint": "D", "upper": "5 deg", "stiffness": 2e3, "damping": 0.5}
 SOFT = {"alloy": {"density": 2796, "youngs_modulus": 2.5e10, "shear_modulus": 9.5e9}}
 FAST = {"joint": "A", "motion": constant_speed("450 rpm")}
 SWING = {"kind": "cycloidal", "angle": 0.3, "rise": 0.03, "return_time": 0.03, "dwell_after": 0.02}
@@ -130,20 +132,24 @@ def swinging(joint: str, kinds: tuple[str, str] = ("beam", "beam")) -> Raw:
 CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
     "planar beams": (beams(), {}, 12),
     "levels in time": (beams(), {"extrapolation_levels": 2}, 12),
-    "co-rotational": (planar("beam"), {"frames": "co-rotational"}, 10),
+    "co-rotational": (planar("beam"), {"frames": "co-rotational"}, 45),
     "co-rotational, bent far": (
         beams(materials=SOFT, damping={"ratio": 0.02, "frequencies": [20, 200]}, drive=FAST),
         {"frames": "co-rotational"}, 40,
     ),
-    "stiffening": (planar("beam"), {"stiffening": True}, 10),
+    "stiffening": (planar("beam"), {"stiffening": True}, 45),
     "four strokes": (beams(loads={"gas": FOUR_STROKE}), {}, 8),
-    "a spring": (planar("beam", springs={"s": SPRING}), {}, 10),
-    "a spring, co-rotational": (planar("beam", springs={"s": SPRING}), {"frames": "co-rotational"}, 10),
-    "a block on an arm": ({**inverted(revolutions=None), "damping": DAMPED}, {"steps_per_revolution": 120}, 6),
+    "a spring": (planar("beam", springs={"s": SPRING}), {}, 40),
+    "a motor": (planar("beam", motors={"m": MOTOR}), {}, 16),
+    "a motor, co-rotational": (planar("beam", motors={"m": MOTOR}), {"frames": "co-rotational"}, 16),
+    "a limit": (planar("beam", limits={"s": STOP}), {}, 24),
+    "a limit, co-rotational": (planar("beam", limits={"s": STOP}), {"frames": "co-rotational"}, 24),
+    "a spring, co-rotational": (planar("beam", springs={"s": SPRING}), {"frames": "co-rotational"}, 40),
+    "a block on an arm": ({**inverted(revolutions=None), "damping": DAMPED}, {"steps_per_revolution": 120}, 9),
     "plane links, reduced": (
-        planar("plane", link={"reduced": True, "mesh": {"elements": [8, 1]}}), {"reduction_tolerance": 1e-2}, 6,
+        planar("plane", link={"reduced": True, "mesh": {"elements": [8, 1]}}), {"reduction_tolerance": 1e-2}, 50,
     ),
-    "plane links": (planar("plane", link={"mesh": {"elements": [8, 1]}}), {}, 6),
+    "plane links": (planar("plane", link={"mesh": {"elements": [8, 1]}}), {}, 50),
     "gears": (geared(), {}, 4),
     "a screw": (swinging("screw"), {}, 8),
     "a universal joint": (swinging("universal"), {}, 8),

@@ -89,8 +89,11 @@ def unstable(steady: Steady | None) -> str:
 
 def steady_warning(steady: Steady | None) -> tuple[str, ...]:
     """What the user should know."""
-    if steady is None or steady.growth is None:
+    if steady is None:
         return ()
+    if steady.growth is None:
+        text = "steady motion: whether it is stable is not found out where joints have limits, which it may run against"
+        return () if steady.certain else (text,)
     if why := unstable(steady):
         return (f"{why}; take another speed, or more damping outside the moving links",)
     out = []

@@ -19,7 +19,7 @@ from jaxtyping import Complex
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.instant import TURN, Flat
 from kedfem.dynamics.system.period_map import PeriodMap
-from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring
+from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.errors import SolveError
 
 CLOSED = 1e-9  # what a period may leave of the size of a state
@@ -66,7 +66,7 @@ def periodic(over: PeriodMap, stability: bool = True, watch: Watch = lambda marc
 
     Parameters
     ----------
-    stability : whether multipliers are asked for
+    stability : whether multipliers are asked for; with stops there are none, as P is not smooth where these are met
 
     Raises
     ------
@@ -76,7 +76,10 @@ def periodic(over: PeriodMap, stability: bool = True, watch: Watch = lambda marc
     steps = _Watched(over, watch)
     x, y = _fixed(steps, over.vector(over.start))
     residual = over.size(over.change(y, x)) / max(_scale(over, y), 1e-300)
-    found, certain = _multipliers(steps, x, y) if stability else (np.zeros(0, complex), True)
+    stops = any(isinstance(each.law, Stop) for each in over.of.system.constraints)
+    found, certain = np.zeros(0, complex), not stops
+    if stability and not stops:
+        found, certain = _multipliers(steps, x, y)
     return Periodic(over.state(x), over.period, residual, over.marches, found, certain)
 
 
