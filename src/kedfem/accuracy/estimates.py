@@ -161,13 +161,13 @@ def wanted(ready: Prepared) -> tuple[str, ...]:
 
 
 def spanned(scene: Scene, model: Model) -> Scene:
-    """The beginning of an analysis that is too long to be run beside itself."""
+    """The beginning of an analysis that is too long to be run beside itself; of a steady motion its period."""
+    if scene.analysis.kind == "steady":
+        return with_analysis(scene, stability=False)
     grid = time_grid(scene)
     elements = scene.springs or scene.limits
     compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not elements
     most = SPAN if compiled else SLOW
-    if scene.analysis.kind == "steady":
-        return with_analysis(scene, stability=False)
     if grid.steps <= most:
         return scene
     return with_analysis(

@@ -26,6 +26,7 @@ from kedfem.dynamics.system.sparse import Part, SparsePart, momentum
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.dynamics.transient import Steps
 from kedfem.links.record import Link, in_space, mass_times
+from kedfem.links.reduced import rigid_modes
 
 NOTICED = 1e-5  # of the forces: what is less is not told; scenes of links of one stiffness have 1e-9
 LEFT = {"beam": 2.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 16.0}
@@ -34,34 +35,17 @@ NODAL = 8.0  # of what K0 leaves: the literal solver's factor loses more than it
 INSTANTS = 64  # of a block that are looked at
 
 
-def rigid_motions(link: Link) -> Float[np.ndarray, "n d r"]:
-    """Translations along, and small turns about, the axes in which a link moves, as states of it."""
-    planar = link.kind in {"beam", "plane"}
-    X, out = link.X * [1.0, 1.0, 0.0] if planar else link.X, []
-    for c in range(2 if planar else 3):
-        out.append(np.zeros((link.n, link.d)))
-        out[-1][:, c] = link.one
-    for e in np.eye(3)[2 if planar else 0 :]:
-        turn = np.zeros((link.n, link.d))
-        turn[:, : min(link.d, 2 if planar else 3)] = np.cross(e, X)[:, : 2 if planar else 3]
-        if link.kind == "beam":
-            turn[:, 2] = link.one
-        out.append(turn)
-    return np.stack(out, axis=2)
-
-
 def rigid_part(link: Link) -> Float[np.ndarray, "r N"]:
     """What takes the rigid motions out of a state, the nearest in the norm of the mass."""
-    every = rigid_motions(link)
-    flat = every.reshape(link.unknowns, -1)
-    weighed = [mass_times(link.mass, np.ascontiguousarray(x)).ravel() for x in np.moveaxis(every, 2, 0)]
+    flat = rigid_modes(link)
+    weighed = [mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in np.ascontiguousarray(flat.T)]
     return np.asarray(np.linalg.pinv(np.stack(weighed) @ flat) @ np.stack(weighed))
 
 
 def condensed_defect(link: Link, part: Part, c: Coefficients) -> Float[np.ndarray, "q r"]:
     """Forces at ports that each rigid motion of a link leaves by rounding in its condensed stiffness [N/m, N/rad]."""
     out = []
-    for motion in np.moveaxis(rigid_motions(link), 2, 0):
+    for motion in rigid_modes(link).T.reshape(-1, link.n, link.d):
         if isinstance(part, SparsePart):
             x = motion.T.ravel()
             Mx = momentum(link, x)
@@ -73,8 +57,7 @@ def condensed_defect(link: Link, part: Part, c: Coefficients) -> Float[np.ndarra
 
 def nodal_defect(link: Link) -> Float[np.ndarray, "r r"]:
     """Sums of the nodal forces that each rigid motion leaves by rounding in K0, root of squares [N/m, N/rad]."""
-    flat = rigid_motions(link).reshape(link.unknowns, -1)
-    forces = (link.K0 @ flat).reshape(link.n, link.d, -1)
+    forces = (link.K0 @ rigid_modes(link)).reshape(link.n, link.d, -1)
     forces = np.moveaxis(in_space(link, np.moveaxis(forces, 2, 0)), 0, 2)
     return np.diag(np.sqrt((forces**2).sum(axis=(0, 1))))
 
@@ -96,13 +79,13 @@ class Rounding:
     @classmethod
     def of(cls, model: Model, solvers: Sequence[Steps]) -> "Rounding":
         """Of the links of a model, as its solver factored them; co-rotational frames take rigid motion away first."""
-        solver = solvers[0] if solvers else None
-        condensed = isinstance(solver, SystemSteps) and solver.oracle is None
+        first = solvers[0] if solvers else None
+        solver = first if isinstance(first, SystemSteps) and first.oracle is None else None
         defects: list[np.ndarray | None] = []
         for k, link in enumerate(model.links):
             if link.fit is not None or link.rigid:
                 defects.append(None)
-            elif condensed and isinstance(solver, SystemSteps):
+            elif solver is not None:
                 left = condensed_defect(link, solver.ready.parts[k], solver.ready.c)
                 defects.append(LEFT[link.kind] * left)
             else:

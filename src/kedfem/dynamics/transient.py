@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.first_rows import FIRST, INSTANTS
@@ -22,7 +21,7 @@ from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.instant import Instant
-from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
+from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
 from kedfem.dynamics.system.period_map import PeriodMap
 from kedfem.dynamics.system.periodic import periodic
 from kedfem.dynamics.system.start import from_links
@@ -99,9 +98,7 @@ def transient(
         state = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
 
-    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
-        return rigid_motion(linkage, along, t, path_parameter(scene, t))
-
+    motion_at = _motion(scene, linkage, along)
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
@@ -131,9 +128,7 @@ def _corotational(
 ) -> Iterator[Block]:
     """All time points of a system with co-rotational frames; see `transient`."""
 
-    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
-        return rigid_motion(linkage, along, t, path_parameter(scene, t))
-
+    motion_at = _motion(scene, linkage, along)
     state, since, length = mark.state, mark.step, block_length(model)
     if state is None:
         begins = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
@@ -161,6 +156,11 @@ def _corotational(
             yield from _finite(Block(first + k, part, links, exerted=exerted))
 
 
+def _motion(scene: Scene, linkage: Linkage, along: Path) -> Motion:
+    """The rigid-body motion at given times."""
+    return lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t))
+
+
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
     """How the elastic motion begins: at rest, quasi-static, or with the steady state of the solver's own steps.
 
@@ -175,9 +175,7 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     if isinstance(solver, LiteralSteps) or not isinstance(start, State):
         raise ValueError("a steady state must be that of a system, got the monolithic solver's")
 
-    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
-        return rigid_motion(linkage, along, t, path_parameter(scene, t))
-
+    motion_at = _motion(scene, linkage, along)
     over = PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
     solver.steady = periodic(over, scene.analysis.stability, solver.watch)
     return solver.steady.state
@@ -185,14 +183,11 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
 
 def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
     """As `started`, of a motion that begins as it is told to; of a steady one the search for it begins there."""
+    motion_at = _motion(scene, linkage, along)
     if isinstance(solver, CorotationalSteps):
-        return solver.begin(lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t)))
+        return solver.begin(motion_at)
     if not isinstance(solver, SystemSteps):
         return first_states(scene, linkage, along, model, solver.stiffening)
-
-    def motion_at(t: Float[np.ndarray, " T"]) -> RigidMotion:
-        return rigid_motion(linkage, along, t, path_parameter(scene, t))
-
     at_rest = scene.analysis.initial == "rest"
     plain = solver.ready.c.single or solver.stiffening is not None
     damped = _dampers_count(model)

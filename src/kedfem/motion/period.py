@@ -19,6 +19,7 @@ from kedfem.scene import (
     cycle,
     drive_angle,
     path_parameter,
+    turn_steps,
 )
 
 WHOLE = 1e-9  # of a period: how near whole multiples must be
@@ -44,7 +45,7 @@ def over_one_period(scene: Scene) -> Scene:
         raise SceneError("analysis.end_time: is required [s], the period of the steady motion, got nothing")
     rigid = linkage(scene)
     count, time = _periods(scene, rigid, base)
-    stated, turns = scene.analysis.revolutions, isinstance(scene.motion, ConstantSpeed) and _turns(scene)
+    stated, turns = scene.analysis.revolutions, turn_steps(scene) is not None
     if stated is not None and abs(stated - count) > WHOLE * count:
         said = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
         raise SceneError(f"analysis.revolutions: {said}")
@@ -69,10 +70,6 @@ def _sped_up(scene: Scene) -> Scene:
 
     drives = {name: later(drive) for name, drive in scene.drives.items()}
     return scene.model_copy(update={"drive": scene.drive and later(scene.drive), "drives": drives})
-
-
-def _turns(scene: Scene) -> bool:
-    return all(scene.joints[name].kind != "prismatic" for name in scene.driven_joints)
 
 
 def _periods(scene: Scene, rigid: Linkage, base: float) -> tuple[int, float]:

@@ -7,13 +7,12 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.loads import Loads
-from kedfem.output.words import with_prefix
+from kedfem.output.words import NOTHING, with_prefix
 
 SHORT = {
     "drive at peak": "at", "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
     "equivalent, roller bearing": "roller", "drive at largest": "at", "largest power": "peak power",
 }  # fmt: skip
-NOTHING = 1e-9  # of the largest of its row and unit
 
 
 def loads_tables(found: Loads) -> list[Table]:

@@ -58,14 +58,20 @@ class Still:
         trial.u[:] = u
         still_forces(self._c, bodies, R, amounts, self._state, trial, self._work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
-        for k, (K, frame) in enumerate(zip(self.K, bodies.frame, strict=True)):
+        for k, frame in enumerate(bodies.frame):
             if frame > RIGID_BODY:
                 mean[k] = trial.Rp[k]
-                continue
-            d = int(bodies.components[k])
-            turn, here = mean[k, :d, :d], own(self.of, k)
-            f[here] = (turn @ (K @ (turn.T @ u[here].reshape(d, -1)).ravel()).reshape(d, -1)).ravel()
+            else:
+                here = own(self.of, k)
+                f[here] = self.sprung(k, mean[k], u[here])
         return f, mean
+
+    def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
+        """R K0 Rᵀ u of the displacement u (N,) of body k, world components."""
+        d = int(self.of.bodies.components[k])
+        turn = R[:d, :d]
+        g = turn.T @ u.reshape(d, -1)
+        return np.asarray(turn @ (self.K[k] @ g.ravel()).reshape(d, -1)).ravel()
 
 
 @dataclass(frozen=True, slots=True)

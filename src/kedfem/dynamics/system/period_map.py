@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.nominal import forcings
-from kedfem.dynamics.system.arrays import State, copied
+from kedfem.dynamics.system.arrays import State, copied, ends_of
 from kedfem.dynamics.system.instant import TURN, Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
 from kedfem.dynamics.system.march import Ready, march
@@ -25,12 +25,9 @@ CARRIED = (
     "u", "v", "a", "F", "f", "damped", "momentum", "seen", "Q", "angle", "strain", "direction", "turn", "port_force",
     "z", "e", "turned", "bearing", "multiplier",
 )  # fmt: skip
-BLOW, SHORTEST = (
-    0.05,
-    8.0,
-)  # of the period, and steps at least, that a blow lasts: it excites what these resolve
+BLOW, SHORTEST = 0.05, 8.0  # of the period, and steps at least: what a blow lasts, and excites
 SWUNG = ("a", "port_force", "bearing", "multiplier")  # in which steps alternate, by ρ∞ less from step to step
-HIDDEN = 1e-4
+HIDDEN = 1e-4  # of the energy: what these count
 ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole turns
 
 
@@ -52,8 +49,7 @@ class PeriodMap:
         self._steps = steps = round(period / of.c.h)
         t = of.c.h * np.arange(1, steps + 1)
         self._parts = [motion_at(t[k : k + length]) for k in range(0, steps, length)]
-        sizes = [getattr(start, name).size for name in CARRIED]
-        ends = np.concatenate([[0], np.cumsum(sizes)])
+        ends = ends_of([getattr(start, name).size for name in CARRIED])
         self._at = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(CARRIED)}
         self.period, self._omega = period, TURN / period
         self._weights: dict[str, float] = {}
@@ -165,12 +161,9 @@ class PeriodMap:
 
     def _forced(self, u: Flat) -> Flat:
         """R K0 Rᵀ u of all bodies, R at the beginning of the period."""
-        out = np.zeros_like(u)
-        for k, (K, R) in enumerate(zip(self._now.always.still.K, self._now.R, strict=True)):
-            d, here = int(self.of.bodies.components[k]), own(self.of, k)
-            turn = R[:d, :d]
-            out[here] = (turn @ (K @ (turn.T @ u[here].reshape(d, -1)).ravel()).reshape(d, -1)).ravel()
-        return out
+        still = self._now.always.still
+        every = (still.sprung(k, R, u[own(self.of, k)]) for k, R in enumerate(self._now.R))
+        return np.concatenate(list(every))
 
     def _moving(self, x: Flat) -> tuple[Flat, Flat, Flat, Flat]:
         """u, v, M u, M v; coordinates of dense bodies have unit mass."""

@@ -10,11 +10,11 @@ vibrations show which the loads do not excite: by its largest magnitude a vibrat
 (Floquet).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Complex
+from jaxtyping import Complex, Float
 
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.instant import TURN, Flat
@@ -152,14 +152,13 @@ def _mixed(steps: _Watched, x: Flat, y: Flat) -> tuple[Flat, Flat]:
         if left <= _closed(map_) * scale or since > PATIENCE or not np.isfinite(left):
             break
         r0, y0 = r, y
-        basis = [each for each, _ in before]
-        c = np.zeros(0)
-        if basis:
+        x = y
+        if before:
+            basis = [each for each, _ in before]
             G = np.array([map_.products(basis, each) for each in basis])
             c = np.linalg.lstsq(G, map_.products(basis, r), rcond=1e-14)[0]
-        x = map_.possible(
-            y - sum((k * moved for k, (_, moved) in zip(c, before, strict=True)), np.zeros_like(y))
-        )
+            x = y - combined(c, [moved for _, moved in before])
+        x = map_.possible(x)
         y = steps(x)
         r = map_.change(y, x)
         before = [*before, (r - r0, map_.change(y, y0))][-DEPTH:]
@@ -175,27 +174,49 @@ def _solved(steps: _Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
         If a vibration repeats itself with the period.
     """
     map_, beta = steps.map, steps.map.whole(r)
-    by = beta if map_.linear else SMALL * scale
-    allowed = (
-        INNER * _closed(map_) * scale if map_.linear else max(INNER * _closed(map_) * scale, SMALL * beta)
-    )
-    basis, H = [r / beta], np.zeros((KRYLOV + 1, KRYLOV))
-    for j in range(KRYLOV):
-        w = basis[j] - steps.product(x, y, basis[j], by)
-        w, H[: j + 2, j] = _orthogonal(map_, basis, w)
-        e = np.zeros(j + 2)
-        e[0] = beta
-        d = np.linalg.lstsq(H[: j + 2, : j + 1], e, rcond=None)[0]
-        left = float(np.linalg.norm(H[: j + 2, : j + 1] @ d - e))
-        if left <= allowed or H[j + 1, j] <= WHOLE * np.abs(H[: j + 2, : j + 1]).max():
+    least = INNER * _closed(map_) * scale
+    by, allowed = (beta, least) if map_.linear else (SMALL * scale, max(least, SMALL * beta))
+    basis = [r / beta]
+    for H in _arnoldi(steps, (x, y), basis, by, KRYLOV):
+        rest, asked = np.eye(*H.shape) - H, beta * np.eye(len(H))[0]
+        d = np.linalg.lstsq(rest, asked, rcond=None)[0]
+        if float(np.linalg.norm(rest @ d - asked)) <= allowed:
             break
+    values, shapes = np.linalg.eig(rest[:-1].astype(complex))
+    nearest = shapes[:, int(np.abs(values).argmin())]
+    if np.abs(values).min() < REPEATS:
+        raise SolveError(_resonant(map_, [combined(part, basis) for part in (nearest.real, nearest.imag)]))
+    return combined(d, basis)
+
+
+def combined(c: Flat, basis: Sequence[Flat]) -> Flat:
+    """Σ c_i v_i of the first vectors of a basis."""
+    out = np.zeros_like(basis[0])
+    for k, v in zip(c, basis, strict=False):
+        out += k * v
+    return out
+
+
+def _arnoldi(
+    steps: _Watched, at: tuple[Flat, Flat], basis: list[Flat], by: float, most: int
+) -> Iterator[Float[np.ndarray, "j1 j"]]:
+    """H of Φ V = V₊ H, on an orthonormal basis that grows by a vector, and a march, each time.
+
+    It ends where the basis holds all that there is, after `most` marches at the latest.
+
+    Parameters
+    ----------
+    at : x and P(x)
+    basis : its first vector; the others are added
+    by : size of the differences by which Φ is found
+    """
+    H = np.zeros((most + 1, most))
+    for j in range(most):
+        w, H[: j + 2, j] = _orthogonal(steps.map, basis, steps.product(*at, basis[j], by))
+        yield H[: j + 2, : j + 1]
+        if H[j + 1, j] <= WHOLE * max(1.0, np.abs(H[: j + 2, : j + 1]).max()):
+            return
         basis.append(w / H[j + 1, j])
-    values, shapes = np.linalg.eig(H[: j + 1, : j + 1].astype(complex))
-    nearest = int(np.abs(values).argmin())
-    if abs(values[nearest]) < REPEATS:
-        raise SolveError(_resonant(map_, [sum(c * v for c, v in zip(part, basis, strict=False))
-                                          for part in (shapes[:, nearest].real, shapes[:, nearest].imag)]))  # fmt: skip
-    return np.asarray(sum(c * v for c, v in zip(d, basis, strict=False)))
 
 
 def _orthogonal(of: PeriodMap, basis: Sequence[Flat], w: Flat) -> tuple[Flat, Flat]:
@@ -204,7 +225,7 @@ def _orthogonal(of: PeriodMap, basis: Sequence[Flat], w: Flat) -> tuple[Flat, Fl
     for _ in range(2):
         c = of.products(basis, w)
         h[:-1] += c
-        w = w - np.einsum("i,ij->j", c, np.asarray(basis))
+        w = w - combined(c, basis)
     h[-1] = of.whole(w)
     return w, h
 
@@ -223,23 +244,16 @@ def _multipliers(steps: _Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray,
     size = map_.whole(v)
     if not size > 0.0:
         return np.zeros(1, complex), True
-    by = scale or 1.0
-    by *= 1.0 if map_.linear else SMALL
-    basis, H = [v / size], np.zeros((MULTIPLIERS + 1, MULTIPLIERS))
-    found, certain = np.zeros(0, complex), False
-    for j in range(MULTIPLIERS):
-        w, H[: j + 2, j] = _orthogonal(map_, basis, steps.product(x, y, basis[j], by))
-        values, shapes = np.linalg.eig(H[: j + 1, : j + 1].astype(complex))
+    by, found = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex)
+    for H in _arnoldi(steps, (x, y), [v / size], by, MULTIPLIERS):
+        values, shapes = np.linalg.eig(H[:-1].astype(complex))
         order = np.argsort(-np.abs(values))
-        off = H[j + 1, j] * np.abs(shapes[j, order]) / np.linalg.norm(shapes[:, order], axis=0)
+        off = H[-1, -1] * np.abs(shapes[-1, order]) / np.linalg.norm(shapes[:, order], axis=0)
         found = values[order]
-        if j >= 2 and off[0] <= tolerance * max(abs(found[0]), tolerance):
+        if len(found) > 2 and off[0] <= tolerance * max(abs(found[0]), tolerance):
             good = off <= max(tolerance, 1e-4) * np.maximum(np.abs(found), tolerance)
             return found[good], True
-        if H[j + 1, j] <= WHOLE:
-            return found, True
-        basis.append(w / H[j + 1, j])
-    return found[:1], certain
+    return (found, True) if len(found) < MULTIPLIERS else (found[:1], False)
 
 
 def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:
