@@ -39,6 +39,7 @@ from kedfem.results.additions import add_account, add_peaks, mark_doubtful
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.data_sets import drive_heading
 from kedfem.results.envelope import Envelope, highest, peaks
 from kedfem.results.force_elements import measured_actions
 from kedfem.results.hot_spots import hot_spots
@@ -180,7 +181,7 @@ def _highest_stresses(
     scene: Scene, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]
 ) -> None:
     """The envelope of stresses, and the top ten of each link."""
-    named = f"{drive.name.replace('_', ' ')} [{drive.unit}]"
+    named = drive_heading(drive)
     extremes = Extremes(envelope.links(), envelope.when(), doubts, named)
     write_envelope(folder, extremes, scene.output.csv)
     write_top(folder, hot_spots(extremes.found, extremes.when, doubts), named)

@@ -8,6 +8,7 @@ from typing import Any
 
 from kedfem.accuracy.study import Measured, Study
 from kedfem.results.files import replacing
+from kedfem.results.table import text_file
 
 COLUMNS = (
     "fidelity", "fineness", "times the steps", "reduction", "steps", "unknowns", "preparation [s]", "stepping [s]",
@@ -40,7 +41,7 @@ def write_study(study: Study, path: Path, machine: str) -> None:
     OutputError
         The file cannot be written.
     """
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(path) as file:
         file.write(f"# measured on: {machine}\n")
         file.write(f"# reference: {study.reference.variant.name}; its own error about {study.floor!r}\n")
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")

@@ -9,9 +9,10 @@ from jaxtyping import Bool, Float
 
 from kedfem.output.plots import figure_saved
 from kedfem.output.units import prefixed
-from kedfem.results import Results, replacing
+from kedfem.results import Results
+from kedfem.results.data_sets import drive_heading
 from kedfem.results.loads import DriveLoad, JointLoad, facing
-from kedfem.results.table import DIGITS
+from kedfem.results.table import cell, text_file, write_numbers
 
 XYZ = "xyz"
 Columns = dict[str, Float[np.ndarray, " T"]]
@@ -52,11 +53,9 @@ def write_drive_load(path: Path, load: DriveLoad, results: Results, rows: Bool[n
 
 
 def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    drive = f"{results.drive.name.replace('_', ' ')} [{results.drive.unit}]"
-    every = {"time [s]": results.time, drive: results.angle} | columns
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerow(every)
-        np.savetxt(file, np.column_stack([x[rows] for x in every.values()]), fmt=DIGITS, delimiter=",")
+    every = {"time [s]": results.time, drive_heading(results.drive): results.angle} | columns
+    with text_file(path) as file:
+        write_numbers(file, every, np.column_stack([x[rows] for x in every.values()]))
 
 
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
@@ -68,12 +67,11 @@ def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]
         The file cannot be written.
     """
     names = list(dict.fromkeys(name for found in every.values() for name in found))
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(path) as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([what, *names])
         for key, found in every.items():
-            values = [found.get(name, np.nan) for name in names]
-            table.writerow([key, *("" if np.isnan(x) else DIGITS % x for x in values)])
+            table.writerow([key, *(cell(found.get(name, np.nan)) for name in names)])
 
 
 def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.vtu import write_points
-from kedfem.results import Peak, replacing
+from kedfem.results import Peak
 from kedfem.results.envelope import LinkEnvelope
 from kedfem.results.hot_spots import drawn_points
-from kedfem.results.table import DIGITS
+from kedfem.results.table import cell, text_file
 
 ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"
 KINDS = ("highest von Mises", "largest principal", "smallest principal")
@@ -70,11 +70,11 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
     names = [(each.link, k) for each, points in every for k in range(len(points))]
     numbers = np.column_stack([X, *columns.values()])
     words = [word for each in extremes.near for word in each]
-    with replacing(folder / POINTS) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(folder / POINTS) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         for (link, node), row, word in zip(names, numbers, words, strict=True):
-            writer.writerow([link, node, *("" if np.isnan(x) else DIGITS % x for x in row), word])
+            writer.writerow([link, node, *map(cell, row), word])
 
 
 def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> None:
@@ -97,10 +97,10 @@ def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> 
         "node",
         "near",
     ]
-    with replacing(folder / TOP) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(folder / TOP) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         for link, peaks in every.items():
             for rank, peak in enumerate(peaks, start=1):
-                numbers = [DIGITS % x for x in (peak.stress, *peak.place, peak.time, peak.angle)]
+                numbers = map(cell, (peak.stress, *peak.place, peak.time, peak.angle))
                 writer.writerow([link, rank, *numbers, peak.node, peak.near])

@@ -6,7 +6,7 @@ import numpy as np
 
 from kedfem.results.dimensions import cf_units, columns_dimension
 from kedfem.results.extras import of_extra
-from kedfem.results.records import Results
+from kedfem.results.records import Channel, Results
 
 
 def as_data_tree(results: Results) -> Any:
@@ -48,9 +48,14 @@ def as_data_frame(results: Results) -> Any:
     return pandas.DataFrame(columns_of(results)[:, 1:], pandas.Index(results.time, name=first), names)
 
 
+def drive_heading(drive: Channel) -> str:
+    """Name of the drive's position with its unit."""
+    return f"{drive.name.replace('_', ' ')} [{drive.unit}]"
+
+
 def header(results: Results) -> list[str]:
     """Names of all columns with their units, time and drive first."""
-    out = ["time [s]", f"{results.drive.name.replace('_', ' ')} [{results.drive.unit}]"]
+    out = ["time [s]", drive_heading(results.drive)]
     for channel, _ in results.channels.values():
         out += [f"{channel.name} {column} [{channel.unit}]" for column in channel.columns]
     return out

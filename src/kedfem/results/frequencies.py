@@ -1,13 +1,11 @@
 """Natural frequencies over positions as a table for spreadsheets."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.results.files import replacing
-from kedfem.results.table import DIGITS
+from kedfem.results.table import text_file, write_numbers
 
 
 def write_frequencies(
@@ -23,6 +21,5 @@ def write_frequencies(
     """
     header = ["time [s]", "drive travel [m]" if slides else "drive angle [rad]"]
     header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerow(header)
-        np.savetxt(file, np.column_stack([t, place, values]), fmt=DIGITS, delimiter=",")
+    with text_file(path) as file:
+        write_numbers(file, header, np.column_stack([t, place, values]))

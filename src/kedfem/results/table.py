@@ -1,9 +1,13 @@
 """Results as a table for spreadsheets and data frames."""
 
 import csv
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.results.data_sets import as_data_frame, columns_of, header
 from kedfem.results.extras import of_extra
@@ -32,11 +36,34 @@ def write_csv(results: Results, path: Path) -> None:
     OutputError
         The file cannot be written.
     """
-    with replacing(Path(path)) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(Path(path)) as file:
         if results.status != "complete":
             file.write(f"# not a whole run: {results.status} after {len(results.time)} steps\n")
-        csv.writer(file, lineterminator="\n").writerow(header(results))
-        np.savetxt(file, columns_of(results), fmt=DIGITS, delimiter=",")
+        write_numbers(file, header(results), columns_of(results))
+
+
+@contextmanager
+def text_file(path: Path) -> Iterator[TextIO]:
+    """A table's file, which takes its place when it is whole.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        yield file
+
+
+def write_numbers(file: TextIO, names: Iterable[str], values: Float[np.ndarray, "n c"]) -> None:
+    """A line of names, and a line of numbers for each row."""
+    csv.writer(file, lineterminator="\n").writerow(names)
+    np.savetxt(file, values, fmt=DIGITS, delimiter=",")
+
+
+def cell(x: float) -> str:
+    """A number in a table; nothing where it is not known."""
+    return "" if np.isnan(x) else DIGITS % x
 
 
 def write_parquet(results: Results, path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kedfem.results import replacing
 from kedfem.results.layout import opened
-from kedfem.results.table import DIGITS
+from kedfem.results.table import DIGITS, text_file
 from kedfem.results.writer import installed_version
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.extremes import MAGNITUDE
@@ -56,7 +56,7 @@ def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> No
     header += [
         f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS
     ]
-    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+    with text_file(path) as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*header, "message"])
         for k, row in enumerate(rows):
