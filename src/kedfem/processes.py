@@ -3,8 +3,10 @@
 Nothing else in kedfem may need Linux; what a system does not know is left out here. Locks are filelock's.
 """
 
+import _thread
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,22 +19,50 @@ from typing import IO, Any
 
 INTERRUPTIONS = ("SIGTERM", "SIGBREAK", "SIGHUP")
 POLL = 0.5  # seconds between two looks for the parent
+AGAIN = 0.05  # seconds until an interruption that was dropped is raised again
+_asked: list[int] = []  # the signals that have interrupted this process
 
 
 def end_as_interrupted() -> None:
     """Let the system's wish that this process end do what Ctrl-C does, unless the process was told to ignore it.
 
-    SIGBREAK is that wish on Windows; SIGHUP is sent when a terminal is closed.
+    SIGBREAK is that wish on Windows; SIGHUP is sent when a terminal is closed. Raised where Python drops what is raised
+    (finalizers, functions that a library calls back), an interruption is raised again a little later.
     """
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        del number, frame
-        raise KeyboardInterrupt
-
-    for name in INTERRUPTIONS:
+    for name in ("SIGINT", *INTERRUPTIONS):
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, interrupt)
+        if number is not None and signal.getsignal(number) in {signal.SIG_DFL, signal.default_int_handler}:
+            signal.signal(number, _interrupt)
+    told = sys.unraisablehook
+
+    def dropped(what: "sys.UnraisableHookArgs") -> None:
+        if _asked and issubclass(what.exc_type, KeyboardInterrupt):
+            again = threading.Timer(AGAIN, _interrupt_main, _asked[-1:])
+            again.daemon = True
+            again.start()
+        else:
+            told(what)
+
+    sys.unraisablehook = dropped
+
+
+def interruption_asked() -> bool:
+    """Whether `end_as_interrupted` has interrupted this process: what else goes wrong then may come of that."""
+    return bool(_asked)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    del frame
+    _asked.append(number)
+    raise KeyboardInterrupt
+
+
+def _interrupt_main(number: int) -> None:
+    """Send the main thread a signal; where a system has none for threads, it is not woken from waiting."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+    else:
+        _thread.interrupt_main(signal.Signals(number))
 
 
 @contextmanager

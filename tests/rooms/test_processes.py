@@ -86,6 +86,56 @@ def test_a_wish_to_end_is_ctrl_c_unless_it_was_ignored_before(name: str, before:
     assert said.strip() == end
 
 
+DROPPED = """
+import ctypes, os, signal, sys, time, weakref
+from kedfem.processes import end_as_interrupted
+end_as_interrupted()
+
+def struck(*_):
+    os.kill(os.getpid(), signal.Signals[sys.argv[2]])
+    for _ in range(100):
+        pass  # here it is raised, and nobody hears of it
+
+class Finalized:
+    def __del__(self):
+        struck()
+
+class Plain:
+    pass
+
+def finalizer():
+    Finalized()
+
+def weak_reference():
+    plain = Plain()
+    seen = weakref.ref(plain, struck)
+    del plain
+
+def called_back():
+    ctypes.CFUNCTYPE(None)(struck)()
+
+try:
+    globals()[sys.argv[1]]()
+    print("went on")
+    time.sleep(30.0)
+    print("undisturbed")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="a process cannot send itself signals there")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("where", ["finalizer", "weak_reference", "called_back"])
+def test_an_interruption_that_python_drops_is_raised_again(where: str, name: str) -> None:
+    """What is raised in a finalizer or a function that C calls is otherwise printed, forgotten, and the run goes on."""
+    done = subprocess.run(
+        [sys.executable, "-c", DROPPED, where, name], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.stdout.split() == ["went", "on", "interrupted"]
+    assert done.stderr == ""
+
+
 MASKED = """
 import builtins, os, signal, sys
 from pathlib import Path

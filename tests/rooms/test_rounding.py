@@ -28,12 +28,16 @@ DIRECTIONS = {
 BASE = 1e6  # the ratio at which the stiff link is as good as rigid, and rounding costs some 1e-3 at the most
 
 
+def oriented(direction: str, *x: float) -> list[float]:
+    """A point or vector, turned with its scene."""
+    return [float(each) for each in DIRECTIONS[direction].apply(x)]
+
+
 def welded(fidelity: str, direction: str, ratio: float) -> dict[str, Any]:
     """A driven bar with a much stiffer one welded to its end, in a field of 100 g; about x, y, z or an oblique axis."""
-    turn = DIRECTIONS[direction]
 
     def at(*x: float) -> list[float]:
-        return [float(each) for each in turn.apply(x)]
+        return oriented(direction, *x)
 
     def bar(material: str, a: float, b: float) -> dict[str, Any]:
         shape = {"kind": "bar", "between": [at(a, 0, 0), at(b, 0, 0)], "width": 0.02, "thickness": 0.02}
@@ -68,6 +72,39 @@ def four_bar(link: str, ratio: float, **analysis: Any) -> dict[str, Any]:
         "extrapolation_levels": 1, **analysis,
     }  # fmt: skip
     return raw | {"output": {"plots": False, "picture": False, "csv": False}}
+
+
+def corotational(stiff: str, fidelity: str, direction: str, ratio: float) -> dict[str, Any]:
+    """A four-bar with co-rotational frames, one of its links stiffer, moved by one turn from rest to rest."""
+    corners = {"A": (0.0, 0.0, 0.0), "B": (0.1, 0.0, 0.0), "C": (0.2, 0.3, 0.0), "D": (0.4, 0.0, 0.0)}
+    at = {name: oriented(direction, *x) for name, x in corners.items()}
+    ends = {"crank": "AB", "coupler": "BC", "rocker": "CD"}
+    joined = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"]}
+    axis = oriented(direction, 0, 0, 1)
+
+    def bar(name: str) -> dict[str, Any]:
+        shape = {"kind": "bar", "between": [at[x] for x in ends[name]], "width": 0.02, "thickness": 0.02}
+        material = "stiffer" if name == stiff else "plain"
+        return {
+            "fidelity": fidelity,
+            "material": material,
+            "shape": shape,
+            "mesh": {"elements": ELEMENTS[fidelity]},
+        }
+
+    return {
+        "materials": {"plain": STEEL, "stiffer": {**STEEL, "youngs_modulus": ratio * 2e11}},
+        "links": {name: bar(name) for name in ends},
+        "joints": {
+            name: {"kind": "revolute", "links": links, "at": at[name], "axis": axis}
+            for name, links in (joined | {"D": ["rocker", "ground"]}).items()
+        },
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": "360 deg", "rise": 0.6}},
+        "analysis": {
+            "accuracy": "quick", "step": 6e-4, "end_time": 0.6, "frames": "co-rotational", "extrapolation_levels": 1,
+        },
+        "damping": {"ratio": 0.02, "frequencies": [20, 2000]}, "output": {},
+    }  # fmt: skip
 
 
 def estimate(run: Ran) -> float:
@@ -159,3 +196,28 @@ def test_a_stiff_link_and_the_literal_solver() -> None:
     reference = ran(four_bar("coupler", BASE))
     runs = [ran(four_bar("coupler", 10.0**k, solver="monolithic")) for k in (8, 9, 10, 11)]
     honest(runs, reference)
+
+
+@pytest.mark.parametrize(
+    ("stiff", "fidelity", "direction"),
+    [
+        ("rocker", "beam", "z"),
+        *(
+            pytest.param(stiff, fidelity, direction, marks=pytest.mark.long)
+            for stiff in ("crank", "coupler", "rocker")
+            for fidelity in ("beam", "plane", "solid")
+            for direction in DIRECTIONS
+            if (stiff, fidelity, direction) != ("rocker", "beam", "z")
+            and (fidelity != "plane" or direction == "z")
+            and (stiff == "coupler" or direction not in {"x", "y"})
+        ),
+    ],
+)
+def test_a_stiff_link_with_co_rotational_frames(stiff: str, fidelity: str, direction: str) -> None:
+    runs = [ran(corotational(stiff, fidelity, direction, each)) for each in (1e6, 1e7)]
+    honest(runs, ran(corotational(stiff, fidelity, direction, 1e4)))
+
+
+def test_links_of_one_stiffness_with_co_rotational_frames_lose_nothing_worth_telling() -> None:
+    run = ran(corotational("rocker", "beam", "oblique", 1.0))
+    assert 0.0 < estimate(run) < 1e-7

@@ -12,7 +12,7 @@ from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick,
 from kedfem.cli.screen import err, out, progress, show
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
-from kedfem.processes import end_as_interrupted
+from kedfem.processes import end_as_interrupted, interruption_asked
 
 __all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
 
@@ -441,6 +441,9 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("KEDFEM_DEBUG"):
             raise
+        if interruption_asked():  # raised within a library that went on without what it interrupted
+            err.print("interrupted", style="yellow")
+            sys.exit(INTERRUPTED)
         what = f"{type(error).__name__}: {error}"
         err.print(
             f"internal error: {what}\nThis is a defect of kedfem; KEDFEM_DEBUG=1 shows where.",
