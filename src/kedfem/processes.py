@@ -20,6 +20,7 @@ from typing import IO, Any
 INTERRUPTIONS = ("SIGTERM", "SIGBREAK", "SIGHUP")
 POLL = 0.5  # seconds between two looks for the parent
 AGAIN = 0.05  # seconds until an interruption that was dropped is raised again
+LATE = 75  # the exit status of a worker that was ended by `at_most`
 _asked: list[int] = []  # the signals that have interrupted this process
 
 
@@ -111,6 +112,29 @@ def end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="end with parent", daemon=True).start()
+
+
+@contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """End a worker, with status LATE, where what it does within takes more processor time; no other process.
+
+    A thread watches it: libraries that are called let others run. A limit within that of `bounded`, on every system.
+    """
+    if not end_with_parent.cache_info().currsize:
+        yield
+        return
+    done, end = threading.Event(), time.process_time() + seconds
+
+    def watch() -> None:
+        while not done.wait(POLL):
+            if time.process_time() > end:
+                os._exit(LATE)
+
+    threading.Thread(target=watch, name="at most", daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
 
 
 @contextmanager

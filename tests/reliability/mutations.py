@@ -2,6 +2,8 @@
 
 import copy
 import random
+import re
+from collections.abc import Callable
 from typing import Any
 
 NUMBERS: list[Any] = [
@@ -33,6 +35,8 @@ NESTED: list[Any] = [
     None,
 ]
 Place = tuple[Any, ...]
+Raw = dict[str, Any]
+MOST_STEPS = 24  # of a whole short run
 
 
 def places(x: Any, at: Place = ()) -> list[Place]:
@@ -124,3 +128,56 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
             one, other, size = rng.randrange(len(out)), rng.randrange(len(out)), rng.randrange(1, 64)
             out[one : one + size] = out[other : other + size]
     return bytes(out)
+
+
+def flipped(content: bytes, rng: random.Random) -> bytes:
+    """Some bytes are others."""
+    out = bytearray(content)
+    for _ in range(rng.choice((1, 5, 50))):
+        out[rng.randrange(len(out))] = rng.randrange(256)
+    return bytes(out)
+
+
+def cut(content: bytes, rng: random.Random) -> bytes:
+    """A piece is missing."""
+    start = rng.randrange(len(content))
+    return content[:start] + content[start + rng.randrange(1, max(2, len(content) // 4)) :]
+
+
+def renumbered(content: bytes, rng: random.Random) -> bytes:
+    """Some numbers are others: negative, huge, not a number, zero."""
+    spots = list(re.finditer(rb"\d+(?:\.\d*)?", content))
+    for spot in sorted(rng.sample(spots, min(len(spots), rng.choice((1, 4, 20)))), key=lambda x: -x.start()):
+        other = rng.choice((b"-1", b"0", b"99999999999", b"1e308", b"nan", b"7"))
+        content = content[: spot.start()] + other + content[spot.end() :]
+    return content
+
+
+def shuffled(content: bytes, rng: random.Random) -> bytes:
+    """Lines at other places, some twice."""
+    lines = content.splitlines(keepends=True)
+    for _ in range(rng.choice((1, 5, 20))):
+        lines.insert(rng.randrange(len(lines)), lines[rng.randrange(len(lines))])
+        lines.pop(rng.randrange(len(lines)))
+    return b"".join(lines)
+
+
+def noise(content: bytes, rng: random.Random) -> bytes:
+    """Random bytes, with the beginning and the end of the real file or without."""
+    middle = rng.randbytes(rng.randrange(1, 3000))
+    return middle if rng.random() < 0.3 else content[:300] + middle + content[-200:]
+
+
+DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (flipped, cut, renumbered, shuffled, noise)
+
+
+def short(raw: Raw) -> Raw:
+    """The scene with few steps, plain defaults and nothing drawn."""
+    analysis = raw.get("analysis")
+    analysis = dict(analysis) if isinstance(analysis, dict) else {}
+    for key in ("revolutions", "steps_per_revolution", "end_time", "step", "accuracy"):
+        analysis.pop(key, None)
+    analysis |= {"step": 1e-3, "end_time": 1e-3 * MOST_STEPS, "accuracy": "quick", "extrapolation_levels": 1}
+    output = {"animation": {"frames_per_revolution": 12}, "plots": False, "picture": False, "csv": False}
+    probes = raw.get("output", {}).get("probes") if isinstance(raw.get("output"), dict) else None
+    return raw | {"analysis": analysis, "output": output | ({"probes": probes} if probes is not None else {})}

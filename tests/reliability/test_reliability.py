@@ -12,8 +12,9 @@ from kedfem.errors import KedfemError
 from kedfem.processes import memory_held, most_memory
 from kedfem.scene import scene_from
 from tests.reliability import endurance, fuzz, kills, phases
-from tests.reliability.mutations import damaged, mutated, nudged, places
+from tests.reliability.mutations import nudged, short
 from tests.rooms.test_bad_scenes import GOOD
+from tests.scenes import example
 
 FOUND = (Path(__file__).parent / "findings.toml").read_text(encoding="utf-8")
 FINDINGS = tomllib.loads(FOUND).get("finding", [])
@@ -78,7 +79,7 @@ def test_many_scenes_and_files(tmp_path: Path) -> None:
     tally = fuzz.Tally()
     with np.errstate(all="ignore"):
         fuzz.validate_scenes(tally, 1000, seed=3)
-        fuzz.read_files(tally, 200, 3, tmp_path)
+        fuzz.damaged_files(tally, 200, 3, tmp_path)
         fuzz.run_scenes(tally, 4, 3, tmp_path, ("spinning_bar", "four_bar_beams"))
     assert not tally.findings, tally.page()
 
@@ -131,7 +132,7 @@ def test_many_steps_leave_joints_closed_and_the_motion_what_it_was() -> None:
 
 
 def test_nudged_scenes_are_other_scenes() -> None:
-    raw = fuzz.short(fuzz.example("four_bar_beams"))
+    raw = short(example("four_bar_beams"))
     seen = {repr(nudged(raw, random.Random(k))) for k in range(20)}
     assert len(seen) > 15
     assert scene_from(raw)

@@ -1,8 +1,6 @@
 """Files damaged at random, and of very many faces: a mesh or a sentence, never a traceback or a library's own words."""
 
 import random
-import re
-from collections.abc import Callable
 from pathlib import Path
 from time import process_time
 
@@ -17,68 +15,15 @@ from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.isolated import LONGEST, silent
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import Cad, link_from
+from tests.reliability.files import MESHES, sound_parts
+from tests.reliability.mutations import DAMAGES
 
-from .cad_files import FORMATS, lever, written
-from .test_mesh_files import box
-
-MESHES = ("msh", "unv", "bdf", "med", "mesh", "vtk", "inp", "vtu", "xdmf")
+from .cad_files import FORMATS
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A part and a mesh in all forms."""
-    import meshio
-
-    folder = tmp_path_factory.mktemp("sound")
-    written(folder, "part", lever)
-    for ending in MESHES[:7]:
-        box(folder / f"part.{ending}")
-    raw = meshio.read(folder / "part.vtk")
-    solid = meshio.Mesh(raw.points, [("tetra10", raw.cells_dict["tetra10"])])
-    for ending in MESHES[7:]:
-        solid.write(folder / f"part.{ending}", **({"data_format": "XML"} if ending == "xdmf" else {}))
-    return folder
-
-
-def flipped(content: bytes, rng: random.Random) -> bytes:
-    """Some bytes are others."""
-    out = bytearray(content)
-    for _ in range(rng.choice((1, 5, 50))):
-        out[rng.randrange(len(out))] = rng.randrange(256)
-    return bytes(out)
-
-
-def cut(content: bytes, rng: random.Random) -> bytes:
-    """A piece is missing."""
-    start = rng.randrange(len(content))
-    return content[:start] + content[start + rng.randrange(1, max(2, len(content) // 4)) :]
-
-
-def renumbered(content: bytes, rng: random.Random) -> bytes:
-    """Some numbers are others: negative, huge, not a number, zero."""
-    spots = list(re.finditer(rb"\d+(?:\.\d*)?", content))
-    for spot in sorted(rng.sample(spots, min(len(spots), rng.choice((1, 4, 20)))), key=lambda x: -x.start()):
-        other = rng.choice((b"-1", b"0", b"99999999999", b"1e308", b"nan", b"7"))
-        content = content[: spot.start()] + other + content[spot.end() :]
-    return content
-
-
-def shuffled(content: bytes, rng: random.Random) -> bytes:
-    """Lines at other places, some twice."""
-    lines = content.splitlines(keepends=True)
-    for _ in range(rng.choice((1, 5, 20))):
-        lines.insert(rng.randrange(len(lines)), lines[rng.randrange(len(lines))])
-        lines.pop(rng.randrange(len(lines)))
-    return b"".join(lines)
-
-
-def noise(content: bytes, rng: random.Random) -> bytes:
-    """Random bytes, with the beginning and the end of the real file or without."""
-    middle = rng.randbytes(rng.randrange(1, 3000))
-    return middle if rng.random() < 0.3 else content[:300] + middle + content[-200:]
-
-
-DAMAGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (flipped, cut, renumbered, shuffled, noise)
+    return sound_parts(tmp_path_factory.mktemp("sound"))
 
 
 def check(sound: Path, folder: Path, ending: str, number: int, capfd: pytest.CaptureFixture[str]) -> bool:

@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 
 import kedfem
+from kedfem.errors import MeshError
+from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.processes import POLL, at_most
 
 BUSY = """
 import os, sys, time
@@ -72,6 +75,35 @@ def test_a_worker_ends_with_its_killed_parent(tmp_path: Path) -> None:
     finally:
         if alive(worker):
             os.kill(worker, signal.SIGKILL)
+
+
+def reading(file: Path, hangs: int) -> int:
+    """Work that hangs as it reads in the first so many processes; the number of the one that came to its end."""
+    tried = len(file.read_text()) + 1
+    file.write_text(tried * "x")
+    with at_most(0.2):
+        while tried <= hangs:
+            pass
+    return tried
+
+
+def test_a_part_that_hangs_as_it_is_read_is_tried_in_three_processes(tmp_path: Path) -> None:
+    file = tmp_path / "tries"
+    file.write_text("")
+    assert apart("part", PART, LONGEST, reading, file, 2) == 3
+    file.write_text("")
+    with pytest.raises(
+        MeshError, match=r"^part: must be a part .*, got one that they had not read in time; mend"
+    ):
+        apart("part", PART, LONGEST, reading, file, 9)
+    assert file.read_text() == "xxx"
+
+
+def test_a_process_that_is_no_worker_is_not_ended() -> None:
+    with at_most(0.0):
+        end = time.process_time() + 2 * POLL
+        while time.process_time() < end:
+            pass
 
 
 @pytest.mark.parametrize("name", [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)])

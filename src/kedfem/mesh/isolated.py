@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.file import silent
-from kedfem.processes import bounded, end_with_parent
+from kedfem.processes import LATE, bounded, end_with_parent
 
 LONGEST = 180  # seconds of processor time after which a part is given up
 READING = 60  # seconds of processor time after which a mesh file is given up
+TRIES = 3  # processes that are tried with a part that cannot be read in time
 MOST_MEMORY = 6e9  # bytes that the process may hold
 PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
 PART = (
@@ -31,7 +32,7 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
 
     Nothing that they write reaches the terminal. The process is ended after work that raises: what a damaged file leaves
     in a library's memory is not known. OpenCASCADE refuses some files in one process and hangs or breaks down at them in
-    another: where a process breaks down, or a used one hangs, a new one tries once.
+    another: where a process breaks down, or a used one hangs, a new one tries once; where one hangs as it reads, two.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     reason = ""
-    for _ in range(2):
+    for tried in range(1, TRIES + 1):
         executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
         used = executor.executor_id in _used
         _used.add(executor.executor_id)
@@ -65,13 +66,15 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
             reason = f"got one for which they need more than {MOST_MEMORY / 1e9:g} GB of memory"
             break
         except TerminatedWorkerError as error:
-            late = "SIGXCPU" in str(error)
+            late, reading = "SIGXCPU" in str(error), f"({LATE})" in str(error)
             reason = (
-                f"got none within {seconds:g} s of processor time"
+                "got one that they had not read in time"
+                if reading
+                else f"got none within {seconds:g} s of processor time"
                 if late
                 else "got one at which they broke down"
             )
-            if late and not used:
+            if not reading and (tried == TRIES - 1 or (late and not used)):
                 break
         except Exception:
             executor.shutdown(kill_workers=True)

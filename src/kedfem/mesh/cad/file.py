@@ -15,6 +15,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
 from kedfem.mesh.places import in_mm
 from kedfem.mesh.session import gmsh_options
+from kedfem.processes import at_most
 
 Format = Literal["STEP", "IGES", "BREP"]
 ENDINGS: dict[str, Format] = {
@@ -27,6 +28,10 @@ ENDINGS: dict[str, Format] = {
 _MILLIMETRE = 1e-3
 _BREP_UNIT = 1e-3
 SMALLEST, LARGEST = 1e-5, 1e3  # [m], of a part's box: beyond them the unit must be wrong
+_READING, _READING_MB = (
+    20.0,
+    10.0,
+)  # seconds of processor time that reading may take, and more per megabyte of the file
 _ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
 _GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is told
 _SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
@@ -91,11 +96,18 @@ def _whole_brep(text: bytes) -> bool:
 def read_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
     """The tags of a file's solids, now in gmsh's model in metres, and what was mended; closed faces are made one.
 
+    A worker that takes too long for it is ended: at some damaged files OpenCASCADE hangs in one process, not in the next.
+
     Raises
     ------
     MeshError
         OpenCASCADE cannot read the file, or there is no solid in it.
     """
+    with at_most(_READING + _READING_MB * file.path.stat().st_size / 1e6):
+        return _solids(gmsh, file)
+
+
+def _solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
     scaling = _scaling(file)
     imported(gmsh, file, scaling, sewing=None)
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
