@@ -12,7 +12,7 @@ from kedfem.errors import KedfemError
 from kedfem.processes import memory_held, most_memory
 from kedfem.scene import scene_from
 from tests.reliability import endurance, fuzz, kills, phases
-from tests.reliability.mutations import nudged, short
+from tests.reliability.mutations import damaged, mutated, nudged, places, short
 from tests.rooms.test_bad_scenes import GOOD
 from tests.scenes import example
 

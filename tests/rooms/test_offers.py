@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ import pytest
 from kedfem.links.part_candidates import axis_in_words, offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.cad.solids import CadFace
 from kedfem.mesh.cad.words import face_form, face_in_words, with_faces_in_words
 from kedfem.scene import Cad
 
@@ -135,3 +136,12 @@ def test_places_are_told_without_the_noise_of_rounding(tiny: float, shown: str) 
     from kedfem.mesh.places import in_mm
 
     assert in_mm((0.03, tiny, 0.02)) == f"(30, {shown}, 20) mm"
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "sphere"])
+def test_a_face_without_extent_has_a_name(kind: Literal["cylinder", "sphere"]) -> None:
+    """What OpenCASCADE makes of a damaged file: it is named in the sentence that refuses it."""
+    for radius, length in ((0.0, 0.01), (0.003, 0.0)):
+        face = CadFace(7, "face 7", kind, np.zeros(3), np.eye(3)[2], radius, True, 1e-6, length)
+        assert f"of radius {1e3 * radius:g} mm" in face_form(face)
+        assert kind == "sphere" or "bore" in face_form(face)

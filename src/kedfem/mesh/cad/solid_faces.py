@@ -82,7 +82,7 @@ def enclosed_volume(gmsh: ModuleType, faces: tuple[CadFace, ...]) -> float:
     """
     flux = 0.0
     for face in faces:
-        if face.kind == "other":
+        if face.kind == "other" or (face.kind != "plane" and not face.radius):
             return float("nan")
         if face.kind == "plane":
             flux += face.area * float(face.centre @ face.direction)

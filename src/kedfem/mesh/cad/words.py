@@ -23,10 +23,10 @@ def face_form(face: CadFace) -> str:
         case "plane":
             return f"plane face facing {direction_in_words(face.direction)}"
         case "sphere":
-            share = face.area / (4 * np.pi * face.radius**2)
-            if abs(share - 1 / 8) < _EIGHTH:
+            whole = 4 * np.pi * face.radius**2
+            if abs(face.area - whole / 8) < _EIGHTH * whole:
                 return f"rounded corner {radius}"
-            return f"{'part of a ' * (share < _PART)}{'ball seat' if face.inward else 'ball'} {radius}"
+            return f"{'part of a ' * (face.area < _PART * whole)}{'ball seat' if face.inward else 'ball'} {radius}"
         case "cylinder":
             return f"{_cylinder(face)} {radius} along {direction_in_words(face.direction)}"
         case _:
@@ -76,9 +76,9 @@ def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
 
 def _cylinder(face: CadFace) -> str:
     """A bore or journal, a part of one, or the rounding between two walls."""
-    turn = np.degrees(face.area / (face.radius * face.length))
-    if turn > _CLOSED * 360:
+    around = 2 * np.pi * face.radius * face.length  # zero of what a damaged file makes of one
+    if face.area > _CLOSED * around:
         return "bore" if face.inward else "journal"
-    if turn > _QUARTER:
+    if face.area > _QUARTER / 360 * around:
         return "part of a bore" if face.inward else "part of a journal"
     return "fillet" if face.inward else "rounded edge"
