@@ -7,6 +7,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from kedfem.cli.comparing import compare
 from kedfem.cli.loading import loads
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
 from kedfem.cli.screen import err, out, progress, show
@@ -374,6 +375,7 @@ def bench(
 
 app.command()(sweep)
 app.command()(loads)
+app.command()(compare)
 
 
 def _quick(scene: Any) -> Any:

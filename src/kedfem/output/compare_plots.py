@@ -1,0 +1,85 @@
+"""The same curves of several runs over each other, as PNG, and their differences as CSV."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.output.plots import envelope, figure_saved, remove_plots
+from kedfem.output.units import prefixed
+from kedfem.results import ready_folder
+from kedfem.results.differences import Difference, Over, magnitude
+from kedfem.results.records import Channel
+from kedfem.results.table import cell, text_file
+
+LOOKS = ("-", "--", ":", "-.")
+
+
+def write_comparison(
+    found: Sequence[Difference], names: Sequence[str], over: Over, along: Float[np.ndarray, " T"], drive: Channel,
+    folder: Path,
+) -> None:  # fmt: skip
+    """A picture of each channel, runs over each other, below the difference from the first; and `differences.csv`.
+
+    Parameters
+    ----------
+    names : of the runs
+    along : (T,) [s], or [rad], [m] of the drive
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written.
+    """
+    remove_plots(ready_folder(folder))
+    factor, label = (1.0, "time (s)")
+    if over == "drive":
+        angle = drive.unit == "rad"
+        factor, label = (180 / np.pi, "drive angle (°)") if angle else (1.0, "drive travel (m)")
+    for each in found:
+        _write_picture(each, names, factor * along, label, folder)
+    with text_file(folder / "differences.csv") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(
+            ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]"]
+        )
+        for each in found:
+            for k, name in enumerate(names):
+                numbers = (each.peaks[k], 100 * each.largest[k], each.at[k], 100 * each.rms[k])
+                table.writerow([each.channel.name, each.channel.unit, name, *map(cell, numbers)])
+
+
+def _write_picture(
+    each: Difference, names: Sequence[str], along: Float[np.ndarray, " T"], label: str, folder: Path
+) -> None:
+    """Curves above, what the others are off by below."""
+    channel = each.channel
+    scale, unit = prefixed(float(each.peaks.max()), channel.unit)
+    if unit == "rad":
+        scale, unit = np.pi / 180, "°"
+    said = channel.description or channel.name
+    title = f"{said[:1].upper()}{said[1:]}\n{channel.name}".replace("$", r"\$")
+    with figure_saved(folder / f"{channel.name.replace('/', '-')}.png", title) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
+        for k, (name, values) in enumerate(zip(names, each.values, strict=True)):
+            shown = values[:, 0] if values.shape[1] == 1 else magnitude(channel, values)
+            kept = envelope(shown)
+            look = {"color": f"C{k % 10}", "linestyle": LOOKS[k % len(LOOKS)], "linewidth": 1.3}
+            above.plot(along[kept], shown[kept] / scale, label=name.replace("$", r"\$"), **look)
+            if k:
+                off = 100 * magnitude(channel, values - each.values[0]) / each.peaks[0]
+                kept = envelope(off)
+                below.plot(along[kept], off[kept], **look)
+        what = channel.name.rsplit("/", 1)[-1].replace("_", " ")
+        if each.values[0].shape[1] > 1:
+            what = f"{what}, {'von Mises' if 'von_mises' in channel.columns else 'magnitude'}"
+        above.set_ylabel(f"{what} ({unit})" if unit else what)
+        below.set_ylabel("difference\n(% of peak)")
+        below.set_xlabel(label)
+        below.set_xlim(along[0], along[-1])
+        above.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
+        for ax in (above, below):
+            ax.grid(alpha=0.3)
+            ax.ticklabel_format(useOffset=False)

@@ -1,0 +1,166 @@
+"""How runs differ: the channels that all of them have, over time or over the drive's position, against the first run."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import make_interp_spline
+
+from kedfem.results.records import Channel, Results
+
+Over = Literal["time", "drive"]
+NOTHING = 1e-9  # of the largest value of the same unit in the first run: rounding, which is not compared
+SAME = 1e-9  # of a range: grids, and motions of drives, that are one
+CUBIC = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A channel of several runs at the rows of the first that lie within all.
+
+    values : runs × (T, c) [unit of the channel]
+    peaks : (runs,) largest magnitude; of stress channels of the von Mises stress
+    largest, rms : (runs,) of the difference from the first run [of the first one's peak]
+    at : (runs,) where it is largest [s], or [rad], [m] over the drive
+    """
+
+    channel: Channel
+    values: tuple[Float[np.ndarray, "T c"], ...]
+    peaks: Float[np.ndarray, " runs"]
+    largest: Float[np.ndarray, " runs"]
+    rms: Float[np.ndarray, " runs"]
+    at: Float[np.ndarray, " runs"]
+
+
+def common_abscissa(runs: Sequence[Results], over: Over | None) -> tuple[Over, Float[np.ndarray, " T"]]:
+    """What runs are compared over, and the rows of the first run that lie within all of them.
+
+    Over the drive where it keeps on in one direction in every run, and moves otherwise over time in some; else over time.
+
+    Raises
+    ------
+    ValueError
+        They have no stretch in common; or over the drive, where it stands still, turns back or is of another kind.
+    """
+    drives = all(_rising(run.angle) and run.drive == runs[0].drive for run in runs)
+    if over == "drive" and not drives:
+        raise ValueError("a drive that keeps on in one direction, the same in all runs")
+    if over is None:
+        over = "drive" if drives and not _moved_alike(runs) else "time"
+    every = [_along(run, over) for run in runs]
+    low, high = max(x.min() for x in every), min(x.max() for x in every)
+    slack = SAME * (high - low)
+    first = np.sort(every[0])
+    inside = first[(first >= low - slack) & (first <= high + slack)]
+    if not high > low or len(inside) <= CUBIC:
+        raise ValueError(f"runs that share a stretch of {'the drive' if over == 'drive' else 'time'}")
+    return over, np.clip(inside, low, high)
+
+
+def _along(run: Results, over: Over) -> Float[np.ndarray, " n"]:
+    return run.time if over == "time" else run.angle
+
+
+def _rising(x: Float[np.ndarray, " n"]) -> bool:
+    """Whether it keeps on in one direction."""
+    steps = np.diff(x)
+    return len(x) > CUBIC and bool((steps > 0).all() or (steps < 0).all())
+
+
+def _moved_alike(runs: Sequence[Results]) -> bool:
+    """Whether the drives of all runs are at the same places at the same times, as far as they go."""
+    first = runs[0]
+    size = float(np.ptp(first.angle)) or 1.0
+    for run in runs[1:]:
+        t = first.time[(first.time >= run.time[0]) & (first.time <= run.time[-1])]
+        if not len(t):
+            return False
+        there = _smooth(run.time, run.angle[:, None], t)[:, 0]
+        if np.abs(there - np.interp(t, first.time, first.angle)).max() > 1e-3 * size:
+            return False
+    return True
+
+
+def _smooth(
+    x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[np.ndarray, " T"]
+) -> np.ndarray:
+    """Values between rows: the rows themselves where they are there, else the cubic spline through them."""
+    order = np.argsort(x)
+    x, y = x[order], y[order]
+    near = np.clip(np.searchsorted(x, at), 1, len(x) - 1)
+    near -= at - x[near - 1] < x[near] - at
+    if (np.abs(x[near] - at) <= SAME * np.ptp(x)).all():
+        return np.asarray(y[near])
+    if len(x) <= CUBIC or not np.isfinite(y).all():
+        return np.stack([np.interp(at, x, each) for each in y.T], axis=1)
+    return np.asarray(make_interp_spline(x, y, k=CUBIC)(at))
+
+
+def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]) -> list[Difference]:
+    """Of all channels that every run has with the same columns, in the first one's order; rounding is left out."""
+    out, highest = [], _highest(runs[0])
+    for name in in_common(runs):
+        channel, _ = runs[0].channels[name]
+        values = tuple(_smooth(_along(run, over), run.channels[name][1], at) for run in runs)
+        sizes = [magnitude(channel, x) for x in values]
+        peaks = np.array([float(np.max(x, initial=0.0)) for x in sizes])
+        if peaks.max() <= NOTHING * highest.get(channel.unit, 0.0) or not peaks[0]:
+            continue
+        off = [magnitude(channel, x - values[0]) / peaks[0] for x in values]
+        out.append(
+            Difference(
+                channel, values, peaks, np.array([x.max() for x in off]),
+                np.array([np.sqrt(np.mean(x**2)) for x in off]), np.array([at[x.argmax()] for x in off]),
+            )
+        )  # fmt: skip
+    return out
+
+
+def in_common(runs: Sequence[Results]) -> list[str]:
+    """Channels that all runs have, with the same columns and unit."""
+    return [
+        name for name, (channel, _) in runs[0].channels.items()
+        if all(name in run.channels and _same(channel, run.channels[name][0]) for run in runs[1:])
+    ]  # fmt: skip
+
+
+def _same(a: Channel, b: Channel) -> bool:
+    return (a.columns, a.unit, a.frame) == (b.columns, b.unit, b.frame)
+
+
+def magnitude(channel: Channel, values: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:
+    """Length of a vector, von Mises stress of a tensor, else the largest of the columns."""
+    if "von_mises" in channel.columns:
+        return np.asarray(np.abs(values[:, channel.columns.index("von_mises")]))
+    if set(channel.columns) <= set("xyz"):
+        return np.asarray(np.linalg.norm(values, axis=1))
+    return np.asarray(np.abs(values).max(axis=1))
+
+
+def _highest(run: Results) -> dict[str, float]:
+    """The largest value of each unit."""
+    out: dict[str, float] = {}
+    for channel, values in run.channels.values():
+        out[channel.unit] = max(out.get(channel.unit, 0.0), float(np.abs(values).max(initial=0.0)))
+    return out
+
+
+def differing_keys(runs: Sequence[Results]) -> dict[str, tuple[Any, ...]]:
+    """Keys of the scenes, dotted, that are not the same in all runs, with their values; None where a key is missing."""
+    scenes = [_flat(json.loads(run.scene_json)) for run in runs]
+    keys = dict.fromkeys(key for scene in scenes for key in scene)
+    every = {key: tuple(scene.get(key) for scene in scenes) for key in keys}
+    return {key: values for key, values in every.items() if any(x != values[0] for x in values[1:])}
+
+
+def _flat(x: Any, name: str = "") -> Mapping[str, Any]:
+    """Tables of tables as one, keys joined by dots."""
+    if not isinstance(x, dict) or not x:
+        return {name: x}
+    out: dict[str, Any] = {}
+    for key, value in x.items():
+        out |= _flat(value, f"{name}.{key}" if name else key)
+    return out
