@@ -15,6 +15,7 @@ from importlib import import_module
 
 MODULES = (
     "vibrations",
+    "single_links",
     "statics",
     "planes",
     "spatial_beams",

@@ -189,6 +189,12 @@ def soft_cube() -> list[Row]:
     ]
 
 
+def ring_mapping(r: np.ndarray, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The unit cube as a ring of mean radius 0.369, thickness 0.048, length 0.05."""
+    angle, radius = -2 * np.pi * r, 0.369 + 0.048 * (t - 0.5)
+    return radius * np.cos(angle), radius * np.sin(angle), 0.05 * (s - 0.5)
+
+
 @case("SDLS109: free thick ring", "code_aster V2.03.109, solid elements")
 def ring() -> list[Row]:
     """Mean radius 0.369, thickness 0.048, length 0.05.
@@ -198,11 +204,7 @@ def ring() -> list[Row]:
     counts = (36, 2, 2)
     material = Material(density=7800, youngs_modulus=185e9, poisson_ratio=0.3)
 
-    def mapping(r: np.ndarray, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        angle, radius = -2 * np.pi * r, 0.369 + 0.048 * (t - 0.5)
-        return radius * np.cos(angle), radius * np.sin(angle), 0.05 * (s - 0.5)
-
-    link = mapped_link(counts, mapping, material, closed=True)
+    link = mapped_link(counts, ring_mapping, material, closed=True)
     got = frequencies(link, free_map(link, held()), 14, 200)[6:]
     names = [
         f"{what} {n}" for n in (2, 3) for what in ("in plane, n =", "out of plane, n =") for _ in range(2)

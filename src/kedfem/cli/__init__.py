@@ -8,6 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from kedfem.cli.comparing import compare
+from kedfem.cli.frequencies import frequencies
 from kedfem.cli.loading import loads
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
 from kedfem.cli.screen import err, out, progress, show
@@ -125,31 +126,6 @@ def kinematics(
         done = moved_by(loaded, folder, watch)
     show(kinematics_tables(loaded, done), done.warnings)
     _say_where(done.folder)
-
-
-@app.command()
-def frequencies(
-    scene: ScenePath,
-    modes: Annotated[int, typer.Option(help="Frequencies at each position.")] = 6,
-    positions: Annotated[int, typer.Option(help="Over a turn, or over the whole run.")] = 16,
-    free: Annotated[bool, typer.Option("--free", help="Drives let go of their joints.")] = False,
-    harmonics: Annotated[int, typer.Option(help="Of the drive that are compared.")] = 5,
-    folder: Annotated[
-        Path | None, typer.Option(help="Where all goes; default: SCENE-frequencies beside the scene.")
-    ] = None,
-    within: Within = False,
-) -> None:
-    """Natural frequencies of the linkage frozen at positions over a turn; the drive's harmonics that meet them."""
-    from kedfem.frequencies import Wanted
-    from kedfem.frequencies import frequencies as found_of
-    from kedfem.report import frequencies_tables
-    from kedfem.scene import read_scene
-
-    loaded = read_scene(scene, within=within)
-    with progress() as watch:
-        done = found_of(loaded, Wanted(modes, positions, free, harmonics), folder, watch)
-    show(frequencies_tables(loaded, done), done.warnings)
-    out.print(f"{done.folder}  table and plots", markup=False, soft_wrap=True)
 
 
 @app.command()
@@ -374,6 +350,7 @@ def bench(
 
 
 app.command()(sweep)
+app.command()(frequencies)
 app.command()(loads)
 app.command()(compare)
 

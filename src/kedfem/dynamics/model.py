@@ -154,7 +154,7 @@ def elastic_model(
     links = with_stiff_ports(scene, links)
     for key, body in scene.bodies.items():
         if body.link in cut:
-            on, carrier = _with_scene_body(scene, f"bodies.{key}", body, links)
+            on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     carried = tuple(
         PrescribedBody(rigid(links.pop(name)), linkage.bodies.index(name), hub, ())
@@ -360,7 +360,7 @@ def _slider_on(slider: Slider, link: Link) -> Slider:
     )
 
 
-def _with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Link]) -> tuple[str, Link]:
+def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Link]) -> tuple[str, Link]:
     """The link or segment that carries a body, and it with the body."""
     at = np.asarray(body.at)
     near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)

@@ -78,19 +78,28 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
     return checked_mesh(where, mesh, link.min_quality)
 
 
-def part_mesh(link: LinkScene, folder: Path) -> SolidMesh:
-    """The mesh of a part from CAD on its own; messages name its file, a solid of an assembly is to be named.
+def part_mesh(link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> SolidMesh:
+    """The mesh of a part on its own; messages name its file, a solid of an assembly is to be named.
+
+    Parameters
+    ----------
+    link : its shape is a part from CAD or a mesh file
+    kept_whole : as of `link_mesh`
 
     Raises
     ------
     MeshError
         As `link_mesh`.
     """
-    if not isinstance(link.shape, Cad):
-        raise TypeError("a part on its own comes from CAD")
-    where = link.shape.file
-    mesh = cad_mesh(CadKeys(where, "--solid"), Path(where).stem, link, link.shape, folder)
-    return checked_mesh(where, FORMS[str(link.element)](mesh), link.min_quality)
+    match link.shape:
+        case Cad() as shape:
+            keys = CadKeys(shape.file, "--solid")
+            mesh = cad_mesh(keys, Path(shape.file).stem, link, shape, folder, kept_whole)
+        case MeshFile() as shape:
+            mesh = mesh_from_file(shape.file, folder / shape.file, shape.scale)
+        case _:
+            raise TypeError("a part on its own comes from CAD or a mesh file")
+    return checked_mesh(shape.file, FORMS[str(link.element)](mesh), link.min_quality)
 
 
 def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:

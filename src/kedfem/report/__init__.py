@@ -3,7 +3,7 @@
 from kedfem.output.words import moment
 from kedfem.report.assembly import assembly_tables
 from kedfem.report.check import check_tables
-from kedfem.report.frequencies import frequencies_tables
+from kedfem.report.frequencies import frequencies_tables, part_tables
 from kedfem.report.kinematics import kinematics_tables
 from kedfem.report.mesh import mesh_tables
 from kedfem.report.run import run_tables
@@ -18,6 +18,7 @@ __all__ = [
     "kinematics_tables",
     "mesh_tables",
     "moment",
+    "part_tables",
     "run_tables",
     "size_line",
     "study_tables",

@@ -4,8 +4,8 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.frequencies import Crossing, Frequencies
-from kedfem.output.words import moment
+from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
+from kedfem.output.words import moment, with_prefix
 from kedfem.scene import Scene
 
 RPM = 60 / (2 * np.pi)
@@ -39,3 +39,20 @@ def _range(x: Crossing, speed: float) -> str:
     """From the slowest speed to the fastest [rpm], with a mark where the drive's is among them."""
     here = " *" * (x.slowest <= speed <= x.fastest)
     return f"{x.slowest * RPM:.0f}–{x.fastest * RPM:.0f}{here}"
+
+
+def part_tables(found: PartFrequencies) -> list[Table]:
+    """Frequencies of a single link; what it is and what holds it."""
+    part, still = found.part, found.still
+    held = f"held at {', '.join(part.held)}" if part.held else "free"
+    table = Table(
+        title=Text(f"Natural frequencies of {part.name}, {held}"),
+        caption=Text(f"{still} motions without strain, at 0 Hz, are left out") if still else None,
+        show_header=False,
+        min_width=60,
+    )
+    table.add_row("mass", with_prefix(found.mass, "kg"))
+    table.add_row("unknowns", str(part.link.unknowns))
+    for number, f in enumerate(found.values, 1):
+        table.add_row(f"mode {number}", f"{f:.5g} Hz")
+    return [table]

@@ -1,4 +1,4 @@
-"""Natural frequencies over positions as a table for spreadsheets."""
+"""Natural frequencies over positions, and of single links, as tables for spreadsheets."""
 
 from pathlib import Path
 
@@ -23,3 +23,15 @@ def write_frequencies(
     header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
     with text_file(path) as file:
         write_numbers(file, header, np.column_stack([t, place, values]))
+
+
+def write_part_frequencies(path: Path, values: Float[np.ndarray, " f"]) -> None:
+    """One row a mode: its number, natural frequency [Hz].
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with text_file(path) as file:
+        write_numbers(file, ["mode", "frequency [Hz]"], np.column_stack([1 + np.arange(len(values)), values]))

@@ -28,7 +28,7 @@ from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
 from kedfem.scene.moving_joints import by_constraint_equations
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
-from kedfem.scene.read import link_from, read_keys, read_scene, scene_from
+from kedfem.scene.read import face_from, link_from, material_from, read_keys, read_scene, scene_from
 from kedfem.scene.scene import Scene
 from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
 from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
@@ -103,11 +103,13 @@ __all__ = [
     "corotational_links",
     "cycle",
     "drive_angle",
+    "face_from",
     "factor_table",
     "inertia_tensor",
     "link_frames",
     "link_from",
     "load_factor",
+    "material_from",
     "part_geometry",
     "path_parameter",
     "rayleigh",

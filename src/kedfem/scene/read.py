@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from kedfem.errors import SceneError
+from kedfem.scene.base import Record
 from kedfem.scene.checks import meshing_faults
-from kedfem.scene.faults import fault_lines
+from kedfem.scene.faces import ChosenFace
+from kedfem.scene.faults import fault_lines, one_of
 from kedfem.scene.files import inside, outside, scene_folder, sketched, toml_table
 from kedfem.scene.including import KEY, toml_text, with_includes
 from kedfem.scene.links import LinkScene, spelt_out
+from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.parts import Entry
 from kedfem.scene.scene import Scene
+
+T = TypeVar("T", bound=Record)
 
 
 def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) -> Scene:
@@ -108,3 +114,46 @@ def scene_from(
         scene_folder.reset(token)
     scene._source, scene._folder, scene._stem = source, Path(folder), stem
     return scene
+
+
+def material_from(where: str, text: str) -> Material:
+    """A material that is built in, by its name, or by its properties: ``{ density = 7850, … }``.
+
+    Raises
+    ------
+    SceneError
+        With all faults, under `where`.
+    """
+    if not text.lstrip().startswith("{"):
+        if text not in BUILT_IN:
+            wanted = one_of(list(BUILT_IN), text)
+            raise SceneError(
+                f"{where}: {wanted}; another one by {{ density = …, youngs_modulus = …, poisson_ratio = … }}"
+            )
+        return Material.model_validate(BUILT_IN[text])
+    return _record(where, text, Material)
+
+
+def face_from(where: str, text: str) -> str | ChosenFace:
+    """A face by its name, or by what it is: ``{ cylinder = "8 mm", axis = "z" }``.
+
+    Raises
+    ------
+    SceneError
+        With all faults, under `where`.
+    """
+    return _record(where, text, ChosenFace) if text.lstrip().startswith("{") else text
+
+
+def _record(where: str, text: str, kind: type[T]) -> T:
+    """A record from a table in one line."""
+    try:
+        raw = tomllib.loads(f"table = {text}")["table"]
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(
+            f"{where}: must be a name or a table, {{ key = value, … }}, got {text!r} ({error})"
+        ) from None
+    try:
+        return kind.model_validate(raw)
+    except ValidationError as error:
+        raise SceneError([f"{where}.{fault}" for fault in fault_lines(error, kind, raw)]) from None

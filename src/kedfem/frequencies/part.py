@@ -1,0 +1,185 @@
+"""Natural frequencies of a single link: a part from a file, or one link of a scene, free or held."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.accuracy.plan import plan_for
+from kedfem.dynamics.link_modes import (
+    Support,
+    clamped_on,
+    held_at,
+    link_modes,
+    single_link,
+    together,
+)
+from kedfem.errors import MeshError, SceneError
+from kedfem.frequencies.linkage import frequencies_folder
+from kedfem.links.candidates import surfaces
+from kedfem.links.choosing import chosen_surface
+from kedfem.links.record import Link
+from kedfem.links.solid import solid_link
+from kedfem.mesh import part_mesh
+from kedfem.motion.linkage import joint_axis
+from kedfem.results import claimed
+from kedfem.results.frequencies import write_part_frequencies
+from kedfem.scene import ChosenFace, LinkScene, Material, Scene
+from kedfem.scene.faults import either, one_of
+
+Watch = Callable[[str, int, int], None]
+HELD = ("revolute", "spherical", "weld")  # joints of which what they hold needs no other link
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A link on its own.
+
+    held : what holds it, in words
+    folder : where its frequencies go
+    """
+
+    name: str
+    link: Link
+    support: Support
+    held: tuple[str, ...]
+    folder: FilePath
+
+
+@dataclass(frozen=True, slots=True)
+class PartFrequencies:
+    """Of a single link.
+
+    values : (f,) natural frequencies in rising order [Hz]
+    still : motions without strain, at zero frequency: six of a free part
+    """
+
+    folder: FilePath
+    part: Part
+    values: Float[np.ndarray, " f"]
+    still: int
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        return float(self.part.link.one @ self.part.link.m1[:, 0])
+
+
+def part_from_file(
+    file: FilePath, given: LinkScene, material: Material, faces: Sequence[str | ChosenFace] = ()
+) -> Part:
+    """A part from CAD or from a mesh file, some of its faces clamped.
+
+    Parameters
+    ----------
+    given : its shape, mesh and element
+    faces : by name or by what they are; of those from CAD no blends are left out
+
+    Raises
+    ------
+    MeshError
+        It cannot be meshed, or has no such face.
+    """
+    names = tuple(each for each in faces if isinstance(each, str))
+    near = tuple(each.near for each in faces if isinstance(each, ChosenFace) and each.near is not None)
+    mesh = part_mesh(given, file.parent, (near, names))
+    link = solid_link(file.stem, mesh, material, np.eye(3))
+    support = together(link, [clamped_on(link, _facets(link, each)) for each in faces])
+    words = tuple(each if isinstance(each, str) else each.label for each in faces)
+    solid = getattr(given.shape, "solid", None)
+    stem = file.stem if solid is None else f"{file.stem}-{solid}"
+    return Part(file.name, link, support, words, file.with_name(f"{stem}-frequencies"))
+
+
+def _facets(link: Link, face: str | ChosenFace) -> Int[np.ndarray, " f"]:
+    """Boundary facets of a face that is clamped."""
+    if isinstance(face, ChosenFace):
+        near = np.asarray(link.nodes.mean(axis=0) if face.near is None else face.near)
+        return chosen_surface(link, "--hold", face, near, surfaces(link)).facets
+    known = {each.face.name: each.facets for each in link.faces if len(each.facets)}
+    if face not in known:
+        other = 'one that has no name by what it is: { plane = "x", near = [0, 0, 0] }'
+        wanted = one_of(list(known), face) if known else f"must be a face by what it is, got {face!r}"
+        raise MeshError(f"--hold: {wanted}; {other}")
+    return known[face]
+
+
+def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
+    """A link of a scene, in full, with its bodies; held where some of its joints sit, free at the others.
+
+    Parameters
+    ----------
+    joints : each holds as if its other link were fixed; one with a drive does not let it turn
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user.
+    """
+    if name not in scene.links:
+        raise SceneError(f"--link: {one_of(list(scene.links), name)}")
+    if scene.links[name].fidelity == "rigid":
+        raise SceneError("--link: must be an elastic link, got a rigid one")
+    for joint in joints:
+        _check(scene, name, joint)
+    plan = plan_for(scene, lambda stage: None)
+    scene = plan.scene if plan else scene
+    link = single_link(scene, name)
+    support = together(link, [held_at(scene, joint, link, _turns(scene, joint)) for joint in joints])
+    folder = frequencies_folder(scene)
+    return Part(name, link, support, tuple(joints), folder.with_name(f"{folder.name}-{name}"))
+
+
+def _check(scene: Scene, name: str, joint: str) -> None:
+    """Refuse joints that do not say on their own what they hold of a link."""
+    own = [key for key, each in scene.joints.items() if name in each.links]
+    if joint not in own:
+        raise SceneError(
+            f"--hold: {one_of(own, joint)}, the joints of link '{name}'"
+            if own
+            else f"--hold: must be left out for a link without joints, got {joint!r}"
+        )
+    kind = scene.joints[joint].kind
+    if kind not in HELD:
+        raise SceneError(
+            f"--hold: must be a joint of kind {either(list(HELD))}, got '{joint}', which is {kind}"
+        )
+    if scene.joints[joint].bushing is not None:
+        raise SceneError(f"--hold: must be a joint that holds rigidly, got '{joint}', which has a bushing")
+
+
+def _turns(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:
+    """Directions about which a joint holds a link."""
+    of = scene.joints[joint]
+    if of.kind == "weld" or joint in scene.driven_joints:
+        return np.eye(3)
+    if of.kind == "spherical":
+        return np.zeros((0, 3))
+    return np.asarray(np.linalg.svd(joint_axis(of)[None])[2][1:])
+
+
+def part_frequencies(
+    part: Part, count: int, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
+) -> PartFrequencies:
+    """The lowest natural frequencies of a single link at rest, without damping.
+
+    Parameters
+    ----------
+    count : of vibrations
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user.
+    """
+    if count < 1:
+        raise SceneError(f"--modes: must be at least 1, got {count}")
+    if part.support.clamped.all():
+        raise SceneError("--hold: must leave something of the part that can move, got all of it")
+    watch("frequencies", 0, 0)
+    modes = link_modes(part.link, part.support, count)
+    with claimed(folder or part.folder) as target:
+        write_part_frequencies(target / "frequencies.csv", modes.frequencies)
+    return PartFrequencies(target, part, modes.frequencies, modes.still)
