@@ -78,6 +78,7 @@ def test_the_command_holds_faces_and_leaves_a_table(plate: Path) -> None:
         (["--material", "{ density"], "--material: must be a name or a table"),
         (["--hold", "{ cylinder = '8 mm' }"], "--hold: must be a face"),
         (["--hold", "end"], "--hold: must be a face by what it is, got 'end'"),
+        (["--element", "quad9"], "element: must be one of hex.*, got 'quad9'"),
         (["--modes", "0"], "--modes: must be at least 1, got 0"),
     ],
 )

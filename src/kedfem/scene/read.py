@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from kedfem.errors import SceneError
 from kedfem.scene.base import Record
-from kedfem.scene.checks import meshing_faults
+from kedfem.scene.checks import ELEMENTS, meshing_faults
 from kedfem.scene.faces import ChosenFace
 from kedfem.scene.faults import fault_lines, one_of
 from kedfem.scene.files import inside, outside, scene_folder, sketched, toml_table
@@ -81,6 +81,8 @@ def link_from(raw: Mapping[str, Any]) -> LinkScene:
     except ValidationError as error:
         link, faults = None, fault_lines(error, LinkScene, raw)
     faults += meshing_faults(Entry((), raw, link))
+    if link is not None and link.element not in ELEMENTS["solid"]:
+        faults.append(f"element: {one_of(ELEMENTS['solid'], link.element)}")
     if link is None or faults:
         raise SceneError(list(dict.fromkeys(faults)))
     return link
