@@ -259,7 +259,7 @@ def test_new_writes_a_commented_scene_that_can_be_checked(run_kedfem: Command, k
 def test_new_refuses_a_kind_that_it_does_not_know(run_kedfem: Command) -> None:
     said = run_kedfem("new", "tripod")
     assert said.code == USER_ERROR
-    assert said.err == "error: KIND: must be one of four-bar, slider-crank, single-arm, got 'tripod'\n"
+    assert said.err == f"error: KIND: must be one of {', '.join(KINDS)}, got 'tripod'\n"
     assert not list(Path().iterdir())
 
 

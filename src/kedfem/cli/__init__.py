@@ -18,7 +18,7 @@ from kedfem.processes import end_as_interrupted, interruption_asked
 
 __all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
 
-KINDS = ("four-bar", "slider-crank", "single-arm")
+KINDS = ("four-bar", "slider-crank", "single-arm", "press", "scissor-lift", "robot-arm")
 
 app = typer.Typer(
     name="kedfem",

@@ -127,7 +127,7 @@ def si_number(text: str, unit: str) -> float:
         given = match[2]
         quantity = unit_registry().Quantity(float(match[1]), unit_of(given, unit))
     else:
-        raise ValueError("not a number with a unit")
+        raise ValueError("not a number with a unit; an expression begins with '='")
     wanted, got = unit_registry().parse_units(unit), quantity.units
     if crossed(quantity._units, unit):
         raise ValueError(
