@@ -25,6 +25,9 @@ def frequencies(
     positions: Annotated[int, typer.Option(help="Over a turn, or over the whole run.")] = 16,
     free: Annotated[bool, typer.Option("--free", help="Drives let go of their joints.")] = False,
     harmonics: Annotated[int, typer.Option(help="Of the drive that are compared.")] = 5,
+    shapes: Annotated[
+        int, typer.Option(help="Lowest mode shapes that are drawn, and animated for ParaView.")
+    ] = 0,
     link: Annotated[str | None, typer.Option(metavar="NAME", help="One link of the scene alone.")] = None,
     hold: Annotated[
         list[str] | None,
@@ -79,19 +82,23 @@ def frequencies(
             given = link_from(_given({"shape": _given(shape), "mesh": _given(sizes), "element": element}))
             faces = [face_from("--hold", each) for each in hold or []]
             part = part_from_file(what, given, material_from("--material", material), faces)
-            alone = part_frequencies(part, modes, folder, watch)
+            alone = part_frequencies(part, modes, folder, watch, shapes)
         else:
             loaded = read_scene(what, within=within)
             if link is not None:
-                alone = part_frequencies(link_of_scene(loaded, link, hold or []), modes, folder, watch)
+                alone = part_frequencies(
+                    link_of_scene(loaded, link, hold or []), modes, folder, watch, shapes
+                )
             else:
-                done = found_of(loaded, Wanted(modes, positions, free, harmonics), folder, watch)
+                done = found_of(loaded, Wanted(modes, positions, free, harmonics, shapes), folder, watch)
     if of_file or link is not None:
         show(part_tables(alone))
-        out.print(f"{alone.folder}  table", markup=False, soft_wrap=True)
+        out.print(f"{alone.folder}  table{', mode shapes' * (shapes > 0)}", markup=False, soft_wrap=True)
     else:
         show(frequencies_tables(loaded, done), done.warnings)
-        out.print(f"{done.folder}  table and plots", markup=False, soft_wrap=True)
+        out.print(
+            f"{done.folder}  table, plots{', mode shapes' * (shapes > 0)}", markup=False, soft_wrap=True
+        )
 
 
 def _refuse(context: typer.Context, options: Iterable[str], wanted: str) -> None:

@@ -111,6 +111,12 @@ class LinkMoment:
     strain: float
 
 
+def bent(u: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]) -> LinkMoment:
+    """A link that is bent and does not move; u in world components."""
+    none = np.zeros_like(u)
+    return LinkMoment(u, none, none, u @ R, R, none, np.zeros(0), 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Exerted:
     """What constraint equations and force laws exert over T time points, where bodies are; world components.

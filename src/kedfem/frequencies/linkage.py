@@ -1,7 +1,8 @@
 """Natural frequencies of a scene's linkage frozen at positions over a turn of its drive: table and plots."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -9,13 +10,19 @@ from jaxtyping import Float
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
-from kedfem.dynamics.frozen import Frozen
+from kedfem.dynamics.frozen import Frozen, Modes
+from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import Curve, Stop, System
 from kedfem.errors import SceneError
+from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.output.frames import link_fields
 from kedfem.output.frequency_plots import write_campbell, write_over_turn
+from kedfem.output.shapes import Shape, write_shapes
+from kedfem.output.vtu import LinkField
+from kedfem.output.words import clock, moment
 from kedfem.results import claimed
 from kedfem.results.frequencies import write_frequencies
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
@@ -31,12 +38,14 @@ class Wanted:
     positions : over the last turn of a drive that goes on turning, else over the whole time; without a drive one
     free : whether the drives let go of their joints; else they hold them
     harmonics : of the drive whose crossings are looked for
+    shapes : lowest mode shapes that are drawn, at the position whose first frequency is the lowest
     """
 
     modes: int = 6
     positions: int = 16
     free: bool = False
     harmonics: int = 5
+    shapes: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +110,8 @@ def frequencies(
     for name in ("modes", "positions", "harmonics"):
         if (value := getattr(wanted, name)) < 1:
             raise SceneError(f"--{name}: must be at least 1, got {value}")
+    if not 0 <= wanted.shapes <= wanted.modes:
+        raise SceneError(f"--shapes: must be between 0 and --modes ({wanted.modes}), got {wanted.shapes}")
     if wanted.free and scene.driven is None:
         raise SceneError(
             "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
@@ -120,7 +131,11 @@ def frequencies(
     solver = Frozen(system, wanted.modes, released)
     t = _positions(scene, wanted.positions)
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    values, still = _over(solver, motion, watch)
+    every = _over(solver, motion, watch)
+    still = max(found.still for found in every)
+    values = np.full((len(t), solver.count), np.nan)
+    for k, found in enumerate(every):
+        values[k, : len(found.frequencies)] = found.frequencies
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
@@ -133,17 +148,49 @@ def frequencies(
             write_over_turn(target / "frequencies.png", t, angle, values, bool(speed))
         if speed:
             write_campbell(target / "campbell.png", values, speed, wanted.harmonics)
+        if wanted.shapes:
+            watch("mode shapes", 0, 0)
+            where = [
+                f" at {clock(scene)} {moment(scene, *x)}" if scene.driven else ""
+                for x in zip(t, angle, strict=True)
+            ]
+            write_shapes(target, _shapes(system, motion, every, where, wanted.shapes), scene.gravity)
     return done
 
 
-def _over(solver: Frozen, motion: RigidMotion, watch: Watch) -> tuple[Float[np.ndarray, "P f"], int]:
-    """Frequencies of vibrations at each position [Hz], and the most motions without strain."""
-    values, still = np.full((len(motion.t), solver.count), np.nan), 0
+def _over(solver: Frozen, motion: RigidMotion, watch: Watch) -> list[Modes]:
+    """Modes at each position; shapes of the first vibration's lowest frequency so far alone."""
+    out: list[Modes] = []
+    lowest = np.inf
     for k in range(len(motion.t)):
         watch("positions", k, len(motion.t))
         found = solver.at(motion.part(k, k + 1))
-        values[k, : len(found.frequencies)], still = found.frequencies, max(still, found.still)
-    return values, still
+        first = float(found.frequencies[0]) if len(found.frequencies) else np.inf
+        out.append(found if first < lowest else replace(found, shapes=()))
+        lowest = min(lowest, first)
+    return out
+
+
+def _shapes(
+    system: System, motion: RigidMotion, every: list[Modes], where: Sequence[str], count: int
+) -> list[Shape]:
+    """The lowest mode shapes where the first frequency is the lowest."""
+    firsts = [found.frequencies[0] if len(found.frequencies) else np.inf for found in every]
+    k = int(np.argmin(firsts))
+    modes, model = every[k], system.model
+    recoveries = [stress_recovery(link) for link in (*model.links, *(x.link for x in model.carried))]
+
+    def fields(mode: int, factor: float, exaggeration: float) -> Sequence[LinkField]:
+        states = []
+        for link, body, shapes in zip(model.links, model.bodies, modes.shapes, strict=True):
+            u = factor * shapes[modes.still + mode]
+            states.append(bent(u, motion.R[k, body][: link.d, : link.d]))
+        return link_fields(model, recoveries, Snapshot(0, motion, k, states), exaggeration)
+
+    return [
+        Shape(f, f"Mode {m + 1}: {f:.4g} Hz{where[k]}", partial(fields, m))
+        for m, f in enumerate(modes.frequencies[:count].tolist())
+    ]
 
 
 def _positions(scene: Scene, count: int) -> Float[np.ndarray, " P"]:

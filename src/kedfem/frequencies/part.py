@@ -2,12 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.accuracy.plan import plan_for
+from kedfem.dynamics.frozen import Modes
+from kedfem.dynamics.history import bent
 from kedfem.dynamics.link_modes import (
     Support,
     clamped_on,
@@ -21,9 +24,13 @@ from kedfem.frequencies.linkage import frequencies_folder
 from kedfem.links.candidates import surfaces
 from kedfem.links.choosing import chosen_surface
 from kedfem.links.record import Link
+from kedfem.links.recovery import stress_recovery
 from kedfem.links.solid import solid_link
 from kedfem.mesh import part_mesh
 from kedfem.motion.linkage import joint_axis
+from kedfem.output.frames import link_field
+from kedfem.output.shapes import Shape, write_shapes
+from kedfem.output.vtu import LinkField
 from kedfem.results import claimed
 from kedfem.results.frequencies import write_part_frequencies
 from kedfem.scene import ChosenFace, LinkScene, Material, Scene
@@ -161,13 +168,18 @@ def _turns(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:
 
 
 def part_frequencies(
-    part: Part, count: int, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
+    part: Part,
+    count: int,
+    folder: FilePath | None = None,
+    watch: Watch = lambda stage, done, total: None,
+    shapes: int = 0,
 ) -> PartFrequencies:
     """The lowest natural frequencies of a single link at rest, without damping.
 
     Parameters
     ----------
     count : of vibrations
+    shapes : lowest mode shapes that are drawn
 
     Raises
     ------
@@ -176,10 +188,30 @@ def part_frequencies(
     """
     if count < 1:
         raise SceneError(f"--modes: must be at least 1, got {count}")
+    if not 0 <= shapes <= count:
+        raise SceneError(f"--shapes: must be between 0 and --modes ({count}), got {shapes}")
     if part.support.clamped.all():
         raise SceneError("--hold: must leave something of the part that can move, got all of it")
     watch("frequencies", 0, 0)
     modes = link_modes(part.link, part.support, count)
     with claimed(folder or part.folder) as target:
         write_part_frequencies(target / "frequencies.csv", modes.frequencies)
+        if shapes:
+            watch("mode shapes", 0, 0)
+            write_shapes(target, _shapes(part, modes, shapes))
     return PartFrequencies(target, part, modes.frequencies, modes.still)
+
+
+def _shapes(part: Part, modes: Modes, count: int) -> list[Shape]:
+    """The lowest mode shapes of a link as it is drawn."""
+    link, recovery = part.link, stress_recovery(part.link)
+    place = np.zeros(3), np.eye(3)
+
+    def fields(mode: int, factor: float, exaggeration: float) -> list[LinkField]:
+        u = factor * modes.shapes[0][modes.still + mode]
+        return [link_field(link, recovery, place, bent(u, np.eye(link.d)), exaggeration)]
+
+    return [
+        Shape(f, f"{part.name}, mode {m + 1}: {f:.4g} Hz", partial(fields, m))
+        for m, f in enumerate(modes.frequencies[:count].tolist())
+    ]

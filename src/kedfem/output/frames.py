@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
-from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von_mises
 from kedfem.mesh.hexahedra import HEX8
 from kedfem.output.vtu import LinkField
 
+Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 BLOCK = 0.08  # width of the block that stands for a slider without a shape, of the longest link
 
 
@@ -45,29 +47,12 @@ def link_fields(
     deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
     """
     motion, k = snapshot.motion, snapshot.k
-    fields = []
-    for link, body, recovery, state in zip(
-        model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
-    ):
-        shown = link.full or link
-        displacement = recovery.at_points(in_space(shown, nodal_state(link, state.u)))
-        stress = nodal_stress(recovery, nodal_state(link, state.g))
-        if link.rigid:
-            stress = np.full_like(stress, np.nan)
-        drawn = recovery.at_points(shown.X)
-        points = motion.p[k, body] + drawn @ motion.R[k, body].T + deformation_scale * displacement
-        fields.append(
-            LinkField(
-                link.name,
-                recovery.cell_type,
-                recovery.cells,
-                points,
-                displacement,
-                stress,
-                von_mises(stress),
-                _section(link),
-            )
+    fields = [
+        link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale)
+        for link, body, recovery, state in zip(
+            model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
         )
+    ]
     for carried, recovery in zip(model.carried, recoveries[len(model.links) :], strict=True):
         X = recovery.at_points((carried.link.full or carried.link).X)
         points = motion.p[k, carried.body] + X @ motion.R[k, carried.body].T
@@ -76,6 +61,25 @@ def link_fields(
         section = _section(carried.link)
         fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], section))
     return _joined(fields) + _blocks(model, snapshot, deformation_scale)
+
+
+def link_field(
+    link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float
+) -> LinkField:
+    """One elastic link: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
+
+    Parameters
+    ----------
+    place : position and orientation of its rigid-body motion
+    """
+    shown, (p, R) = link.full or link, place
+    displacement = recovery.at_points(in_space(shown, nodal_state(link, moment.u)))
+    stress = nodal_stress(recovery, nodal_state(link, moment.g))
+    if link.rigid:
+        stress = np.full_like(stress, np.nan)
+    points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
+    kind, cells = recovery.cell_type, recovery.cells
+    return LinkField(link.name, kind, cells, points, displacement, stress, von_mises(stress), _section(link))
 
 
 def _section(link: Link) -> tuple[float, float, bool] | None:

@@ -1,0 +1,67 @@
+"""Mode shapes: a cycle of each for ParaView, and a picture at its largest."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kedfem.output.picture import write_picture
+from kedfem.output.vtu import AnimationWriter, LinkField, remove_animation
+
+FRAMES = 24  # over a cycle
+AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses are
+DRAWN = 0.08  # of the size of what is drawn: largest displacement in pictures and animations
+MOSTLY = 0.9  # of the squares of all displacements: a shape along one axis
+STEM = "shape"
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A mode shape.
+
+    frequency : [Hz]
+    title : of its picture
+    fields : of all links with displacements and stresses times the first number, drawn exaggerated by the second
+    """
+
+    frequency: float
+    title: str
+    fields: Callable[[float, float], Sequence[LinkField]]
+
+
+def write_shapes(
+    folder: Path, shapes: Sequence[Shape], gravity: tuple[float, float, float] = (0, 0, 0)
+) -> None:
+    """``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; those of an earlier command go.
+
+    Shapes are written with a largest displacement of AMPLITUDE, stresses with it.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written, or VTK cannot draw here.
+    """
+    for old in folder.glob(f"{STEM}_*.pvd"):
+        remove_animation(folder, old.stem)
+        old.with_suffix(".png").unlink(missing_ok=True)
+    for k, shape in enumerate(shapes, 1):
+        name = f"{STEM}_{k}"
+        still = shape.fields(1.0, 0.0)
+        points = np.concatenate([each.points for each in still])
+        largest = max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in still)
+        factor = AMPLITUDE / largest if largest else 1.0
+        exaggeration = float(f"{DRAWN * float(np.linalg.norm(np.ptp(points, axis=0))) / AMPLITUDE:.2g}")
+        writer = AnimationWriter(folder, name)
+        for j in range(FRAMES):
+            swing = float(np.cos(2 * np.pi * j / FRAMES))
+            writer.add(j / FRAMES / shape.frequency, shape.fields(factor * swing, exaggeration))
+        title = f"{shape.title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
+        write_picture(folder / f"{name}_0000.vtu", folder / f"{name}.png", title, exaggeration, gravity)
+
+
+def _along(fields: Sequence[LinkField]) -> str:
+    """The world's axis along which nearly everything moves, which a picture may be looked along."""
+    parts = sum((each.displacement**2).sum(axis=0) for each in fields)
+    k = int(np.argmax(parts))
+    return f", along {'xyz'[k]}" if np.asarray(parts)[k] > MOSTLY * np.sum(parts) else ""
