@@ -67,7 +67,10 @@ def described(detail: ErrorDetails, hint: Any, raw: Any) -> tuple[Where, str]:
         return (*where, "kind"), kind_message(here, detail["input"])
     if detail["type"] == "extra_forbidden":
         _, above, inside = walked(detail["loc"][:-1], hint, raw)
-        return where, unknown_key(str(where[-1]), known_keys(above, inside))
+        known = known_keys(above, inside)
+        if len(where) > 1 and where[-1] in known_keys(hint, raw) and where[-1] not in known:
+            return where, f"unknown key, {where[-1]!r} belongs to the scene itself, before its first table"
+        return where, unknown_key(str(where[-1]), known)
     return where, message(detail, here)
 
 
