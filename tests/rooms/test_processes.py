@@ -121,6 +121,7 @@ def test_a_wish_to_end_is_ctrl_c_unless_it_was_ignored_before(name: str, before:
 DROPPED = """
 import ctypes, os, signal, sys, time, weakref
 from kedfem.processes import end_as_interrupted
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever the one that runs the tests ignores
 end_as_interrupted()
 
 def struck(*_):

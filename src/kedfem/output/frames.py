@@ -66,7 +66,7 @@ def link_fields(
 def link_field(
     link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float
 ) -> LinkField:
-    """One elastic link: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
+    """One elastic link where its displacement takes it, which is exaggerated.
 
     Parameters
     ----------

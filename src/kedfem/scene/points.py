@@ -19,6 +19,9 @@ AXES: dict[str, XYZ] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0
 MARKS = {"from", "between", "along", "distances"}
 """Keys that tell one construction of a point from others."""
 FARTHEST = 1e100  # m: squares of distances can still be told
+UNIT = (
+    1e-15  # a vector whose length is so near one is a unit vector, and stays as it is when it is read again
+)
 UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a point that is named but could not be constructed
 
 _known_points: ContextVar[Mapping[str, XYZ] | None] = ContextVar("known_points", default=None)
@@ -74,6 +77,8 @@ def unit_axis(value: object, components: ValidatorFunctionWrapHandler) -> Any:
     size = math.hypot(*vector)
     if size == 0.0:
         raise fault("must be a direction, got a vector of length zero")
+    if abs(size - 1.0) < UNIT:
+        return tuple(vector)
     return tuple(part / size for part in vector)
 
 
