@@ -19,11 +19,11 @@ Cell = tuple[str, tuple[str, str], bool]
 FOUND: list[Cell] = [("prismatic", ("solid", "ground"), True), ("prismatic", ("bare", "planar beam"), False)]
 DRIVEN = ("revolute", "prismatic")
 #: A rigid link is a stiff one, by the square of a ratio of 1000, and rounding grows with that: points moved by 1e-15 of
-#: themselves change deflections beside a driven hinge in space by 1e-7, 6e-5, 1e-2 at ratios of 100, 1000, 10,000
-DRIVEN_RIGID = 1e-3
-#: the same without a drive, in chains in space in which it is most: 3e-5 of a slide, 8e-5 of a ball
-MOST = {("prismatic", "rigid"), ("spherical", "rigid"), ("planar", "rigid")}
-MOST_RIGID = 1e-4
+#: themselves change deflections beside a driven hinge in space by 1e-7, 6e-5, 1e-2 at ratios of 100, 1000, 10,000. So
+#: does another processor. What turned chains with stiff links differ by, the most of several processors: with a drive
+#: 1.5e-4 in space and 6e-6 in a plane, without one 8e-5 in space (a ball; 6e-5 a slide, 2e-5 a cylindrical joint)
+DRIVEN_RIGID = {"space": 1e-3, "plane": 1e-4}
+RIGID_IN_SPACE = 4e-4
 #: where both links are rigid the others bend little, and what the strain of the stiff link differs by from direction to
 #: direction, 2.5e-8 rad at a ratio of 100 and 2.5e-10 at 1000, is up to 4e-4 of that
 BOTH_RIGID = 1e-3
@@ -105,10 +105,10 @@ def limit(cell: Cell, plane: bool) -> float:
     stiff = {"rigid", "bare"} & set(partners)
     if plane and {"rigid", "bare", "ground"}.issuperset(partners) and (driven or kind == "weld"):
         return BOTH_RIGID
-    if stiff and driven and not plane:
-        return DRIVEN_RIGID
-    if not plane and (kind, partners[0]) in MOST:
-        return MOST_RIGID
+    if stiff and driven:
+        return DRIVEN_RIGID["plane" if plane else "space"]
+    if stiff and not plane:
+        return RIGID_IN_SPACE
     return ROUNDING["rigid" if stiff else "beams"]
 
 
