@@ -66,7 +66,7 @@ def found(
     """Forces (2, 2, 3) and values (4,) of one action."""
     forces, values = np.zeros((1, 2, 2, 3)), np.zeros((1, 4))
     v = np.zeros_like(x) if v is None else v
-    evaluate(t, x[None], v[None], np.array([before]), kernel_table([action]), forces, values)
+    evaluate(t, np.ones(1), x[None], v[None], np.array([before]), kernel_table([action]), forces, values)
     return forces[0], values[0]
 
 
@@ -231,7 +231,7 @@ def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
                   for s in t])  # fmt: skip
     values, before = np.zeros((9, 3, 4)), np.zeros(3)
     forces = np.zeros_like(x)
-    evaluate_all(t, x, np.zeros_like(x), before, kernel_table(every), forces, values)
+    evaluate_all(t, np.ones((9, 3)), x, np.zeros_like(x), before, kernel_table(every), forces, values)
     q = np.zeros(3)
     for k in range(9):
         for i, action in enumerate(every):

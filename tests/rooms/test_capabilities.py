@@ -116,6 +116,8 @@ SCENES: list[Raw] = [
         "analysis/revolutions": 1, "analysis/steps_per_revolution": 10, "damping": {"alpha": 1.0, "beta": 1e-5},
         "loads/p": {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 1],
                     "factor": {"over": "angle", "at": [0], "value": [1]}},
+        "springs/s": {"kind": "spring", "between": [{"link": "arm", "at": [1, 0]}, {"link": "ground", "at": [1, 1]}],
+                      "stiffness": 1.0, "stiffness_factor": {"over": "angle", "at": [0], "value": [1]}},
     }),
 ]  # fmt: skip
 

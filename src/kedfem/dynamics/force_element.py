@@ -4,7 +4,7 @@ An action has two ends. An end is up to two vectors of a link, linear in its sta
 `force_elements_kernel` makes forces on these vectors from their positions and velocities.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +21,7 @@ OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION}
 IN_SPACE = (1.0, 1.0, 1.0)
 
 Vector = Float[np.ndarray, "3"]
+Times = Float[np.ndarray, " T"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,7 @@ class ForceElement:
     kind : TURN, SLIDE, DISTANCE
     ends : the coordinate is that of the first against the second
     stiffness, damping, free : of a spring, free where it has no force
+    factor : of a spring, times (T,) and the drive's angles (T,) → what its stiffness is multiplied by; none: one
     limits : of a stop, between which it has no force; none: no stop
     axis : of a hinge or slide, as drawn
     over, at, value : of a motor, its curve; none: no points
@@ -68,6 +70,7 @@ class ForceElement:
     stiffness: float = 0.0
     damping: float = 0.0
     free: float = 0.0
+    factor: Callable[[Times, Times], Times] | None = None
     limits: tuple[float, float] | None = None
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     over: int = 0
@@ -97,6 +100,15 @@ def kernel_table(every: Sequence[ForceElement]) -> Table:
         np.array([x for action in every for x in action.at], float),
         np.array([x for action in every for x in action.value], float),
     )
+
+
+def stiffness_factors(every: Sequence[ForceElement], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
+    """What the stiffness of each action is multiplied by over time."""
+    out = np.ones((len(t), len(every)))
+    for i, action in enumerate(every):
+        if action.factor is not None:
+            out[:, i] = action.factor(t, phi)
+    return out
 
 
 def _drawn_angles(action: ForceElement, e1: Vector, e2: Vector) -> list[float]:

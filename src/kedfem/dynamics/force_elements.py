@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit
+from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, load_factor
 
 
 def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -193,7 +194,10 @@ def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> ForceElement:
 
 
 def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement:
-    law: dict[str, Any] = {"stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free}
+    factor = partial(load_factor, spring.stiffness_factor)
+    law: dict[str, Any] = {
+        "stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free, "factor": factor,
+    }  # fmt: skip
     if not isinstance(spring, LineSpring) or spring.between is None:
         made = _slide if isinstance(spring, LineSpring) else _hinge
         return replace(made(find, f"springs/{name}", str(spring.joint)), **law)

@@ -7,6 +7,7 @@ moves. As q does not change where all turns or moves together, the forces balanc
 A : actions; every array has a row per action
 
     x, v : (A, 2, 2, 3) two vectors of each of two ends, world components, and their rates; see `actions.End`
+    factors : (A,) what the stiffness of each is multiplied by
     before : (A,) q at the time point before, so that turns are counted on beyond ±π
     forces : (A, 2, 2, 3) out
     values : (A, 4) out: q, q', Q, energy stored
@@ -29,7 +30,7 @@ STIFFNESS, DAMPING, LOWER, AXIS, E1, E2, DRAWN, UPPER = 0, 1, 2, 3, 6, 9, 12, 14
 
 
 @compiled
-def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
+def evaluate(t, factors, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
     """Forces and values of all actions at one time, into `forces` and `values`."""
     kinds, forms, numbers, over, first, at, height = table
     for i in range(len(kinds)):
@@ -48,7 +49,8 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
                     rate += gradient[e, k, c] * v[i, e, k, c]
         lower, upper = numbers[i, LOWER], numbers[i, UPPER]
         stretch = q - lower if q < lower else q - upper if q > upper else 0.0
-        Q = -numbers[i, STIFFNESS] * stretch - numbers[i, DAMPING] * rate
+        stiffness = factors[i] * numbers[i, STIFFNESS]
+        Q = -stiffness * stretch - numbers[i, DAMPING] * rate
         if lower < upper and Q * stretch >= 0.0:  # a stop pushes, and only beyond
             Q = 0.0
         if first[i] < first[i + 1]:
@@ -59,14 +61,17 @@ def evaluate(t, x, v, before, table, forces, values):  # type: ignore[no-untyped
                 for c in range(3):
                     gradient[e, k, c] *= Q
         values[i, 0], values[i, 1], values[i, 2] = q, rate, Q
-        values[i, 3] = 0.5 * numbers[i, STIFFNESS] * stretch * stretch
+        values[i, 3] = 0.5 * stiffness * stretch * stretch
 
 
 @compiled
-def evaluate_all(t, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
-    """The same at T times: x, v, forces (T, A, 2, 2, 3), values (T, A, 4); before (A,) is moved on to the last."""
+def evaluate_all(t, factors, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
+    """The same at T times: factors (T, A), x, v, forces (T, A, 2, 2, 3), values (T, A, 4).
+
+    before (A,) is moved on to the last.
+    """
     for k in range(len(t)):
-        evaluate(t[k], x[k], v[k], before, table, forces[k], values[k])
+        evaluate(t[k], factors[k], x[k], v[k], before, table, forces[k], values[k])
         before[:] = values[k, :, 0]
 
 

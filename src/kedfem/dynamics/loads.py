@@ -35,6 +35,7 @@ from kedfem.scene import (
     SurfaceLoad,
     TorqueLoad,
     factor_table,
+    factors,
     load_factor,
     path_parameter,
     time_grid,
@@ -96,25 +97,26 @@ def _turns(pattern: Pattern) -> bool:
 
 
 def coarse_steps(scene: Scene) -> tuple[str, ...]:
-    """A warning for each load whose factor does something between the time steps that these do not see."""
+    """A warning for each load or spring whose factor does something between the time steps that these do not see."""
     grid, out = time_grid(scene), []
     steps = grid.step * np.arange(grid.steps + 1)
     phi = path_parameter(scene, steps)[0] if scene.driven else np.zeros_like(steps)
-    for name, load in scene.loads.items():
-        sampled = load_factor(load.factor, steps, phi)
-        if load.factor.over == "time":
-            fine = np.array(factor_table(load.factor, grid.end)[0])
+    for where, factor in factors(scene):
+        sampled = load_factor(factor, steps, phi)
+        if factor.over == "time":
+            fine = np.array(factor_table(factor, grid.end)[0])
             fine = fine[(fine > 0) & (fine < grid.end)]
         else:
             fine = grid.step / FINER * np.arange(min(FINER * grid.steps, MOST) + 1)
         t = np.union1d(steps, fine)
         angle = path_parameter(scene, t)[0] if scene.driven else np.zeros_like(t)
-        value = load_factor(load.factor, t, angle)
+        value = load_factor(factor, t, angle)
         missed = np.trapezoid(np.abs(value - np.interp(t, steps, sampled)), t)
         if missed > MISSED * np.trapezoid(np.abs(value), t):
             out.append(
-                f"loads.{name}: its table is finer than the time step of {grid.step:.3g} s: what the steps see of it "
-                f"is off by {100 * missed / np.trapezoid(np.abs(value), t):.0f} %; take a smaller step"
+                f"{where.rpartition('.')[0]}: its table is finer than the time step of {grid.step:.3g} s: "
+                f"what the steps see of it is off by {100 * missed / np.trapezoid(np.abs(value), t):.0f} %; "
+                "take a smaller step"
             )
     return tuple(out)
 

@@ -13,6 +13,7 @@ from kedfem.dynamics.coupling import Attachment, SharedCut, joined
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
 from kedfem.dynamics.places import on_part, part_seat, slider_axis, slider_guide
 from kedfem.dynamics.rigid_couplings import with_stiff_ports
+from kedfem.dynamics.rigid_links import made_rigid
 from kedfem.dynamics.slots import slot_ways
 from kedfem.dynamics.state import Rayleigh
 from kedfem.errors import MeshError, SceneError
@@ -28,7 +29,7 @@ from kedfem.links.coupling_surfaces import (
 )
 from kedfem.links.record import Link
 from kedfem.links.recovery import PointRows, point_rows
-from kedfem.links.reduced import RIGID, on_functions, reduced, rigid, rigid_functions, wave_frequency
+from kedfem.links.reduced import on_functions, reduced, rigid
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, joint_axis, unit
@@ -42,16 +43,10 @@ from kedfem.scene import (
     Scene,
     inertia_tensor,
     rayleigh,
-    time_grid,
 )
 from kedfem.scene.capabilities import SLIDERS
 
 T = TypeVar("T")
-
-LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-# ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
-# fail
-RESOLVED = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +170,7 @@ def elastic_model(
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = _made_rigid(scene, links, thicken=elements)
+    links = made_rigid(scene, links, thicken=elements)
     sliders = tuple(_slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
@@ -189,59 +184,6 @@ def elastic_model(
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
         rows=held.rows, cuts=tuple(cuts),
     )  # fmt: skip
-
-
-def _made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
-    """The same with rigid links made so: stiff beside the elastic ones, whatever they are made of themselves.
-
-    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error.
-
-    Parameters
-    ----------
-    thicken : whether a mass that lies in a plane gets next to no thickness, which bars between points need no more of
-    """
-    made = {key for key, link in links.items() if scene.links[link.name].fidelity == "rigid"}
-    elastic = [link for key, link in links.items() if key not in made]
-    out = dict(links)
-    for key in made:
-        link = _thickened(links[key]) if thicken else links[key]
-        _with_extent(link)
-        highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
-        followed = link.fit is not None
-        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
-    return out
-
-
-def _thickened(link: Link) -> Link:
-    """A link whose mass lies in a plane, with 2e-8 of its largest second moment added along all directions."""
-    second = _second_moments(link)
-    if second[0] >= 2 * LAMINA * second[-1] or link.d < 3 or link.kind == "beam":
-        return link
-    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
-    return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
-
-
-def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
-    """Of its mass about the centre, the least first [kg m²]."""
-    F = rigid_functions(link)
-    A = F.T @ np.asarray(link.mass[0] @ F)
-    return np.asarray(np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0]))
-
-
-def _with_extent(link: Link) -> None:
-    """Refuse a rigid link whose mass has no extent along one of its directions: nothing tells its functions along it.
-
-    Raises
-    ------
-    SceneError
-        If the least second moment of its mass about the centre is nothing beside the largest.
-    """
-    second = _second_moments(link)
-    if second[0] < LAMINA * second[-1]:
-        raise SceneError(
-            f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "
-            "plane (such as a body with Ixx + Iyy = Izz on a link of next to no mass): give the body some thickness"
-        )
 
 
 def keys(name: str, link: Segments) -> list[str]:

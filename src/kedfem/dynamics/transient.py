@@ -189,7 +189,8 @@ def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: St
     if not isinstance(solver, SystemSteps):
         return first_states(scene, linkage, along, model, solver.stiffening)
     at_rest = scene.analysis.initial == "rest"
-    plain = solver.ready.c.single or solver.stiffening is not None
+    pulled = scene.springs or scene.motors or scene.limits
+    plain = (solver.ready.c.single and not pulled) or solver.stiffening is not None
     damped = _dampers_count(model)
     if plain and (at_rest or not damped) and not scene.analysis.initial_deflection:
         states = first_states(scene, linkage, along, model, solver.stiffening)

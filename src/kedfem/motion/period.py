@@ -11,13 +11,14 @@ from kedfem.motion.path import MOST_TURNS, Path, path
 from kedfem.scene import (
     ConstantSpeed,
     Drive,
-    Factor,
     MotionLaw,
     Ramp,
     Scene,
     Table,
     cycle,
     drive_angle,
+    factors,
+    is_constant,
     path_parameter,
     turn_steps,
 )
@@ -104,17 +105,12 @@ def _never(scene: Scene) -> Iterator[str]:
     for name, drive in scene.driven_joints.items():
         if not isinstance(drive.motion, Table) and cycle(drive.motion) is None:
             yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
-    for name, load in scene.loads.items():
-        factor = load.factor
-        if factor.over == "time" and factor.period is None and not _constant(factor):
-            yield f"loads.{name}.factor: {where}, got a table over time without one: give it its period"
+    for name, factor in factors(scene):
+        if factor.over == "time" and factor.period is None and not is_constant(factor):
+            yield f"{name}: {where}, got a table over time without one: give it its period"
     for name, motor in scene.motors.items():
         if motor.curve.over == "time" and len(set(motor.curve.value)) > 1:
             yield f"motors.{name}: {where}, got a table over time: make it a load"
-
-
-def _constant(factor: Factor) -> bool:
-    return len(set(factor.value)) < 2
 
 
 def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
@@ -129,21 +125,20 @@ def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
         yield (
             f"analysis.kind: 'steady' must be of a linkage that returns, got one that is elsewhere after {time:.6g} s"
         )
-    for name, load in scene.loads.items():
-        factor = load.factor
-        if _constant(factor):
+    for name, factor in factors(scene):
+        if is_constant(factor):
             continue
         if factor.over == "time" and factor.period is not None and not _whole(time, factor.period):
-            yield f"loads.{name}.factor.period: must be a part of the motion's period, got {factor.period:.6g} s"
+            yield f"{name}.period: must be a part of the motion's period, got {factor.period:.6g} s"
         if factor.over == "angle" and gone:
             if factor.period is None:
                 yield (
-                    f"loads.{name}.factor.period: is required with analysis.kind = 'steady' and a drive that goes on "
+                    f"{name}.period: is required with analysis.kind = 'steady' and a drive that goes on "
                     "turning, got nothing"
                 )
             elif not _whole(gone, factor.period):
                 yield (
-                    f"loads.{name}.factor.period: must be a part of the motion's period, got "
+                    f"{name}.period: must be a part of the motion's period, got "
                     f"{math.degrees(factor.period):.6g} deg"
                 )
 

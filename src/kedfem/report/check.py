@@ -34,7 +34,7 @@ from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.force_elements import measured_actions
 from kedfem.results.recording import recording
-from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, time_grid
+from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
 from kedfem.scene.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
 
@@ -185,8 +185,13 @@ def _spring_law(spring: Spring) -> tuple[str, str]:
         )
     else:
         on, units = f"spring about joint {spring.joint}", ("N m/rad", "N m s/rad")
-    constants = zip((spring.stiffness, spring.damping), units, strict=True)
-    return on, ", ".join(with_prefix(value, unit) for value, unit in constants if value)
+    factor = spring.stiffness_factor
+    stiffness = spring.stiffness * (factor.value[0] if is_constant(factor) else 1.0)
+    constants = zip((stiffness, spring.damping), units, strict=True)
+    given = [with_prefix(value, unit) for value, unit in constants if value]
+    if not is_constant(factor):
+        given[0] += f" times {min(factor.value):.4g} to {max(factor.value):.4g} over {factor.over}"
+    return on, ", ".join(given)
 
 
 def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:

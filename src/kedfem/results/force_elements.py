@@ -16,6 +16,7 @@ from kedfem.dynamics.force_element import (
     ForceElement,
     Table,
     kernel_table,
+    stiffness_factors,
     vectors,
 )
 from kedfem.dynamics.force_elements import actions, hinges
@@ -89,15 +90,16 @@ class Measured:
             self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
             x, v = vectors(self.every, block)
             self.places, self.forces, self.block = x, np.zeros_like(x), block
-            evaluate_all(block.motion.t, x, v, self.turned, self.table, self.forces, self.values)
+            t, factors = block.motion.t, stiffness_factors(self.every, block.motion.t, block.motion.phi)
+            evaluate_all(t, factors, x, v, self.turned, self.table, self.forces, self.values)
             if block.exerted is not None:
-                self._taken(block.exerted.element)
+                self._taken(block.exerted.element, factors)
         return self.values
 
-    def _taken(self, element: Float[np.ndarray, "T 3 A"]) -> None:
+    def _taken(self, element: Float[np.ndarray, "T 3 A"], factors: Float[np.ndarray, "T A"]) -> None:
         """Coordinates, rates and forces of force elements as the solver has them."""
         known = element.shape[2]
-        stiffness = np.array([x.stiffness for x in self.every[:known]])
+        stiffness = factors[:, :known] * np.array([x.stiffness for x in self.every[:known]])
         lower, upper = np.array([x.limits or (x.free, x.free) for x in self.every[:known]]).reshape(-1, 2).T
         q = element[:, 0]
         self.values[:, :known, :3] = element.transpose(0, 2, 1)

@@ -7,7 +7,7 @@ from kedfem.scene.faces import ChosenFace
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import corotational, corotational_links, link_frames
 from kedfem.scene.initial import InitialMotion
-from kedfem.scene.laws import drive_angle, factor_table, load_factor, path_parameter
+from kedfem.scene.laws import drive_angle, factor_table, factors, is_constant, load_factor, path_parameter
 from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing
 from kedfem.scene.loads import (
     Body,
@@ -105,7 +105,9 @@ __all__ = [
     "drive_angle",
     "face_from",
     "factor_table",
+    "factors",
     "inertia_tensor",
+    "is_constant",
     "link_frames",
     "link_from",
     "load_factor",

@@ -186,9 +186,9 @@ REFUSALS = (
     Refusal("loads", {"element": ("body",), "link": ("slider",)}, "{where}.link",
         "name a link with a shape for a body load", "a slider without a shape has no volume",
         "{name!r}, which is rigid", "take a load of kind force, or give it a shape"),
-    Refusal("loads", {"factor": ("angle",), "drive": ("none",)}, "{where}.factor.over",
+    *(Refusal(section, {"factor": ("angle",), "drive": ("none",)}, f"{{where}}.{key}.over",
         "be combined with a drive over whose angle it is", "no other angle is prescribed", "a scene without one",
-        "take a factor over time"),
+        "take a factor over time") for section, key in (("loads", "factor"), ("springs", "stiffness_factor"))),
 )  # fmt: skip
 
 

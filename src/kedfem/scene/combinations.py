@@ -126,7 +126,8 @@ def elements(parts: Parts) -> Iterator[Told]:
     for spring in parts.springs.values():
         facts, words = on_joint(parts, spring.word("joint"))
         element = "torsion" if spring.word("kind") == "torsion" else "along"
-        yield "springs", {**facts, "element": element}, {**words, "where": place(spring.where)}
+        facts |= {"element": element, "factor": spring.word("stiffness_factor", "over") or ""}
+        yield "springs", facts, {**words, "where": place(spring.where)}
     for limit in parts.limits.values():
         facts, words = on_joint(parts, limit.word("joint"))
         moved = "prescribed" if limit.word("joint") in parts.driven_joints else "free"

@@ -250,13 +250,22 @@ def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[
 
 
 def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """A raw scene with the factors of its loads read from the files that they name; and faults."""
-    loads, faults = raw.get("loads"), []
-    if not isinstance(loads, Mapping):
-        return dict(raw), []
-    read = dict(loads)
-    for name, load in loads.items():
-        factor = load.get("factor") if isinstance(load, Mapping) else None
+    """A raw scene with the factors of its loads and springs read from the files that they name; and faults."""
+    read, faults = dict(raw), list[str]()
+    for section, key in (("loads", "factor"), ("springs", "stiffness_factor")):
+        if isinstance(raw.get(section), Mapping):
+            read[section], more = _with_factors(raw[section], f"{section}.{{}}.{key}", key, folder)
+            faults += more
+    return read, faults
+
+
+def _with_factors(
+    every: Mapping[str, Any], where: str, key: str, folder: Path
+) -> tuple[dict[str, Any], list[str]]:
+    """The same of one section: its tables by name, their factors under `key`."""
+    read, faults = dict(every), list[str]()
+    for name, each in every.items():
+        factor = each.get(key) if isinstance(each, Mapping) else None
         if not isinstance(factor, Mapping) or not isinstance(factor.get("file"), str):
             continue
         over = factor.get("over", "time")
@@ -265,8 +274,8 @@ def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, 
         try:
             at, value = two_columns(folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1"))
         except SceneError as error:
-            faults += [f"loads.{name}.factor.file: {fault}" for fault in error.faults]
+            faults += [f"{where.format(name)}.file: {fault}" for fault in error.faults]
             continue
-        table = {key: x for key, x in factor.items() if key != "file"}
-        read[name] = {**load, "factor": {**table, "over": over, "at": at, "value": value}}
-    return {**raw, "loads": read}, faults
+        table = {word: x for word, x in factor.items() if word != "file"}
+        read[name] = {**each, key: {**table, "over": over, "at": at, "value": value}}
+    return read, faults

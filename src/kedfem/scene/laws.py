@@ -1,7 +1,8 @@
-"""The drives' angles or travels and the loads' factors over time, in closed form."""
+"""The drives' angles or travels and the factors of loads and springs over time, in closed form."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -172,7 +173,7 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
 
 
 def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
-    """Factor of a load at times t (t,) [s] and angles phi (t,) of the drive [rad].
+    """A factor at times t (t,) [s] and angles phi (t,) of the drive [rad].
 
     Linear between the table's points; held outside, or repeated after its period.
     """
@@ -182,6 +183,18 @@ def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
         x = at[0] + np.mod(x - at[0], factor.period)
         at, value = np.append(at, at[0] + factor.period), np.append(value, value[0])
     return np.asarray(np.interp(x, at, value))
+
+
+def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
+    """All tables of a scene that multiply something, each with where it stands: of loads, of springs."""
+    yield from ((f"loads.{name}.factor", load.factor) for name, load in scene.loads.items())
+    for name, spring in scene.springs.items():
+        yield f"springs.{name}.stiffness_factor", spring.stiffness_factor
+
+
+def is_constant(factor: Factor) -> bool:
+    """Whether it is the same always."""
+    return len(set(factor.value)) < 2
 
 
 def factor_table(factor: Factor, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

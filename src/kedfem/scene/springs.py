@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from kedfem.scene.base import Record, refuse
-from kedfem.scene.loads import Force, Torque
+from kedfem.scene.loads import ONE, FactorOver, Force, Torque
 from kedfem.scene.points import Point
 from kedfem.scene.units import Angle, Length, Quantity
 
@@ -30,6 +30,20 @@ class SpringEnd(Record):
 
 class _Elastic(Record):
     """What all springs share."""
+
+    stiffness_factor: FactorOver = ONE
+    """what k is multiplied by, nowhere negative: a number, or a table over time or the drive's angle as the factor of a
+    load has it, such as the stiffness of a tooth mesh; repeated with a `period`"""
+
+    @model_validator(mode="after")
+    def _never_pushed_apart(self) -> Self:
+        least = min(self.stiffness_factor.value, default=1.0)
+        if least < 0.0:
+            wanted = "must hold values of at least 0 (a spring of negative stiffness would push apart)"
+            refuse([(("stiffness_factor", "value"), f"{wanted}, got {least:.6g}")])
+        if self.stiffness_factor != ONE and not getattr(self, "stiffness", 1.0):
+            refuse([(("stiffness_factor",), "must be combined with a stiffness, got none")])
+        return self
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:

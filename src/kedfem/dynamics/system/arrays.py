@@ -297,6 +297,7 @@ class Driving(NamedTuple):
     drives : (T, D)
     F : (T, N) P − M R0'' on the coordinates, world components; amounts : (T, w) of loads that turn with bodies
     stations : (T, n) weights of the stations of all lines, where their pins are
+    stiffness_factors : (T, r) what the stiffness of each law is multiplied by
     factors : (T, m) of the terms of stress stiffness; terms_at : (i + 1,) where those of each body begin
     entries_at, entries : (m + 1,) where the entries of each term begin
     """
@@ -310,6 +311,7 @@ class Driving(NamedTuple):
     F: Any
     amounts: Any
     stations: Any
+    stiffness_factors: Any
     factors: Any
     terms_at: Any
     entries_at: Any

@@ -6,6 +6,7 @@ motors and limits are laws on the same coordinates.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -38,7 +39,16 @@ from kedfem.links.record import Link
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.linkage import Linkage, joint_axis
 from kedfem.motion.path import Path
-from kedfem.scene import AngleLimit, LineSpring, Motor, Scene, TravelLimit
+from kedfem.scene import (
+    AngleLimit,
+    LineSpring,
+    Motor,
+    Scene,
+    TorsionSpring,
+    TravelLimit,
+    is_constant,
+    load_factor,
+)
 from kedfem.scene.capabilities import SLOTS
 
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
@@ -73,6 +83,14 @@ def system_of(
     )
     model = replace(model, links=links)
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
+
+
+def spring_law(spring: LineSpring | TorsionSpring) -> Spring:
+    """The law of a spring of a scene."""
+    factor = spring.stiffness_factor
+    if is_constant(factor):
+        return Spring(factor.value[0] * spring.stiffness, spring.damping, spring.free)
+    return Spring(spring.stiffness, spring.damping, spring.free, factor=partial(load_factor, factor))
 
 
 def without_stiffness(link: Link) -> Link:
@@ -156,7 +174,7 @@ class _Builder:
         elif isinstance(element, AngleLimit | TravelLimit):
             law = Stop(*element.range, element.stiffness, element.damping)
         else:
-            law = Spring(element.stiffness, element.damping, element.free)  # type: ignore[attr-defined]
+            law = spring_law(element)  # type: ignore[arg-type]
         if isinstance(element, LineSpring) and element.between is not None:
             i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(element.between))
             a, a_j = (self.ends[n].origin for n in (i, j))

@@ -89,13 +89,14 @@ def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def law(of, r, t, e, rate, before, force, out):  # type: ignore[no-untyped-def]
+def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyped-def]
     """Force against the coordinate e with its rate, and how it grows with both: out (3,); a constraint has its misfit.
 
     Returns whether it is a constraint.
 
     Parameters
     ----------
+    factor : what a spring's stiffness is multiplied by
     before, force : coordinate and force along it at the beginning of the step
     """
     kind, numbers = of.law[r], of.numbers[r]
@@ -104,7 +105,8 @@ def law(of, r, t, e, rate, before, force, out):  # type: ignore[no-untyped-def]
         out[0] = e
         return True
     if kind == SPRING:
-        out[0], out[1], out[2] = numbers[0] * (e - numbers[2]) + numbers[1] * rate, numbers[0], numbers[1]
+        k = factor * numbers[0]
+        out[0], out[1], out[2] = k * (e - numbers[2]) + numbers[1] * rate, k, numbers[1]
     elif kind == CURVE:
         over = of.over[r]
         at = t if over == TIME else (rate if over == RATE else e)

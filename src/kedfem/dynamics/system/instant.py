@@ -26,6 +26,7 @@ from kedfem.dynamics.system.record import (
     Law,
     Spring,
     Stop,
+    law_at,
 )
 from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.turning_loads import turned as turned_load
@@ -114,8 +115,8 @@ class Instant:
 
     def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
-        every = enumerate(self.of.system.constraints)
-        return np.array([push(each.law, self.time, e[0, n], e[1, n]) for n, each in every]).reshape(-1, 3)
+        laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
+        return np.array([push(law, self.time, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
 
     def hard(self, C: Float[np.ndarray, "r k"]) -> Bool[np.ndarray, " r"]:
         """Which are constraints that say something of z."""

@@ -109,7 +109,8 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
                     rate += trial.C[a, m] * newmark_rate(
                         c, trial.z[m], state.z[0, m], state.z[1, m], state.z[2, m]
                     )
-        held = law(of, a, driving.t[t], e, rate, state.e[0, a], state.multiplier[a], work.law)
+        factor = driving.stiffness_factors[t, a]
+        held = law(of, a, driving.t[t], factor, e, rate, state.e[0, a], state.multiplier[a], work.law)
         kappa = share * (work.law[1] + c.rate[0] * work.law[2])
         trial.m[a] = 0.0
         if held:

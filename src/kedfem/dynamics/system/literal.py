@@ -132,7 +132,7 @@ class Literal:
             own = self._own_rates(now, old, at)
             for n, each in enumerate(self.system.constraints):
                 if n not in hard:
-                    m[n] = -(1 - scheme.alpha_f) * force(each, float(at.t[0]), now.e[0, n], own[n])[0]
+                    m[n] = -(1 - scheme.alpha_f) * force(each, at, now.e[0, n], own[n])[0]
             left = [
                 self._unbalanced(now, old) - self.W.T @ lam,
                 self.W @ now.u - self.B @ now.z,

@@ -27,23 +27,25 @@ from kedfem.dynamics.system.record import (
     Stop,
     System,
     Term,
+    law_at,
 )
 from kedfem.dynamics.system.turning_loads import shown_by
 from kedfem.links.record import Link
 from kedfem.motion.constraints import ConstraintEquation, stacked
+from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.values import features, jacobian
 
 Column = Float[np.ndarray, " _"]
 
 
-def force(each: Constraint, t: float, e: float, rate: float) -> tuple[float]:
-    """Force of a law against its coordinate."""
-    match each.law:
+def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[float]:
+    """Force of a law against its coordinate, at one time."""
+    match law_at(each.law, at.t, at.phi):
         case Spring(stiffness=k, damping=c, free=free):
             return (k * (e - free) + c * rate,)
-        case Curve(over=over, at=at, value=value):
-            x = t if over == TIME else (rate if over == RATE else e)
-            return (-float(np.interp(x, at, value)),)
+        case Curve(over=over, at=places, value=value):
+            x = float(at.t[0]) if over == TIME else (rate if over == RATE else e)
+            return (-float(np.interp(x, places, value)),)
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
             if lower <= e <= upper:
                 return (0.0,)

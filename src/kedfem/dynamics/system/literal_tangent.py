@@ -71,7 +71,7 @@ def _of_pull(of: Literal, now: Now, old: Now, at: RigidMotion, m: Column) -> Mat
             pull, rate = m.copy(), of.rates(e, *old.e)[0]
             for n in set(which).difference(of.hard):
                 each = of.system.constraints[n]
-                pull[n] = -(1 - of.scheme.alpha_f) * force(each, float(at.t[0]), e[n], rate[n])[0]
+                pull[n] = -(1 - of.scheme.alpha_f) * force(each, at, e[n], rate[n])[0]
             pushed.append(moved[which].T @ pull[which])
         out[:, column] = (pushed[0] - pushed[1]) / (2 * DIFFERENCE)
     return out

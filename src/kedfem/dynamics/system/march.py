@@ -23,7 +23,7 @@ from kedfem.dynamics.system.arrays import (
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
-from kedfem.dynamics.system.record import Driven, Held, Spring, System, without_unknowns
+from kedfem.dynamics.system.record import System, is_affine, stiffness_factors, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
 from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.turning_loads import turning
@@ -75,10 +75,7 @@ class ConvergenceError(SolveError):
 def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
     """Factor all bodies of a system for a scheme."""
     model = system.model
-    linear = all(
-        without_unknowns(system, each) or (each.linear and isinstance(each.law, Held | Driven | Spring))
-        for each in system.constraints
-    )
+    linear = all(without_unknowns(system, each) or is_affine(system, each) for each in system.constraints)
     single = linear and all(link.fit is None for link in model.links) and system.stiffening is None
     c = coefficients(scheme, model.damping, model.links, single, tolerance)
     parts = factored(model.links, model.joints, c)
@@ -116,6 +113,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         np.concatenate(F, axis=1),
         amounts(of, motion),
         weights,
+        stiffness_factors(of.system, motion.t, motion.phi),
     )
     terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing)
     # other strides would be compiled for anew

@@ -1,6 +1,7 @@
 """The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
 RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
 
 Vector = Float[np.ndarray, "3"]
+Times = Float[np.ndarray, " T"]
+Factor = Callable[[Times, Times], Times]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +38,14 @@ class Spring:
     """A spring and damper: force k (e − free) + c e' against the coordinate e [N/m or N m; N s/m or N m s].
 
     drive : number of a drive whose travel is taken from the coordinate, as of a shaft that gives; −1: none
+    factor : times (T,) and the drive's angles (T,) → what k is multiplied by (T,); none: one
     """
 
     stiffness: float
     damping: float = 0.0
     free: float = 0.0
     drive: int = -1
+    factor: Factor | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +71,22 @@ class Stop:
 
 
 Law = Held | Driven | Spring | Curve | Stop
+
+
+def law_at(law: Law, t: Times, phi: Times) -> Law:
+    """A law as it is at one time (1,) and angle of the drive (1,)."""
+    if isinstance(law, Spring) and law.factor is not None:
+        return replace(law, stiffness=law.stiffness * float(law.factor(t, phi)[0]), factor=None)
+    return law
+
+
+def stiffness_factors(system: "System", t: Times, phi: Times) -> Float[np.ndarray, "T r"]:
+    """What the stiffness of each law is multiplied by over time."""
+    out = np.ones((len(t), len(system.constraints)))
+    for n, each in enumerate(system.constraints):
+        if isinstance(each.law, Spring) and each.law.factor is not None:
+            out[:, n] = each.law.factor(t, phi)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +173,23 @@ class System:
     unknowns: int
     model: Any
     stiffening: Any = None
+
+
+def is_affine(system: System, each: Constraint) -> bool:
+    """Whether a force, or a misfit, grows with z by a constant gradient: one solution of the interface is exact.
+
+    So does a spring along a slide on the ground: it pulls at a point, along a direction that only the rigid-body motion
+    turns.
+    """
+    law = each.law
+    known = law.over == TIME if isinstance(law, Curve) else isinstance(law, Held | Driven | Spring)
+    return known and (each.linear or all(_at_a_point(system, term) for term in each.terms))
+
+
+def _at_a_point(system: System, term: Term) -> bool:
+    """Whether a term is the way of a point of one end along a direction of another that moves as prescribed."""
+    one, other = system.ends[term.i], system.ends[term.j]
+    return term.kind == GAP and other.form == RIGID and bool((term.a == one.origin).all())
 
 
 def without_unknowns(system: System, each: Constraint) -> bool:

@@ -1,0 +1,99 @@
+"""Rigid links of a model: in the span of {1, x, y, z}, and so stiff there that they do not deform beside what does."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import SceneError
+from kedfem.links.bodies import with_body
+from kedfem.links.coupling_surfaces import rigid_seat
+from kedfem.links.record import Link
+from kedfem.links.reduced import RIGID, rigid, rigid_functions, wave_frequency
+from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid
+
+LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
+# ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
+# fail
+RESOLVED = 30.0
+
+
+def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
+    """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
+
+    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error.
+    Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
+
+    Parameters
+    ----------
+    thicken : whether a mass that lies in a plane gets next to no thickness, which bars between points need no more of
+    """
+    made = {key for key, link in links.items() if scene.links[link.name].fidelity == "rigid"}
+    elastic = [link for key, link in links.items() if key not in made]
+    out, soft = dict(links), _mounts(scene)
+    for key in made:
+        link = _thickened(links[key]) if thicken else links[key]
+        _with_extent(link)
+        highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
+        if not elastic and any(soft):
+            highest = min(highest, RIGID * _mounted(link, *soft))
+        followed = link.fit is not None
+        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
+    return out
+
+
+def _thickened(link: Link) -> Link:
+    """A link whose mass lies in a plane, with 2e-8 of its largest second moment added along all directions."""
+    second = _second_moments(link)
+    if second[0] >= 2 * LAMINA * second[-1] or link.d < 3 or link.kind == "beam":
+        return link
+    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
+
+
+def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
+    """Of its mass about the centre, the least first [kg m²]."""
+    F = rigid_functions(link)
+    A = F.T @ np.asarray(link.mass[0] @ F)
+    return np.asarray(np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0]))
+
+
+def _with_extent(link: Link) -> None:
+    """Refuse a rigid link whose mass has no extent along one of its directions: nothing tells its functions along it.
+
+    Raises
+    ------
+    SceneError
+        If the least second moment of its mass about the centre is nothing beside the largest.
+    """
+    second = _second_moments(link)
+    if second[0] < LAMINA * second[-1]:
+        raise SceneError(
+            f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "
+            "plane (such as a body with Ixx + Iyy = Izz on a link of next to no mass): give the body some thickness"
+        )
+
+
+def _mounts(scene: Scene) -> tuple[float, float]:
+    """The largest stiffness of anything soft beside links [N/m], and about an axis [N m/rad]; zero without any."""
+    along, about = [0.0], [0.0]
+    for joint in scene.joints.values():
+        if joint.bushing is not None:
+            along += joint.bushing.stiffness or ()
+            about += joint.bushing.rotational_stiffness or ()
+    for spring in scene.springs.values():
+        stiffness = max(spring.stiffness_factor.value) * spring.stiffness
+        (about if isinstance(spring, TorsionSpring) else along).append(stiffness)
+    for limit in scene.limits.values():
+        (about if isinstance(limit, AngleLimit) else along).append(limit.stiffness)
+    for name, drive in scene.driven_joints.items():
+        slides = scene.joints[name].kind == "prismatic"
+        (along if slides else about).append(drive.shaft_stiffness or 0.0)
+    return max(along), max(about)
+
+
+def _mounted(link: Link, along: float, about: float) -> float:
+    """The highest frequency at which a link would swing alone on one of such mounts [rad/s]."""
+    mass, second = float(link.one @ link.m1[:, 0]), _second_moments(link)
+    least = float(second[:2].sum())  # about the axis with most mass near it
+    return float(np.sqrt(along / mass + (along * link.size**2 + about) / least))
