@@ -244,6 +244,13 @@ class _Stream:
         return replace(block, links=links)
 
 
+def in_balance(scene: Scene, blocks: Iterator[Block]) -> Iterator[Block]:
+    """Blocks of a single march from its start, with accelerations of the balance in place of the method's own δ''."""
+    stream = _Stream(iter(()), generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf), Mark())
+    for block in blocks:
+        yield stream._balanced(block)
+
+
 def balanced(
     scheme: Scheme, before: Float[np.ndarray, "n d"], balance: Float[np.ndarray, "n d"],
     own: Float[np.ndarray, "T n d"],

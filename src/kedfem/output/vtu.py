@@ -123,9 +123,20 @@ class AnimationWriter:
         with replacing(path) as part:
             _write_vtu(part, time, fields)
         self.times.append(float(time))
-        with replacing(self.folder / f"{self.stem}.pvd") as part:
-            part.write_text(_collection(self.stem, self.times), encoding="utf-8")
+        write_collection(self.folder, self.stem, self.times)
         return path
+
+
+def write_collection(folder: Path, stem: str, times: Sequence[float]) -> None:
+    """The PVD file that lists frames ``STEM_0000.vtu``, … at their times [s].
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with replacing(folder / f"{stem}.pvd") as part:
+        part.write_text(_collection(stem, times), encoding="utf-8")
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:

@@ -1,0 +1,160 @@
+"""Load cases of one part as a deck for Abaqus and CalculiX, its mesh with them; and as VTU and a table.
+
+A deck has one step for each instant. Forces stand at nodes, all of them in balance; six supports, as many as hold a body
+and no more, keep it from drifting off: their reactions are what the balance leaves.
+"""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from kedfem.links.record import Link
+from kedfem.motion.constraints import cross
+from kedfem.output.vtu import STRESS_COMPONENTS
+from kedfem.results.files import replacing
+from kedfem.results.load_cases import LoadCase
+from kedfem.results.table import cell, text_file
+from kedfem.scene import Material
+
+Forces = Float[np.ndarray, "n 3"]
+ELEMENTS = {"hexahedron": "C3D8", "hexahedron20": "C3D20", "tetra10": "C3D10"}
+"""By meshio's names, nodes in the same order; CalculiX has no 27-node hexahedra."""
+
+LINE = 15  # numbers after the first on a line
+
+
+def supports(link: Link) -> list[tuple[int, int]]:
+    """Six (node, component) that hold a link against all rigid motions, and against each as well as can be."""
+    _, _, order = scipy.linalg.qr(_rigid(link).T, mode="economic", pivoting=True)
+    return sorted((int(k // 3), int(k % 3)) for k in order[:6])
+
+
+def reactions(link: Link, held: Sequence[tuple[int, int]], forces: Forces) -> Float[np.ndarray, "6"]:
+    """What supports bear under forces at a link's nodes, by statics [N]."""
+    modes = _rigid(link)
+    rows = [3 * node + component for node, component in held]
+    return np.asarray(-np.linalg.solve(modes[rows].T, modes.T @ forces.ravel()))
+
+
+def _rigid(link: Link) -> Float[np.ndarray, "c 6"]:
+    """Small rigid motions at all components of the nodes: three ways, and about the middle, over the link's size."""
+    X = link.X - link.X.mean(axis=0)
+    turns = [np.cross(axis, X / np.abs(X).max()).ravel() for axis in np.eye(3)]
+    return np.column_stack([*(np.tile(e, len(X)) for e in np.eye(3)), *turns])
+
+
+def write_deck(
+    path: Path, link: Link, material: Material, cases: Sequence[LoadCase], said: Iterable[str]
+) -> None:
+    """The deck.
+
+    Parameters
+    ----------
+    said : lines of comment for its head
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    held = supports(link)
+    with text_file(path) as file:
+        file.writelines(f"** {line}\n" for line in said)
+        file.write("*NODE, NSET=NALL\n")
+        file.writelines(f"{k}, {_numbers(X)}\n" for k, X in enumerate(link.X, start=1))
+        file.write(f"*ELEMENT, TYPE={ELEMENTS[link.cell_type]}, ELSET=EALL\n")
+        for k, nodes in enumerate(link.cells + 1, start=1):
+            words = [str(k), *map(str, nodes)]
+            lines = [", ".join(words[i : i + LINE + 1]) for i in range(0, len(words), LINE + 1)]
+            file.write(",\n".join(lines) + "\n")
+        file.write("*NSET, NSET=SUPPORTS\n")
+        file.writelines(f"{node + 1}\n" for node in sorted({node for node, _ in held}))
+        file.write(
+            f"*MATERIAL, NAME=LINK\n*ELASTIC\n{material.youngs_modulus:.9e}, {material.poisson_ratio:.9e}\n"
+        )
+        file.write(f"*DENSITY\n{material.density:.9e}\n*SOLID SECTION, ELSET=EALL, MATERIAL=LINK\n")
+        file.write("** six supports, statically determinate: their reactions are what the balance leaves\n")
+        file.write("*BOUNDARY\n")
+        file.writelines(f"{node + 1}, {component + 1}, {component + 1}\n" for node, component in held)
+        for case in cases:
+            _write_step(file, case)
+
+
+def _write_step(file: TextIO, case: LoadCase) -> None:
+    file.write(f"** time {case.time:.9g} s, drive at {case.angle:.9g}\n*STEP\n*STATIC\n*CLOAD, OP=NEW\n")
+    for node, force in enumerate(case.total, start=1):
+        file.writelines(f"{node}, {c}, {f:.9e}\n" for c, f in enumerate(force, start=1) if f != 0)
+    file.write("*NODE FILE\nU, RF\n*EL FILE\nS\n*NODE PRINT, NSET=SUPPORTS\nRF\n*END STEP\n")
+
+
+def _numbers(x: Float[np.ndarray, " k"]) -> str:
+    return ", ".join(f"{value:.12e}" for value in x)
+
+
+def write_case(path: Path, link: Link, case: LoadCase) -> None:
+    """A load case for ParaView: the link as drawn; forces of each kind, displacement, acceleration and stress at nodes.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    import meshio
+    from meshio import vtu
+
+    fields = {f"{name} [N]": x for name, x in case.parts.items()} | {
+        "all forces [N]": case.total, "displacement [m]": case.displacement,
+        "acceleration [m/s^2]": case.acceleration, "von Mises [Pa]": case.von_mises,
+        "von Mises by statics [Pa]": case.static_von_mises, "stress [Pa]": case.stress,
+    }  # fmt: skip
+    fields = {name: np.ascontiguousarray(x) for name, x in fields.items()}
+    content = meshio.Mesh(link.X, [(link.cell_type, link.cells.astype(np.int32))], point_data=fields)
+    stress = f'Name="stress [Pa]" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
+    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
+    with replacing(path) as part:
+        vtu.write(str(part), content, binary=True, compression="zlib")
+        part.write_bytes(part.read_bytes().replace(stress.encode(), (stress + named).encode(), 1))
+
+
+def resultants(
+    X: Forces, case: LoadCase, about: Mapping[str, Float[np.ndarray, "3"]]
+) -> dict[str, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]]:
+    """Point, force [N] and moment about it [N m] of each kind of force; the point is the origin where none is named."""
+    out = {}
+    for name, forces in case.parts.items():
+        at = np.asarray(about.get(name, np.zeros(3)))
+        out[name] = at, forces.sum(axis=0), cross(X - at, forces).sum(axis=0)
+    return out
+
+
+def write_resultants(
+    path: Path, X: Forces, cases: Sequence[LoadCase], about: Mapping[str, Float[np.ndarray, "3"]], drive: str
+) -> None:
+    """Force and moment of each kind at each instant as CSV.
+
+    Parameters
+    ----------
+    drive : heading of the drive's position
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    columns = [
+        f"{what} {c} [{unit}]"
+        for what, unit in (("point", "m"), ("force", "N"), ("moment", "N m"))
+        for c in "xyz"
+    ]
+    with text_file(path) as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["time [s]", drive, "what", *columns])
+        for case in cases:
+            for name, vectors in resultants(X, case, about).items():
+                numbers = map(cell, np.concatenate(vectors))
+                table.writerow([cell(case.time), cell(case.angle), name, *numbers])
