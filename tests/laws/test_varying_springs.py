@@ -69,16 +69,18 @@ def hill(form: str, axis: str, zeta: float, **analysis: Any) -> Raw:
     }
 
 
-def multiplier(form: str, zeta: float) -> float:
-    """The largest of the equation itself, from its two solutions over a period."""
+def multiplier(form: str, zeta: float, speed: float = 2 * OMEGA) -> float:
+    """The largest of the equation itself, from its two solutions over a period of a speed [rad/s]."""
+    slow = 2 * OMEGA / speed
+    delta, epsilon, zeta = slow**2 * DELTA, slow**2 * EPSILON, slow * zeta
     if form == "Meissner":
         P = np.eye(2)
         for f in (1, -1):
-            P = expm(np.array([[0, 1], [-(DELTA + f * EPSILON), -2 * zeta]]) * np.pi / 2) @ P
+            P = expm(np.array([[0, 1], [-(delta + f * epsilon), -2 * zeta]]) * np.pi / 2) @ P
     else:
 
         def rates(t: float, x: np.ndarray) -> list[float]:
-            return [x[1], -(DELTA + EPSILON * np.cos(2 * t)) * x[0] - 2 * zeta * x[1]]
+            return [x[1], -(delta + epsilon * np.cos(2 * t)) * x[0] - 2 * zeta * x[1]]
 
         both = [solve_ivp(rates, (0, np.pi), x0, rtol=1e-12, atol=1e-13, method="DOP853") for x0 in np.eye(2)]
         P = np.array([each.y[:, -1] for each in both]).T

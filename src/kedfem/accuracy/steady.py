@@ -13,6 +13,8 @@ from kedfem.scene import Scene, time_grid, turn_steps
 
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
+APART = 0.1  # of logarithms of growth, by which levels of a step that resolves what grows differ at most
+FALLEN = 0.5  # what falls to less in a period is stable, whatever its last digit
 KNOWN = 1e-3  # error of the state that is not worth a word
 SETTLED = 0.01  # what is left of a vibration that has died away
 
@@ -24,8 +26,10 @@ class Steady:
     period : [s]; revolutions : of the drive in it, 0 of one that does not go on turning
     marches : periods that were marched to find it, at all levels in time
     residual : what a period leaves of the size of its state, at worst of all levels
-    growth : by which a period multiplies the least damped vibration, combined of all levels; None if not asked for
+    growth : by which a period multiplies the least damped vibration, combined of all levels; None if not asked for, or
+        if the levels do not agree: then it is the method's own
     certain : whether that was found to the tolerance
+    levels : growth of each level
     """
 
     period: float
@@ -34,6 +38,7 @@ class Steady:
     residual: float
     growth: float | None
     certain: bool
+    levels: tuple[float, ...] = ()
 
     @property
     def unstable(self) -> bool:
@@ -67,13 +72,15 @@ def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
     found = [x for x in (getattr(each, "steady", None) for each in solvers) if isinstance(x, Periodic)]
     if not found:
         return None
-    turn, grid, growth = turn_steps(scene), time_grid(scene), None
+    turn, grid, growth, levels = turn_steps(scene), time_grid(scene), None, tuple[float, ...]()
     if all(len(each.multipliers) for each in found):
         weights = level_weights(len(found), scene.analysis.rho_inf)
-        growth = float(np.exp(weights @ np.log([max(each.growth, 1e-300) for each in found])))
+        levels = tuple(max(each.growth, 1e-300) for each in found)
+        if max(levels) < FALLEN or np.ptp(np.log(levels)) <= APART:
+            growth = float(np.exp(weights @ np.log(levels)))
     return Steady(
         found[0].period, grid.steps / turn if turn else 0.0, sum(each.marches for each in found),
-        max(each.residual for each in found), growth, all(each.certain for each in found),
+        max(each.residual for each in found), growth, all(each.certain for each in found), levels,
     )  # fmt: skip
 
 
@@ -84,6 +91,11 @@ def unstable(steady: Steady | None) -> str:
     return (
         f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
         f"of {steady.period:.4g} s, until something else limits it"
+        + (
+            ""
+            if len(steady.levels) > 1
+            else "; that the steps are short enough for this only extrapolation_levels = 2 tells"
+        )
     )
 
 
@@ -91,6 +103,13 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
     """What the user should know."""
     if steady is None:
         return ()
+    if steady.growth is None and steady.levels:
+        least, most = min(steady.levels), max(steady.levels)
+        return (
+            "steady motion: whether it is stable cannot be told with steps as long as these: at the levels in time "
+            f"vibrations are multiplied by {least:.3g} and {most:.3g} in a period, which is the method's doing; "
+            "take smaller steps",
+        )
     if steady.growth is None:
         text = "steady motion: whether it is stable is not found out where joints have limits, which it may run against"
         return () if steady.certain else (text,)

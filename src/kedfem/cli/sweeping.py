@@ -26,6 +26,13 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores.")] = None,
     quick: Quick = False,
     keep: Annotated[bool, typer.Option("--keep", help="Leave a folder of results for each point.")] = False,
+    edges: Annotated[
+        float | None,
+        typer.Option(
+            metavar="WIDTH",
+            help="Find edges of unstable bands along the first key to this relative width, as 0.001.",
+        ),
+    ] = None,
     folder: Annotated[
         Path | None, typer.Option(help="Where all goes; default: SCENE-sweep beside the scene.")
     ] = None,
@@ -39,7 +46,7 @@ def sweep(
 
     raw, _ = read_keys(scene, within=within)
     base = Base(raw, scene.parent, scene.stem)
-    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep)
+    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep, edges)
     try:
         with progress() as watch:
             done = swept_by(base, axes, asked, folder, watch)
@@ -50,6 +57,6 @@ def sweep(
         err.print(f"interrupted; {said}", style="yellow", markup=False, soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from None
     show(*sweep_tables(done))
-    for name in ("sweep.h5", "sweep.csv", "sweep.png"):
+    for name in ("sweep.h5", "sweep.csv", "edges.csv", "sweep.png"):
         if (done.folder / name).exists():
             out.print(f"{done.folder / name}", markup=False, soft_wrap=True)

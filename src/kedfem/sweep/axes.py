@@ -101,7 +101,7 @@ def _axis(where: Where, spec: str) -> Axis:
         raise SceneError(f"--over {place(where)}: must be {HOW} (2 to {MOST:,}), got {shown(spec)}")
     first, last, unit, whole = _ends(where, parts[:2], 2)
     numbers = np.linspace(first, last, int(parts[2]))
-    return Axis(where, tuple(_value(x, unit, whole) for x in numbers), numbers, unit)
+    return Axis(where, tuple(stated(x, unit, whole) for x in numbers), numbers, unit)
 
 
 def _ends(where: Where, parts: Sequence[str], count: int) -> tuple[float, float, str, bool]:
@@ -148,7 +148,7 @@ def _word(text: str) -> Value:
     return int(text) if text.lstrip("+-").isdigit() else pair[0]
 
 
-def _value(number: float, unit: str, whole: bool = False) -> Value:
+def stated(number: float, unit: str, whole: bool = False) -> Value:
     """A value of a range as a scene would state it."""
     if unit:
         return f"{number:.15g} {unit}"
@@ -162,5 +162,5 @@ def _hypercube(ranges: Sequence[tuple[Where, float, float, str, bool]], samples:
     out = []
     for (where, first, last, unit, _), x in zip(ranges, cube.T, strict=True):
         numbers = first + (last - first) * x
-        out.append(Axis(where, tuple(_value(each, unit) for each in numbers), numbers, unit))
+        out.append(Axis(where, tuple(stated(each, unit) for each in numbers), numbers, unit))
     return out

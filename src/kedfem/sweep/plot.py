@@ -1,14 +1,17 @@
-"""The resonance plot: largest stresses, joint forces and torques over a swept key, as PNG."""
+"""The resonance plot: largest stresses, joint forces and torques over a swept key; the map of stability over two. PNG."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
 
+from kedfem.accuracy.steady import GROWS
 from kedfem.output.plots import figure_saved
 from kedfem.sweep.axes import Axis
+from kedfem.sweep.edges import Edge
 from kedfem.sweep.files import column_units, largest, plain_quantities
-from kedfem.sweep.points import Row
+from kedfem.sweep.points import GROWTH, Row
 
 PANELS = (
     ("stress/", "Pa", "peak stress (MPa)", 1e-6),
@@ -19,10 +22,11 @@ PANELS = (
 )
 
 
-def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> None:
-    """Largest magnitudes over the only key that is swept; of points that have not settled as open rings.
+def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges: Sequence[Edge] = ()) -> None:
+    """Largest magnitudes over the only key that is swept, or the map of stability of two.
 
-    Nothing is drawn of several keys, of words, nor of fewer than two points; a plot of an earlier sweep goes.
+    A plot of an earlier sweep goes. Points that have not settled are open rings, unstable bands whose edges are known are
+    shaded. Nothing is drawn of words, of more keys, of fewer than two points, nor of two keys without a known growth.
 
     Raises
     ------
@@ -30,6 +34,9 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> Non
         The file cannot be written.
     """
     path.unlink(missing_ok=True)
+    if len(axes) == 2:
+        _write_map(path, axes, rows, edges)
+        return
     numbers = axes[0].numbers
     units = column_units(rows)
     panels = [
@@ -42,7 +49,9 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> Non
     order = np.argsort(numbers)
     loose = np.array([rows[k].settled == "no" for k in order])
     title = f"Largest over the last turns of each run, over {axes[0].key}"
-    with figure_saved(path, title + ("; rings: not settled" if loose.any() else "")) as figure:
+    with figure_saved(
+        path, title + ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if edges else "")
+    ) as figure:
         panes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (label, scale, names) in zip(panes, panels, strict=True):
             for name in names:
@@ -56,8 +65,66 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> Non
                     fillstyle="none",
                     color=line.get_color(),
                 )
+            for first, last in _bands(numbers[order], edges):
+                ax.axvspan(first, last, color="tab:red", alpha=0.12, linewidth=0)
             ax.set_ylabel(label)
             ax.set_ylim(0.0, 1.05 * ax.get_ylim()[1])
             ax.grid(alpha=0.3)
             ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
         panes[-1].set_xlabel(axes[0].key + (f" ({axes[0].unit})" if axes[0].unit else ""))
+
+
+def _bands(numbers: np.ndarray, edges: Sequence[Edge]) -> list[tuple[float, float]]:
+    """From where to where a motion is unstable, of one key."""
+    if not edges:
+        return []
+    ends = [] if edges[0].unstable_above else [float(numbers[0])]
+    ends += [each.at for each in edges]
+    ends += [float(numbers[-1])] if edges[-1].unstable_above else []
+    return list(pairwise(ends))[::2]
+
+
+def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges: Sequence[Edge]) -> None:
+    """Growth over two keys, unstable points apart from stable ones, and the edges between them."""
+    known = [k for k, row in enumerate(rows) if GROWTH in row.extremes]
+    x, y = (axis.numbers for axis in axes)
+    if x is None or y is None or len(known) < 2:
+        return
+    growth = np.array([rows[k].extremes[GROWTH][1][0] for k in known])
+    with figure_saved(
+        path, "By what vibrations are multiplied in a period" + ("; red: unstable bands" if edges else "")
+    ) as figure:
+        ax = figure.subplots()
+        for some, marker, label in (
+            (growth <= 1 + GROWS, "o", "stable"),
+            (growth > 1 + GROWS, "X", "unstable"),
+        ):
+            which = np.array(known)[some]
+            shown = ax.scatter(
+                x[which], y[which], c=growth[some], marker=marker, s=28, cmap="coolwarm", vmin=1 - (far := _far(growth)),
+                vmax=1 + far, edgecolors="black", linewidths=0.3, label=label,
+            )  # fmt: skip
+        for same in dict.fromkeys(each.others for each in edges):
+            line = [each for each in edges if each.others == same]
+            at, along = float(y[line[0].points[0]]), [k for k in known if y[k] == y[line[0].points[0]]]
+            for first, last in _bands(np.sort(x[along]), line):
+                ax.plot(
+                    [first, last],
+                    [at, at],
+                    color="tab:red",
+                    alpha=0.35,
+                    linewidth=7,
+                    solid_capstyle="butt",
+                    zorder=0,
+                )
+            ax.plot([each.at for each in line], [at] * len(line), "k|", markersize=16)
+        figure.colorbar(shown, ax=ax, label="growth in a period")
+        for name, axis in (("x", axes[0]), ("y", axes[1])):
+            getattr(ax, f"set_{name}label")(axis.key + (f" ({axis.unit})" if axis.unit else ""))
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)
+        ax.grid(alpha=0.3)
+
+
+def _far(growth: np.ndarray) -> float:
+    """How far colours go from one: as far as growth does on either side."""
+    return max(float(np.abs(growth - 1).max()), 1e-9)

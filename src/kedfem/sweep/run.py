@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path as FilePath
 from typing import Any
@@ -15,6 +15,7 @@ from kedfem.scene import scene_from
 from kedfem.scene.timing import scene_speed
 from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis
+from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges
 from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.keys import with_values
 from kedfem.sweep.plot import write_plot
@@ -34,12 +35,14 @@ class Asked:
     workers : processes; as many as this one may use cores if None
     quick : plain defaults for what the scene leaves open, instead of a plan
     keep : whether the files of each run stay
+    edges : relative width to which edges of unstable bands are found along the first key; none: they are not looked for
     """
 
     last: float = 1.0
     workers: int | None = None
     quick: bool = False
     keep: bool = False
+    edges: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,7 @@ class Swept:
 
     before : rows that an earlier sweep had finished
     planned : the point by whose plan all were run; None if there was none
+    edges : of unstable bands; empty if they were not looked for
     """
 
     folder: FilePath
@@ -55,6 +59,7 @@ class Swept:
     rows: tuple[Row, ...]
     before: int
     planned: int | None
+    edges: tuple[Edge, ...] = ()
 
 
 def sweep_folder(base: Base) -> FilePath:
@@ -85,34 +90,74 @@ def sweep(
         raise SceneError(f"--workers: must be at least 1, got {asked.workers}")
     if asked.quick:
         base = _quick(base)
-    scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
+    scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
+    if asked.edges is not None:
+        refuse_without_growth(scene, axes[0], asked.edges)
     with claimed(folder or sweep_folder(base)) as target:
         chosen, planned = _planned(base, axes, watch)
+        point = _Points(base, chosen, asked, target)
         rows: dict[int, Row] = {}
-        waiting: dict[int, tuple[str, Job]] = {}
+        axes, found, pool = list(axes), list[Edge](), executor
+        try:
+            while True:
+                waiting = point.waiting(axes, rows)
+                pool = pool or _pool(asked.workers, len(waiting))
+                _run(waiting, rows, target, watch, pool)
+                if asked.edges is None:
+                    break
+                found = list(edges(axes, rows))
+                if not (wide := [each for each in found if each.width > asked.edges]):
+                    break
+                axes = with_middles(axes, wide)
+            _end(pool, kill=False)
+        except BaseException:
+            if pool is not None:
+                _end(pool, kill=True)
+            raise
+        finally:
+            order = sorted(rows)
+            done, every = [axis.at(order) for axis in axes], [rows[k] for k in order]
+            write_sweep(target / "sweep.h5", done, every, asked.last)
+            write_table(target / "sweep.csv", done, every)
+            write_plot(target / "sweep.png", done, every, found)
+            if asked.edges is not None:
+                write_edges(target / "edges.csv", axes, found)
+    return Swept(target, tuple(axes), tuple(every), point.before, planned, tuple(found))
+
+
+@dataclass
+class _Points:
+    """The points of a sweep: which have a row from before, and which wait to be run.
+
+    before : rows that an earlier sweep had finished
+    """
+
+    base: Base
+    chosen: Chosen
+    asked: Asked
+    target: FilePath
+    before: int = 0
+
+    def waiting(self, axes: Sequence[Axis], rows: dict[int, Row]) -> dict[int, tuple[str, Job]]:
+        """Points without a row, with their digests; those of earlier sweeps, and invalid scenes, get theirs."""
+        out: dict[int, tuple[str, Job]] = {}
         for k, values in enumerate(_points(axes)):
-            job = Job(base, values, chosen, asked.last)
+            if k in rows:
+                continue
+            job = Job(self.base, values, self.chosen, self.asked.last)
             try:
                 name = job.identity()
             except SceneError as error:
                 rows[k] = Row("failed", str(error))
                 continue
-            own = target / "runs" / f"{k:05d}" if asked.keep else None
-            kept = kept_row(target, name)
+            own = self.target / "runs" / f"{k:05d}" if self.asked.keep else None
+            kept = kept_row(self.target, name)
             if kept is not None and (own is None or (own / "results.h5").exists()):
                 rows[k] = kept
+                self.before += 1
             else:
-                waiting[k] = name, Job(base, values, chosen, asked.last, own)
-        before = sum(row.status != "failed" for row in rows.values())
-        try:
-            _run(waiting, rows, target, watch, executor or _pool(asked.workers, len(waiting)))
-        finally:
-            order = sorted(rows)
-            done = [axis.at(order) for axis in axes]
-            write_sweep(target / "sweep.h5", done, [rows[k] for k in order], asked.last)
-            write_table(target / "sweep.csv", done, [rows[k] for k in order])
-            write_plot(target / "sweep.png", done, [rows[k] for k in order])
-    return Swept(target, tuple(axes), tuple(rows[k] for k in sorted(rows)), before, planned)
+                out[k] = name, replace(job, folder=own)
+        return out
 
 
 def _quick(base: Base) -> Base:
@@ -171,9 +216,7 @@ def _run(
         ) from error
     except BaseException:
         _keep({each for each in pending if each.done()}, pending, waiting, rows, target)
-        _end(pool, kill=True)
         raise
-    _end(pool, kill=False)
 
 
 def _keep(

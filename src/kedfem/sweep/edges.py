@@ -1,0 +1,118 @@
+"""Edges of unstable bands: the interval between a stable and an unstable point is halved again and again.
+
+Neighbours are points whose other keys have the same values, along the first key.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from kedfem.accuracy.steady import GROWS
+from kedfem.errors import SceneError
+from kedfem.results.table import text_file
+from kedfem.scene import Scene
+from kedfem.sweep.axes import Axis, Value, stated
+from kedfem.sweep.points import GROWTH, Row
+
+FINEST = 1e-9  # relative width of an edge: rounding, not speed, is found below
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """Where a motion becomes unstable, or stable again, along the first key.
+
+    others : values of the other keys
+    below, above : of the first key: the edge is between them
+    unstable_above : else below
+    points : numbers of these two points
+    """
+
+    others: tuple[Value, ...]
+    below: float
+    above: float
+    unstable_above: bool
+    points: tuple[int, int]
+
+    @property
+    def at(self) -> float:
+        """Their mean."""
+        return 0.5 * (self.below + self.above)
+
+    @property
+    def width(self) -> float:
+        """Relative."""
+        return (self.above - self.below) / max(abs(self.below), abs(self.above))
+
+
+def refuse_without_growth(scene: Scene, axis: Axis, width: float) -> None:
+    """Refuse to look for edges where none can be found.
+
+    Raises
+    ------
+    SceneError
+    """
+    if not FINEST <= width < 1.0:
+        raise SceneError(
+            f"--edges: must be a relative width from {FINEST:g} to below 1, such as 0.001, got {width:g}"
+        )
+    if scene.analysis.kind != "steady" or not scene.analysis.stability:
+        given = f"kind = {scene.analysis.kind!r}" if scene.analysis.kind != "steady" else "stability = false"
+        raise SceneError(
+            "--edges: must be combined with analysis.kind = 'steady' and its stability, which tell what vibrations are "
+            f"multiplied by in a period, got {given}"
+        )
+    if axis.numbers is None or len(axis.numbers) < 2:
+        raise SceneError(f"--edges: must be combined with numbers of the first key, {axis.key}, at least two")
+
+
+def edges(axes: Sequence[Axis], rows: Mapping[int, Row]) -> Iterator[Edge]:
+    """All edges between points that are done, in the order of the other keys and the first."""
+    numbers, others = axes[0].numbers, axes[1:]
+    if numbers is None:
+        return
+    lines: dict[tuple[Value, ...], list[int]] = {}
+    for k in sorted(rows, key=lambda k: (float(numbers[k]), k)):
+        if GROWTH in rows[k].extremes:
+            lines.setdefault(tuple(axis.values[k] for axis in others), []).append(k)
+    for same, line in lines.items():
+        for i, j in pairwise(line):
+            first, second = (rows[k].extremes[GROWTH][1][0] > 1 + GROWS for k in (i, j))
+            if first != second:
+                yield Edge(same, float(numbers[i]), float(numbers[j]), bool(second), (i, j))
+
+
+def with_middles(axes: Sequence[Axis], found: Sequence[Edge]) -> list[Axis]:
+    """The axes with a point more in the middle of each edge."""
+    first, out = axes[0], []
+    middles = np.array([each.at for each in found])
+    for axis in axes:
+        if axis is first:
+            values = tuple(stated(x, axis.unit) for x in middles)
+            numbers = None if axis.numbers is None else np.concatenate([axis.numbers, middles])
+            out.append(replace(axis, values=axis.values + values, numbers=numbers))
+        else:
+            out.append(axis.at([*range(len(axis.values)), *(each.points[0] for each in found)]))
+    return out
+
+
+def write_edges(path: FilePath, axes: Sequence[Axis], found: Sequence[Edge]) -> None:
+    """One line an edge: the other keys' values, the place, its half width, and on which side the motion is unstable.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    first = axes[0]
+    unit = f" [{first.unit}]" if first.unit else ""
+    with text_file(path) as file:
+        table = csv.writer(file, lineterminator="\n")
+        header = [*(axis.key for axis in axes[1:]), f"{first.key}{unit}", f"half width{unit}", "unstable"]
+        table.writerow(header)
+        for each in found:
+            place = f"{each.at:.9g}", f"{0.5 * (each.above - each.below):.3g}"
+            table.writerow([*each.others, *place, "above" if each.unstable_above else "below"])
