@@ -438,8 +438,10 @@ def paths(table, above=""):
     "base", [pytest.param(x, marks=() if x == "beam" else pytest.mark.long) for x in BASES]
 )
 def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
-    for path in paths(tomllib.loads(BASES[base])):
-        for odd in ODD:
+    """Every odd value at every third place of the long scenes, and another third for the next one."""
+    every = 1 if base == "beam" else 3
+    for k, path in enumerate(paths(tomllib.loads(BASES[base]))):
+        for odd in ODD[k % every :: every]:
             try:
                 scene_from(changed(BASES[base], {path: odd}))
             except SceneError as error:
