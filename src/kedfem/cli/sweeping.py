@@ -24,6 +24,12 @@ def sweep(
         float, typer.Option(metavar="REVOLUTIONS", help="Whose extremes count, the last ones.")
     ] = 1.0,
     workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores.")] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler whose workers run the points, as tcp://host:8786."
+        ),
+    ] = None,
     quick: Quick = False,
     keep: Annotated[bool, typer.Option("--keep", help="Leave a folder of results for each point.")] = False,
     edges: Annotated[
@@ -39,17 +45,24 @@ def sweep(
     within: Within = False,
 ) -> None:
     """Run a scene at many values of its keys: peak stresses, joint forces, torque over them. Started again it goes on."""
+    from kedfem.errors import SceneError
     from kedfem.report import sweep_tables
     from kedfem.scene import read_keys
     from kedfem.sweep import Asked, Base, axes_of, sweep_folder
     from kedfem.sweep import sweep as swept_by
+    from kedfem.sweep.cluster import cluster as on_cluster
 
     raw, _ = read_keys(scene, within=within)
     base = Base(raw, scene.parent, scene.stem)
     axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep, edges)
+    if cluster is not None and workers is not None:
+        raise SceneError(
+            "--workers: cannot be combined with --cluster, whose workers are as many as there are"
+        )
     try:
+        executor = None if cluster is None else on_cluster(cluster, base.folder)
         with progress() as watch:
-            done = swept_by(base, axes, asked, folder, watch)
+            done = swept_by(base, axes, asked, folder, watch, executor)
     except KeyboardInterrupt:
         said = (
             f"finished points are in {folder or sweep_folder(base)}; the same command goes on with the others"

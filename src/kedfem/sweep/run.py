@@ -226,7 +226,13 @@ def _keep(
     """Rows of points that are done go to the disk."""
     for each in done:
         k = pending.pop(each)
-        rows[k] = each.result()
+        try:
+            rows[k] = each.result()
+        except BrokenExecutor:
+            raise
+        except Exception as error:  # noqa: BLE001 - as libraries of clusters have them
+            rows[k] = Row("failed", f"its worker was lost: {type(error).__name__}: {error}")
+            continue
         keep_row(target, waiting[k][0], rows[k])
 
 
