@@ -222,3 +222,29 @@ def test_a_pool_of_processes_finds_the_same_rows(tmp_path: Path) -> None:
     for one, other in zip(pooled.rows, here.rows, strict=True):
         for name, (_, four) in other.extremes.items():
             assert_allclose(one.extremes[name][1], four, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_a_point_whose_worker_is_lost_is_a_failed_row(tmp_path: Path) -> None:
+    """As executors of clusters tell it; the other points are kept, and it is tried again."""
+
+    class Losing(Inline):
+        def submit(self, fn: Any, /, *args: Any, **_: Any) -> Future[Any]:
+            if self.runs == 1:
+                self.runs += 1
+                lost: Future[Any] = Future()
+                lost.set_exception(RuntimeError("no worker left"))
+                return lost
+            return super().submit(fn, *args)
+
+    raw = arm()
+
+    def run(executor: Executor) -> Swept:
+        axes = axes_of(["drive.speed=100rpm:300rpm:3"], raw)
+        return sweep(Base(raw, tmp_path, "arm"), axes, QUICK, tmp_path / "out", executor=executor)
+
+    done = run(Losing())
+    assert [row.status for row in done.rows] == ["complete", "failed", "complete"]
+    assert done.rows[1].message == "its worker was lost: RuntimeError: no worker left"
+    again = run(Inline())
+    assert again.before == 2
+    assert [row.status for row in again.rows] == ["complete"] * 3

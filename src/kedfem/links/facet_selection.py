@@ -1,6 +1,9 @@
 """Which facets of a meshed link a joint sits on: faces by name, else what lies about its point and axis."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
+from weakref import WeakKeyDictionary
+from zlib import crc32
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -8,11 +11,13 @@ from jaxtyping import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.candidates import round_candidates
 from kedfem.links.missing import ambiguous, in_its_plane, not_touching
-from kedfem.links.record import Link
+from kedfem.links.record import Link, read_only
 from kedfem.links.round_surfaces import Round, ball, rounds, seated
 from kedfem.links.surface import CYLINDER_TOLERANCE, flat_face
 
 Facets = Int[np.ndarray, " f"]
+
+_FOUND: WeakKeyDictionary[Any, dict[tuple[object, ...], Facets]] = WeakKeyDictionary()
 
 
 def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
@@ -43,6 +48,23 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
 
 
 def picked(
+    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
+) -> Facets:
+    """As `_picked`; of a mesh that has been asked for the same before what was found then.
+
+    A joint is looked for on the same mesh some dozen times in a run: by every model that choices and estimates make.
+    """
+    about = link.axes if axis is None else axis
+    given = (point, about, link.X)
+    key = link.kind, axis is None, *(crc32(np.ascontiguousarray(x, float).tobytes()) for x in given)
+    before = _FOUND.setdefault(link.basis, {})
+    if key not in before:
+        before[key] = _picked(link, where, point, axis)
+        read_only(before[key])
+    return before[key]
+
+
+def _picked(
     link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
 ) -> Facets:
     """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.

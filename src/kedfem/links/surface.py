@@ -4,6 +4,8 @@ The facets of a plane link are edges, as wide as the link is thick.
 """
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,6 +39,7 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     Of a plane link it is |x_r| times the thickness.
     """
     mesh, elem = link.basis.mesh, link.basis.elem
+    kind: Any = type(elem)
     elements = mesh.f2t[0, facets]
     corners = mesh.t[: elem.refdom.nnodes, elements]
     on = (corners[:, None] == mesh.facets[:, facets][None]).any(axis=1)  # (c, f) which corners a facet has
@@ -51,7 +54,7 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     )
     for which in np.unique(face):
         here = face == which
-        shape, gradient, weights = _face_functions(elem, on[:, here.argmax()])
+        shape, gradient, weights = _face_functions(kind, tuple(on[:, here.argmax()].tolist()))
         nodes = link.X[dofs[here]]
         tangents = np.einsum("qmk,fmj->kfqj", gradient, nodes)
         N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
@@ -64,11 +67,11 @@ def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     return Surface(x, dA, N, dofs, normals)
 
 
-def _face_functions(
-    elem: skfem.Element, on: Bool[np.ndarray, " c"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@cache
+def _face_functions(of: Any, on: tuple[bool, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on the facet with some corners."""
-    corners = np.asarray(elem.doflocs)[: len(on)][on]
+    elem = of()
+    corners = np.asarray(elem.doflocs)[: len(on)][np.array(on)]
     places, weights = _facet_rule(elem)
     first, edges = corners.min(axis=0), np.eye(elem.dim)[np.ptp(corners, axis=0) > 0]
     if _simplex(elem):
