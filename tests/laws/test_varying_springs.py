@@ -30,17 +30,14 @@ def as_dense(m: Any) -> np.ndarray:
 def hill(form: str, axis: str, zeta: float, **analysis: Any) -> Raw:
     """A block on a slide, x'' + 2 ζ ω x' + ω² (δ + ε f(ω t)) x = 0, half of δ by a bushing, f of period π.
 
-    Mathieu's f is cos 2 ω t; Meissner's is 1 and −1 by turns.
+    Mathieu's f is cos 2 ω t; Meissner's is 1 and −1 by turns, at the time points of steps the mean of both.
     """
     share = 0.5 * DELTA * OMEGA**2 * MASS
     swing = 2 * EPSILON / DELTA
     phi = np.linspace(0, 2 * np.pi, 2881)
     at, f = {
         "Mathieu": (phi, np.cos(phi)),
-        "Meissner": (
-            np.array([0, np.pi * (1 - 1e-9), np.pi, 2 * np.pi * (1 - 1e-9)]),
-            np.array([1, 1, -1, -1]),
-        ),
+        "Meissner": (np.pi * np.array([1e-8, 1 - 1e-8, 1 + 1e-8, 2 - 1e-8]), np.array([1, 1, -1, -1])),
     }[form]
     factor = {
         "over": "angle",
@@ -60,7 +57,11 @@ def hill(form: str, axis: str, zeta: float, **analysis: Any) -> Raw:
         "links": {"crank": rigid(0, 0.1, 0.02), "block": rigid(0.3, 0.3 + SIDE, SIDE)},
         "joints": {
             "A": {"kind": "revolute", "links": ["crank", "ground"], "at": [0, 0, 0], "axis": "z"},
-            "mount": {"kind": "weld", "bushing": {"stiffness": share}, **between},
+            "mount": {
+                "kind": "weld",
+                "bushing": {"stiffness": share, "rotational_stiffness": share * SIDE**2},
+                **between,
+            },
             "S": {"kind": "prismatic", "axis": list(AXES[axis]), **between},
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 2 * OMEGA}},
@@ -96,13 +97,18 @@ def multiplier(form: str, zeta: float, speed: float = 2 * OMEGA) -> float:
     ],
 )  # fmt: skip
 def test_multipliers_of_a_spring_that_stiffens_and_softens(form: str, axis: str, zeta: float) -> None:
-    # what jumps between two steps, as Meissner's, has an error of second order that extrapolation leaves a part of
-    steps = {"Mathieu": 360, "Meissner": 2880}[form]
-    of = steady(hill(form, axis, zeta, steps_per_revolution=steps))[2]
+    of = steady(hill(form, axis, zeta))[2]
     exact = multiplier(form, zeta)
     assert of.unstable
     assert exact > 1.25
     assert_allclose(of.growth, exact, rtol=1e-6)
+
+
+def test_the_largest_multiplier_is_found_though_others_are_found_before_it() -> None:
+    """Another vibration of the block, undamped, is found after three marches: the motion had been told to be stable."""
+    of = steady(hill("Meissner", "x", 0.0, steps_per_revolution=180, extrapolation_levels=1))[2]
+    assert of.certain
+    assert_allclose(of.growth, multiplier("Meissner", 0.0), rtol=2e-4)
 
 
 @pytest.mark.long
@@ -113,8 +119,8 @@ def test_the_multiplier_of_one_level_is_of_second_order(form: str) -> None:
         abs(steady(hill(form, "x", 0.0, steps_per_revolution=int(n), extrapolation_levels=1))[2].growth
             / multiplier(form, 0.0) - 1) for n in steps
     ]  # fmt: skip
-    assert errors[0] < 2e-4
-    assert 1.5 < np.log(errors[0] / errors[2]) / np.log(8) < 2.5
+    assert errors[0] < 4e-4
+    assert 1.9 < np.log(errors[0] / errors[2]) / np.log(8) < 2.1
 
 
 RISES = {"over": "time", "at": [0.0, 0.05, 0.1, 0.2], "value": [1.0, 0.0, 3.0, 1.0]}

@@ -16,6 +16,9 @@ LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre h
 # ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
 # fail
 RESOLVED = 30.0
+MOUNTED = (
+    3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
+)
 
 
 def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
@@ -36,7 +39,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         _with_extent(link)
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
-            highest = min(highest, RIGID * _mounted(link, *soft))
+            highest = min(highest, MOUNTED * _mounted(link, *soft))
         followed = link.fit is not None
         out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
     return out

@@ -30,7 +30,7 @@ MIXINGS, PATIENCE, DEPTH = 60, 8, 30  # of Anderson: marches, those without gain
 SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
 REPEATS = 1e-4  # |1 − μ| of a vibration that repeats itself with the period
 WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
-MULTIPLIERS = 80  # marches for them, at most
+MULTIPLIERS, AGAIN = 80, 5  # marches for them, at most; those after which no larger one may have come up
 SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others
 Watch = Callable[[int], None]
 """Told of the periods that were marched so far."""
@@ -244,16 +244,18 @@ def _multipliers(steps: _Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray,
     size = map_.whole(v)
     if not size > 0.0:
         return np.zeros(1, complex), True
-    by, found = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex)
+    by, found, since = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex), 0
     for H in _arnoldi(steps, (x, y), [v / size], by, MULTIPLIERS):
         values, shapes = np.linalg.eig(H[:-1].astype(complex))
         order = np.argsort(-np.abs(values))
         off = H[-1, -1] * np.abs(shapes[-1, order]) / np.linalg.norm(shapes[:, order], axis=0)
         found = values[order]
-        if len(found) > 2 and off[0] <= tolerance * max(abs(found[0]), tolerance):
+        sure = len(found) > 2 and off[0] <= tolerance * max(abs(found[0]), tolerance)
+        since = since + 1 if sure else 0
+        if since > AGAIN:  # the first that is found need not be the largest: some are hardly struck
             good = off <= max(tolerance, 1e-4) * np.maximum(np.abs(found), tolerance)
             return found[good], True
-    return (found, True) if len(found) < MULTIPLIERS else (found[:1], False)
+    return (found, True) if len(found) < MULTIPLIERS else (found[:1], since > 0)
 
 
 def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:
