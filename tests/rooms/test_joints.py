@@ -1,5 +1,6 @@
 """Joints between elastic links: what they hold, what they leave free, whatever the direction of the scene."""
 
+import gc
 import tracemalloc
 from typing import Any
 
@@ -148,6 +149,7 @@ def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) ->
     held = []
     for block in steps:
         if block.step in (513, 1793):
+            gc.collect()
             held.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert held[1] < held[0] + 100_000  # one step's states are 10 kB, so 1200 of them would show

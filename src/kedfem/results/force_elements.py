@@ -96,7 +96,7 @@ class Measured:
                 self._taken(block.exerted.element, factors)
         return self.values
 
-    def _taken(self, element: Float[np.ndarray, "T 3 A"], factors: Float[np.ndarray, "T A"]) -> None:
+    def _taken(self, element: Float[np.ndarray, "T 3 k"], factors: Float[np.ndarray, "T A"]) -> None:
         """Coordinates, rates and forces of force elements as the solver has them."""
         known = element.shape[2]
         stiffness = factors[:, :known] * np.array([x.stiffness for x in self.every[:known]])
