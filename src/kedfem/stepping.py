@@ -12,18 +12,21 @@ from kedfem.accuracy.estimates import Seen, watcher
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import leveled
 from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.marks import Marks
-from kedfem.dynamics.model import segments, ways
+from kedfem.dynamics.model import Model, segments, ways
 from kedfem.dynamics.transient import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
-from kedfem.output.derived import STEM, fields, remove_derived
+from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived
+from kedfem.output.frames import link_fields
+from kedfem.output.vtkhdf import AnimationFile
 from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
+from kedfem.results.data_sets import drive_heading
 from kedfem.results.envelope import Envelope
 from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
@@ -79,6 +82,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
+    one = AnimationFile(folder / ONE_FILE, drive_heading(drive_channel(scene))) if _one_file(scene) else None
     envelope = Envelope(model, watched.recoveries, watched.stresses_since)
     seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
@@ -93,10 +97,11 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         "marks": marks, "frames": frames, "envelope": envelope, "seen": seen, "errors": errors,
         "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
     }  # fmt: skip
+    memories |= {"one file": one} if one else {}
     if keeper is not None:
         keeper.prepared(ready)
         keeper.put_back(memories)
-        refuse_without(frames)
+        refuse_without(frames, one)
     for each in solvers:
         if not isinstance(each, LiteralSteps):
             each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
@@ -121,6 +126,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
                     if block.step + k in wanted:
                         now = block.at(k)
                         frames.add(now.t, fields(scene, model, watched.recoveries, now))
+                        _append(one, model, watched.recoveries, now)
                 watch("steps", block.step + len(block) - 1, steps)
                 if keeper is not None and keeper.due(envelope.waits):
                     table.flush()
@@ -132,17 +138,29 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     return envelope, seen, errors.estimate
 
 
-def refuse_without(frames: AnimationWriter) -> None:
+def _one_file(scene: Scene) -> bool:
+    return scene.output.animation is not None and scene.output.animation.vtkhdf
+
+
+def _append(one: AnimationFile | None, model: Model, recoveries: list[StressRecovery], now: Snapshot) -> None:
+    """A frame for the animation in one file, if there is to be one."""
+    if one is not None:
+        one.add(now.t, now.phi, link_fields(model, recoveries, now, 0.0, world=True))
+
+
+def refuse_without(*writers: AnimationWriter | AnimationFile | None) -> None:
     """A run goes on only where the frames that it wrote are still there.
 
     Raises
     ------
     OutputError
     """
-    if (missing := frames.missing) is not None:
-        raise OutputError(
-            f"{missing}: must be there to resume the run that wrote it, got nothing; run without --resume"
-        )
+    for missing in (writer.missing for writer in writers if writer):
+        if missing is not None:
+            raise OutputError(
+                f"{missing}: must be there, with its frames, to resume the run that wrote it, got less; run without "
+                "--resume"
+            )
 
 
 @dataclass

@@ -263,7 +263,7 @@ def test_missing_frames_are_noticed(tmp_path: Path) -> None:
     ended_early(scene_of("springs", tmp_path, analysis), 0.5)
     folder = scene_of("springs", tmp_path, analysis).results_folder
     (folder / "animation_0001.vtu").unlink()
-    with pytest.raises(OutputError, match=r"animation_0001\.vtu: must be there to resume"):
+    with pytest.raises(OutputError, match=r"animation_0001\.vtu: must be there, with its frames, to resume"):
         analyse(scene_of("springs", tmp_path, analysis), resumes=True)
 
 

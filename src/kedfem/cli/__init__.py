@@ -385,6 +385,7 @@ def _say_where(folder: Path) -> None:
         ("results.csv", "the same as a table"),
         ("results.parquet", "the same for pandas"),
         ("animation.pvd", "animation, open in ParaView"),
+        ("animation.vtkhdf", "the same in one file"),
         ("plots", "plots"),
         ("envelope.vtu", "highest stresses over all steps, for ParaView"),
         ("peaks.csv", "top ten of each link"),

@@ -251,6 +251,14 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
     return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
 
 
+def turned_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "p 6"]:
+    """Stresses xx, yy, zz, xy, yz, zx in the axes that T takes components to: T S Tᵀ [same unit]."""
+    xx, yy, zz, xy, yz, zx = stress.T
+    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
+    S = T @ S @ T.T
+    return np.stack([S[:, i, j] for i, j in COMPONENTS], axis=1)
+
+
 def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarray, "m q"]]:
     """Reduced Gauss points of the reference element and the matrix that extends values there to the element's nodes."""
     d, at_nodes = link.d, np.asarray(link.basis.elem.doflocs)  # (m, d)

@@ -19,8 +19,8 @@ from kedfem.results.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
-WORST, PARQUET = "worst.vtu", "results.parquet"
-WHOLE = (TABLE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP)
+WORST, PARQUET, ONE_FILE = "worst.vtu", "results.parquet", "animation.vtkhdf"
+WHOLE = (TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP)
 """Files of a run that the next one replaces."""
 
 

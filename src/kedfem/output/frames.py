@@ -8,7 +8,7 @@ from jaxtyping import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
-from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, von_mises
+from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, turned_stress, von_mises
 from kedfem.mesh.hexahedra import HEX8
 from kedfem.output.vtu import LinkField
 
@@ -37,18 +37,20 @@ def _one(parts: Sequence[LinkField]) -> LinkField:
 
 
 def link_fields(
-    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float
-) -> list[LinkField]:
+    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float,
+    world: bool = False,
+) -> list[LinkField]:  # fmt: skip
     """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
 
     Parameters
     ----------
     recoveries : per link, then per carried link
     deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
+    world : whether stresses are in the world's axes; then those of beams, known along their axis alone, are nan
     """
     motion, k = snapshot.motion, snapshot.k
     fields = [
-        link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale)
+        link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale, world)
         for link, body, recovery, state in zip(
             model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
         )
@@ -64,8 +66,9 @@ def link_fields(
 
 
 def link_field(
-    link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float
-) -> LinkField:
+    link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float,
+    world: bool = False,
+) -> LinkField:  # fmt: skip
     """One elastic link where its displacement takes it, which is exaggerated.
 
     Parameters
@@ -79,7 +82,19 @@ def link_field(
         stress = np.full_like(stress, np.nan)
     points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
     kind, cells = recovery.cell_type, recovery.cells
-    return LinkField(link.name, kind, cells, points, displacement, stress, von_mises(stress), _section(link))
+    von = von_mises(stress)
+    if world:
+        stress = _in_world(shown, moment, stress)
+    return LinkField(link.name, kind, cells, points, displacement, stress, von, _section(link))
+
+
+def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 6"]:
+    """Stresses of a meshed link in the world's axes; nan of a beam."""
+    if not link.meshed:
+        return np.full_like(stress, np.nan)
+    R = np.eye(3)
+    R[: link.d, : link.d] = moment.R
+    return turned_stress(stress, R @ link.axes)
 
 
 def _section(link: Link) -> tuple[float, float, bool] | None:

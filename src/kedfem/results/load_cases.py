@@ -23,7 +23,7 @@ from kedfem.dynamics.ports import port_vectors
 from kedfem.dynamics.state import Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
-from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
+from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, turned_stress, von_mises
 from kedfem.motion.constraints import cross
 
 Forces = Float[np.ndarray, "n 3"]
@@ -118,7 +118,7 @@ def load_case(at: Snapshot, k: int, model: Model, full: Model, statics: Statics)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in parts.values())
     parts = {name: x for name, x in parts.items() if np.abs(x).max(initial=0.0) > NOTHING * largest}
     g = nodal_state(model.links[k], now.g)
-    stress = _as_drawn(nodal_stress(statics.recovery, g), link.axes)
+    stress = turned_stress(nodal_stress(statics.recovery, g), link.axes)
     acceleration = (at.motion.p2[at.k, body] + link.X @ at.motion.R2[at.k, body].T + a) @ R
     total = np.asarray(sum(parts.values(), np.zeros((link.n, 3))))
     again = von_mises(statics.stress(total))
@@ -170,11 +170,3 @@ def _force_elements(model: Model, k: int, at: Snapshot, now: LinkMoment) -> Forc
             "tell at which nodes), got a reduced link: leave out `reduced` for its load cases"
         )
     return np.asarray(left @ now.R)
-
-
-def _as_drawn(stress: Float[np.ndarray, "n 6"], axes: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "n 6"]:
-    """Stresses from a link's own axes, x along it, in the axes of the reference position."""
-    xx, yy, zz, xy, yz, zx = stress.T
-    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
-    S = axes @ S @ axes.T
-    return np.stack([S[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)

@@ -96,6 +96,9 @@ class Animation(Record):
     """factor on the elastic displacement; 1 in a scene without a drive"""
     last_revolutions: Positive | None = None
     """only so many revolutions, the last ones; all if not given"""
+    vtkhdf: StrictBool = False
+    """whether an elastic run's frames are also one file, `animation.vtkhdf`: mesh stored once, points where the rigid
+    motion takes them, `displacement` for ParaView's Warp By Vector (never exaggerated), stresses in the world's axes"""
 
 
 ELASTIC = ("displacement", "velocity", "acceleration")

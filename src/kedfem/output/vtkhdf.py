@@ -1,0 +1,199 @@
+"""The ParaView animation as one file: VTKHDF, an unstructured grid over time whose mesh is stored once.
+
+Points are where the rigid motion takes them, so that Warp By Vector by ``displacement [m]`` draws the deflection as
+large as its user likes. Each frame is appended, and the file is whole after it.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import OutputError
+from kedfem.output.vtu import LinkField
+from kedfem.results.files import ready_folder, reason, require_space
+
+VERSION = (2, 3)
+"""Of the format: field data over time."""
+
+TYPES = {
+    "line": 3, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25, "quad9": 28, "hexahedron27": 29,
+}  # fmt: skip
+"""VTK's numbers of meshio's names."""
+
+SPARE = 1_000_000  # bytes for HDF5's own tables
+STRESS, VON_MISES, DISPLACEMENT = "stress [Pa]", "von Mises [Pa]", "displacement [m]"
+LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress [Pa]"
+
+
+class AnimationFile:
+    """Frames of a run in one file.
+
+    Parameters
+    ----------
+    path
+        The file; the first frame replaces an older one.
+    drive
+        What the drive's position is called, with its unit: a field of each frame.
+
+    Raises
+    ------
+    OutputError
+        From :meth:`add`: the file cannot be written.
+    """
+
+    REMEMBERED = ("written",)
+
+    def __init__(self, path: Path, drive: str) -> None:
+        self.path, self.drive = Path(path), drive
+        self.written = 0
+
+    @property
+    def missing(self) -> Path | None:
+        """The file, if frames that were written are not there any more."""
+        import h5py
+
+        if not self.written:
+            return None
+        try:
+            with h5py.File(self.path, "r") as file:
+                there = int(file["VTKHDF/Steps"].attrs["NSteps"]) >= self.written
+        except (OSError, KeyError):
+            there = False
+        return None if there else self.path
+
+    def add(self, time: float, angle: float, fields: Sequence[LinkField]) -> None:
+        """Append a frame.
+
+        Parameters
+        ----------
+        time : [s]
+        angle : of the drive [rad], or travel [m]
+        fields
+            The links in this frame, not exaggerated: points are those of the rigid motion, stresses in the world's axes.
+        """
+        import h5py
+
+        arrays = _point_data(fields)
+        points = np.concatenate([field.points for field in fields]).astype(np.float32)
+        try:
+            ready_folder(self.path.parent)
+            size = points.nbytes + sum(x.nbytes for x in arrays.values())
+            require_space(self.path.parent, size + SPARE)
+            with h5py.File(self.path, "r+" if self.written else "w") as file:
+                root = file["VTKHDF"] if self.written else _laid_out(file, fields, arrays, self.drive)
+                self._append(root, time, angle, {"Points": points, **_in("PointData", arrays)})
+        except (OSError, RuntimeError) as error:
+            raise OutputError(
+                f"{self.path}: must be a file that can be written, got {reason(error)}"
+            ) from error
+        self.written += 1
+
+    def _append(self, root: Any, time: float, angle: float, arrays: dict[str, np.ndarray]) -> None:
+        """A frame after those that count; what else is there is of a run that was killed."""
+        k, n = self.written, len(arrays["Points"])
+        for name, x in arrays.items():
+            root[name].resize((k + 1) * n, axis=0)
+            root[name][k * n :] = x
+        field, sizes = f"FieldData/{self.drive}", f"Steps/FieldDataSizes/{self.drive}"
+        steps = {
+            "Steps/Values": time,
+            field: angle,
+            sizes: (1, 1),
+            "Steps/PartOffsets": 0,
+            "Steps/NumberOfParts": 1,
+        }
+        steps |= {"Steps/PointOffsets": k * n, "Steps/CellOffsets": 0, "Steps/ConnectivityIdOffsets": 0}
+        steps |= {f"Steps/PointDataOffsets/{name}": k * n for name in root["PointData"]}
+        steps |= {f"Steps/CellDataOffsets/{name}": 0 for name in root["CellData"]}
+        steps |= {f"Steps/FieldDataOffsets/{self.drive}": k}
+        for name in (name for name in root["FieldData"] if name != self.drive):  # which number is which link
+            steps |= {f"Steps/FieldDataOffsets/{name}": 0, f"Steps/FieldDataSizes/{name}": (1, 1)}
+        for name, value in steps.items():
+            root[name].resize(k + 1, axis=0)
+            root[name][k] = value
+        root["Steps"].attrs["NSteps"] = k + 1
+
+
+def _in(group: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {f"{group}/{name}": x for name, x in arrays.items()}
+
+
+def _point_data(fields: Sequence[LinkField]) -> dict[str, np.ndarray]:
+    """What each node has in a frame, all links one after the other."""
+    stress = np.concatenate([field.stress for field in fields])
+    least, most = _principal(stress)
+    return {
+        name: x.astype(np.float32)
+        for name, x in {
+            DISPLACEMENT: np.concatenate([field.displacement for field in fields]),
+            VON_MISES: np.concatenate([field.von_mises for field in fields]),
+            STRESS: stress,
+            LARGEST: most,
+            SMALLEST: least,
+        }.items()
+    }
+
+
+def _principal(
+    stress: Float[np.ndarray, "p 6"],
+) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Smallest and largest principal stress; nan where stress is not known."""
+    xx, yy, zz, xy, yz, zx = stress.T
+    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
+    known = np.isfinite(stress).all(axis=1)
+    out = np.full((len(stress), 3), np.nan)
+    out[known] = np.linalg.eigvalsh(S[known])
+    return out[:, 0], out[:, 2]
+
+
+def _laid_out(file: Any, fields: Sequence[LinkField], arrays: dict[str, np.ndarray], drive: str) -> Any:
+    """The file without frames: the mesh, and empty arrays that grow."""
+    root = file.create_group("VTKHDF")
+    root.attrs["Version"] = np.array(VERSION)
+    root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
+    first = np.cumsum([0, *(len(field.points) for field in fields)])
+    cells = [field.cells + n0 for field, n0 in zip(fields, first, strict=False)]
+    sizes = np.concatenate([np.full(len(each), each.shape[1]) for each in cells])
+    root["Connectivity"] = np.concatenate([each.ravel() for each in cells])
+    root["Offsets"] = np.concatenate([[0], np.cumsum(sizes)])
+    kinds = [np.full(len(field.cells), TYPES[field.cell_type], np.uint8) for field in fields]
+    root["Types"] = np.concatenate(kinds)
+    counts = {"Points": first[-1], "Cells": len(sizes), "ConnectivityIds": sizes.sum()}
+    for name, count in counts.items():
+        root[f"NumberOf{name}"] = np.array([count])
+    numbers = [np.full(len(field.cells), k, np.int32) for k, field in enumerate(fields)]
+    root.create_group("CellData")["link"] = np.concatenate(numbers)
+    n, steps = int(first[-1]), root.create_group("Steps")
+    for name, x in {"Points": np.zeros((n, 3), np.float32), **_in("PointData", arrays)}.items():
+        _growing(root, name, x.dtype, x.shape[1:], max(min(n, 100_000), 1))
+    for name in ("PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"):
+        _growing(steps, name, np.int64)
+    for name in [
+        *(f"PointDataOffsets/{x}" for x in arrays),
+        "CellDataOffsets/link",
+        f"FieldDataOffsets/{drive}",
+    ]:
+        _growing(steps, name, np.int64)
+    _growing(steps, f"FieldDataSizes/{drive}", np.int64, (2,))
+    _growing(steps, "Values", np.float64)
+    _growing(root, f"FieldData/{drive}", np.float64)
+    for field, number in _numbers(fields):
+        root[f"FieldData/{field}"] = np.array([number], float)
+        for group, shape in (("FieldDataOffsets", ()), ("FieldDataSizes", (2,))):
+            _growing(steps, f"{group}/{field}", np.int64, shape)
+    return root
+
+
+def _numbers(fields: Sequence[LinkField]) -> Iterator[tuple[str, int]]:
+    """Field data that tell which number of the cell data is which link; "/" would begin a group."""
+    return ((f"link {field.name}".replace("/", "_"), k) for k, field in enumerate(fields))
+
+
+def _growing(group: Any, name: str, kind: Any, shape: tuple[int, ...] = (), rows: int = 256) -> None:
+    """An empty array to which rows are appended."""
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+    whole = {"maxshape": (None, *shape), "chunks": (rows, *shape)}
+    group.create_dataset(name, (0, *shape), kind, **whole, **packed)
