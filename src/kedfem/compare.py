@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from kedfem.errors import OutputError
 from kedfem.output.compare_plots import write_comparison
-from kedfem.results import Results, read_results
+from kedfem.results import Results, read_results, results_file
 from kedfem.results.differences import (
     Difference,
     Over,
@@ -64,7 +64,7 @@ def compare(
     """
     if len(files) < 2:
         raise OutputError(f"kedfem compare: must have two results or more, got {len(files)}")
-    paths = [FilePath(each) / "results.h5" if FilePath(each).is_dir() else FilePath(each) for each in files]
+    paths = [results_file(each) for each in files]
     runs = [read_results(path) for path in paths]
     for path, run in zip(paths, runs, strict=True):
         if not len(run.time):

@@ -26,7 +26,7 @@ from kedfem.output.static_decks import (
     write_resultants,
 )
 from kedfem.output.vtu import write_collection
-from kedfem.results import Results, read_results, ready_folder
+from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.load_cases import LoadCase, Statics, load_case
 from kedfem.scene import Scene, corotational, scene_from
@@ -77,7 +77,7 @@ def load_cases(
     KedfemError
         With a message for the user.
     """
-    path = FilePath(file) / "results.h5" if FilePath(file).is_dir() else FilePath(file)
+    path = results_file(file)
     results = read_results(path)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)
     _refuse(scene, link)

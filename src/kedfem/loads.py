@@ -13,7 +13,7 @@ from kedfem.errors import KedfemError, OutputError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.load_files import write_drive_load, write_joint_load, write_polar, write_summary
-from kedfem.results import Results, read_results, ready_folder
+from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.loads import (
     DriveLoad,
     JointLoad,
@@ -57,7 +57,7 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
     KedfemError
         With a message for the user.
     """
-    path = FilePath(file) / "results.h5" if FilePath(file).is_dir() else FilePath(file)
+    path = results_file(file)
     results = read_results(path)
     _refuse(path, results, last)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)

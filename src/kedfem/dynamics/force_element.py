@@ -22,6 +22,7 @@ IN_SPACE = (1.0, 1.0, 1.0)
 
 Vector = Float[np.ndarray, "3"]
 Times = Float[np.ndarray, " T"]
+Factor = Callable[[Times, Times], Times]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class ForceElement:
     stiffness: float = 0.0
     damping: float = 0.0
     free: float = 0.0
-    factor: Callable[[Times, Times], Times] | None = None
+    factor: Factor | None = None
     limits: tuple[float, float] | None = None
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     over: int = 0
@@ -102,12 +103,12 @@ def kernel_table(every: Sequence[ForceElement]) -> Table:
     )
 
 
-def stiffness_factors(every: Sequence[ForceElement], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
-    """What the stiffness of each action is multiplied by over time."""
+def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
+    """What the stiffness of each action, or law, is multiplied by over time; one where it has no factor."""
     out = np.ones((len(t), len(every)))
-    for i, action in enumerate(every):
-        if action.factor is not None:
-            out[:, i] = action.factor(t, phi)
+    for i, factor in enumerate(every):
+        if factor is not None:
+            out[:, i] = factor(t, phi)
     return out
 
 

@@ -18,6 +18,12 @@ def reason(error: OSError | RuntimeError) -> str:
     return (said or str(error)).splitlines()[0]
 
 
+def results_file(given: Path) -> Path:
+    """The results file that is meant: `results.h5` of a folder, or the file itself."""
+    given = Path(given)
+    return given / "results.h5" if given.is_dir() else given
+
+
 def ready_folder(folder: Path) -> Path:
     """A folder that exists and takes files; made where it is missing, with its parents.
 

@@ -90,7 +90,8 @@ class Measured:
             self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
             x, v = vectors(self.every, block)
             self.places, self.forces, self.block = x, np.zeros_like(x), block
-            t, factors = block.motion.t, stiffness_factors(self.every, block.motion.t, block.motion.phi)
+            t, varied = block.motion.t, [each.factor for each in self.every]
+            factors = stiffness_factors(varied, t, block.motion.phi)
             evaluate_all(t, factors, x, v, self.turned, self.table, self.forces, self.values)
             if block.exerted is not None:
                 self._taken(block.exerted.element, factors)

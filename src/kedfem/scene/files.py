@@ -254,13 +254,13 @@ def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, 
     read, faults = dict(raw), list[str]()
     for section, key in (("loads", "factor"), ("springs", "stiffness_factor")):
         if isinstance(raw.get(section), Mapping):
-            read[section], more = _with_factors(raw[section], f"{section}.{{}}.{key}", key, folder)
+            read[section], more = _with_factors(raw[section], section, key, folder)
             faults += more
     return read, faults
 
 
 def _with_factors(
-    every: Mapping[str, Any], where: str, key: str, folder: Path
+    every: Mapping[str, Any], section: str, key: str, folder: Path
 ) -> tuple[dict[str, Any], list[str]]:
     """The same of one section: its tables by name, their factors under `key`."""
     read, faults = dict(every), list[str]()
@@ -274,7 +274,7 @@ def _with_factors(
         try:
             at, value = two_columns(folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1"))
         except SceneError as error:
-            faults += [f"{where.format(name)}.file: {fault}" for fault in error.faults]
+            faults += [f"{section}.{name}.{key}.file: {fault}" for fault in error.faults]
             continue
         table = {word: x for word, x in factor.items() if word != "file"}
         read[name] = {**each, key: {**table, "over": over, "at": at, "value": value}}

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import rows_of, work_over_time
+from kedfem.dynamics.force_element import stiffness_factors
 from kedfem.dynamics.nominal import forcing_of, forcings
 from kedfem.dynamics.scheme import Scheme
 from kedfem.dynamics.system.arrays import (
@@ -23,7 +24,7 @@ from kedfem.dynamics.system.arrays import (
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
-from kedfem.dynamics.system.record import System, is_affine, stiffness_factors, without_unknowns
+from kedfem.dynamics.system.record import System, is_affine, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
 from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.turning_loads import turning
@@ -103,6 +104,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
+    varied = [getattr(each.law, "factor", None) for each in of.system.constraints]
     rows = (
         motion.t,
         motion.R,
@@ -113,7 +115,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         np.concatenate(F, axis=1),
         amounts(of, motion),
         weights,
-        stiffness_factors(of.system, motion.t, motion.phi),
+        stiffness_factors(varied, motion.t, motion.phi),
     )
     terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing)
     # other strides would be compiled for anew

@@ -1,12 +1,12 @@
 """The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.force_element import Factor, Times
 from kedfem.links.stations import Stations
 
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
@@ -17,8 +17,6 @@ NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
 RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
 
 Vector = Float[np.ndarray, "3"]
-Times = Float[np.ndarray, " T"]
-Factor = Callable[[Times, Times], Times]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +76,6 @@ def law_at(law: Law, t: Times, phi: Times) -> Law:
     if isinstance(law, Spring) and law.factor is not None:
         return replace(law, stiffness=law.stiffness * float(law.factor(t, phi)[0]), factor=None)
     return law
-
-
-def stiffness_factors(system: "System", t: Times, phi: Times) -> Float[np.ndarray, "T r"]:
-    """What the stiffness of each law is multiplied by over time."""
-    out = np.ones((len(t), len(system.constraints)))
-    for n, each in enumerate(system.constraints):
-        if isinstance(each.law, Spring) and each.law.factor is not None:
-            out[:, n] = each.law.factor(t, phi)
-    return out
 
 
 @dataclass(frozen=True, slots=True)
