@@ -68,5 +68,5 @@ def _cases(results: Path, link: str, at: list[float], folder: Path | None) -> No
         (f"{link}.pvd", "the same for ParaView, with the run's stresses"),
         (f"{link}.csv", "forces and moments of joints, loads and inertia"),
     ):
-        if name:
+        if (found.folder / name).exists():  # no deck of 27-node hexahedra
             out.print(f"{found.folder / name}  {what}", markup=False, soft_wrap=True)
