@@ -11,6 +11,7 @@ from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kin
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories
 from kedfem.accuracy.plan import Plan, plan_for
+from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.singular import SingularPasses
@@ -48,7 +49,7 @@ from kedfem.results.recording import recording
 from kedfem.results.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
-from kedfem.scene import Scene
+from kedfem.scene import Scene, without_vibration
 from kedfem.stepping import Watch, Watched, stepped
 
 T = TypeVar("T")
@@ -128,7 +129,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage)
     plain = sizes(scene, ready.model)
-    notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stability_warning(scene)]
+    notices = [*size_warnings(scene, plain), *assembly_warning(assembly)]
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed(
@@ -136,7 +137,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     )
     every = [*ready.model.links, *(carried.link for carried in ready.model.carried)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
-    notices += resolution_warnings(clock.timed("frequencies", lambda: resolution(ready)))
+    notices += [] if without_vibration(scene) else _about_steps(ready, clock)
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
@@ -144,9 +145,10 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     envelope, seen, step = clock.timed(
         "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
     )
-    notices += [*balance_warning(account.balance, scene.analysis.stiffening), *efforts.warnings()]
-    notices += [*undetermined_warning(untold), *watched.passes.warnings(), *eased_warning(solvers)]
-    notices += [*coarse_steps(scene), *keeper.warnings()]
+    balance = None if without_vibration(scene) else account.balance
+    notices += balance_warning(balance, scene.analysis.stiffening) if balance else ()
+    notices += [*efforts.warnings(), *undetermined_warning(untold), *watched.passes.warnings()]
+    notices += [*eased_warning(solvers), *keeper.warnings()]
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
@@ -156,11 +158,11 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     step = replace(step, errors=found.step or step.errors)
     steady = steady_of(scene, solvers)
     notices += steady_warning(steady)
-    notes = attributes(found) | step.notes | balance_notes(account.balance)
+    notes = attributes(found) | step.notes | (balance_notes(balance) if balance else {})
     notes |= steady.notes if steady else {}
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
-    why = meaningless(found, account.balance, efforts.unworked, bool(scene.analysis.stiffening))
+    why = meaningless(found, balance, efforts.unworked, bool(scene.analysis.stiffening))
     if why := unstable(steady) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
@@ -174,7 +176,13 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     add_account(folder / "results.h5", notices, clock.seconds)
     results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
-               account.balance, found, plain, step, steady)  # fmt: skip
+               balance, found, plain, step, steady)  # fmt: skip
+
+
+def _about_steps(ready: Prepared, clock: "Clock") -> list[str]:
+    """Warnings of steps that are too long for what moves and for what loads do."""
+    resolved = resolution_warnings(clock.timed("frequencies", lambda: resolution(ready)))
+    return [*stability_warning(ready.scene), *resolved, *coarse_steps(ready.scene)]
 
 
 def _highest_stresses(

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
+from kedfem.accuracy.variants import with_analysis
 from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.nominal import motions
@@ -70,6 +71,10 @@ def kinematics(
             "drive: is required for kinematics, got none: without one the linkage rests as drawn "
             "(kedfem run moves it by its forces)"
         )
+    if scene.analysis.kind == "static":  # in which the mechanism would stand still
+        grid = time_grid(scene)
+        scene = with_analysis(scene, kind="transient", end_time=grid.end, step=grid.step,
+                              revolutions=None, steps_per_revolution=None)  # fmt: skip
     with claimed(folder or kinematics_folder(scene)) as target:
         return _moved(scene, target, watch)
 

@@ -19,7 +19,7 @@ from kedfem.accuracy.variants import (
 )
 from kedfem.dynamics.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps
+from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, without_vibration
 
 FOLLOWED = 0.5  # of the accuracy: rigid-body frames that err by more give way to co-rotational frames, in scenes of beams
 DEARER = 1.5  # the same where solid or plane links would follow too: it costs them more, and the estimate is cautious
@@ -56,8 +56,9 @@ def open_frames(scene: Scene) -> bool:
 
 
 def open_step(scene: Scene) -> bool:
-    """Whether it leaves its step open."""
-    return scene.analysis.step is None and scene.analysis.steps_per_revolution is None
+    """Whether it leaves its step open; positions that are found each by itself have none."""
+    stated = scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
+    return not stated and not without_vibration(scene)
 
 
 def open_beams(scene: Scene) -> list[str]:
@@ -165,6 +166,8 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     shorter steps; then they are told, and the others choose. What the scene states of step and levels stays.
     """
     trial = shortened(scene)
+    if without_vibration(scene):
+        return scene, 0.0
     if not open_step(scene):
         error = _stated_error(search, trial)
         if error > allowed:

@@ -116,7 +116,7 @@ def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...
     return (f"estimated error: {said}; most of it from the {share.source}: {remedy}",)
 
 
-def meaningless(budget: Budget, balance: Balance, unworked: float, stiffened: bool = False) -> str:
+def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
     """Why a run means nothing by its own account, in words; empty for one that may.
 
     Parameters
@@ -125,8 +125,10 @@ def meaningless(budget: Budget, balance: Balance, unworked: float, stiffened: bo
     stiffened : the run has geometric stiffening, whose work is in the energy's residual too
     """
     worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
-    left = {"momentum": balance.linear, "angular momentum": balance.angular, "the drive's work": unworked}
-    if not stiffened:
+    left = {"the drive's work": unworked}
+    if balance is not None:
+        left |= {"momentum": balance.linear, "angular momentum": balance.angular}
+    if balance is not None and not stiffened:
         left["energy"] = balance.energy
     said = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
     said += [

@@ -35,7 +35,7 @@ from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
 from kedfem.links.record import Link
 from kedfem.results.recording import recording
-from kedfem.scene import ForceLoad, Scene, time_grid
+from kedfem.scene import ForceLoad, Scene, time_grid, without_vibration
 
 LARGE = (
     100_000  # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
@@ -82,13 +82,16 @@ class Seen:
     geometric: GeometricError
     running: StepError
     rounding: Rounding
+    steps: bool = True
+    """whether there are time steps, and not positions found each by itself"""
     REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
         self.strained.add(block)
         self.geometric.add(block)
-        self.running.add(block)
+        if self.steps:
+            self.running.add(block)
         self.rounding.add(block)
 
 
@@ -99,6 +102,7 @@ def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
         GeometricError(ready.model, ready.scene.analysis.stiffening),
         step_error(ready),
         Rounding.of(ready.model, solvers),
+        not without_vibration(ready.scene),
     )
 
 
@@ -130,10 +134,8 @@ def budget(
         reduction_share(reduction), frames_share(seen.geometric, kinds), seen.rounding.share(kinds),
     ]  # fmt: skip
     if small is None:
-        shares += [
-            _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step),
-            _plain_mesh(eta, kinds),
-        ]
+        marched = _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step)
+        shares += [marched if seen.steps else None, _plain_mesh(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
     small = replace(small, scene=spanned(small.scene, small.model))
@@ -143,8 +145,9 @@ def budget(
         counts = by_kind(counted(base))
         here = [kind for kind in kinds if kind in counts]
         shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
-        known = known or step_errors(small, base)
-        shares.append(_step_share({name: error for name, error in known.items() if name in counted(base)}))
+        if seen.steps:
+            known = known or step_errors(small, base)
+            shares.append(_step_share({n: error for n, error in known.items() if n in counted(base)}))
         shares.append(_mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")

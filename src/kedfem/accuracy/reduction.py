@@ -32,7 +32,7 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, drive_angle, path_parameter, time_grid, turn_steps
+from kedfem.scene import Scene, drive_angle, path_parameter, time_grid, turn_steps, without_vibration
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
@@ -141,7 +141,8 @@ def reduced(
         ]
 
     stage("error of the reduction")
-    beginning = replace(full, scene=shortened(with_analysis(full.scene, kind="transient")))
+    scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
+    beginning = replace(full, scene=shortened(scene))
     Q, estimate = _settled(beginning, parts, first, tolerance, chosen, given)
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)

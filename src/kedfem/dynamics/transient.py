@@ -20,6 +20,8 @@ from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.deflected import NoBalanceError, static
+from kedfem.dynamics.system.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
 from kedfem.dynamics.system.period_map import PeriodMap
@@ -30,7 +32,7 @@ from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, corotational, path_parameter, time_grid
+from kedfem.scene import Scene, corotational, path_parameter, time_grid, without_vibration
 
 BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
@@ -86,6 +88,9 @@ def transient(
     """
     mark = start if isinstance(start, Mark) else Mark(start=start)
     since = mark.step
+    if without_vibration(scene):
+        yield from _positions(scene, linkage, along, model, solver, mark)
+        return
     if isinstance(solver, CorotationalSteps):
         yield from _corotational(scene, linkage, along, model, solver, mark)
         return
@@ -154,6 +159,48 @@ def _corotational(
                 advice, tried = _finer(model, failed), f", not even in {2**HALVINGS} parts"
                 raise SolveError(_stuck(first + k + failed.taken, part, failed, advice, tried)) from None
             yield from _finite(Block(first + k, part, links, exerted=exerted))
+
+
+def _positions(
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark
+) -> Iterator[Block]:
+    """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
+    if isinstance(solver, LiteralSteps):
+        raise ValueError("a balance must be that of a system, got the monolithic solver's")
+    grid, motion_at, of, state = time_grid(scene), _motion(scene, linkage, along), solver.ready, mark.state
+    shared = Instant(of, motion_at, 0.0)
+    for k in range(mark.step, grid.steps + 1):
+        mark.set(k, state, solver)
+        t = k * grid.step
+        motion = motion_at(np.array([t]))
+        try:
+            if scene.analysis.kind == "static":
+                state = static(of, motion_at, t, near=state, like=shared)
+            else:
+                state = deflection_in_motion(of, motion_at, time=t, like=shared)
+        except NoBalanceError:
+            raise SolveError(_unbalanced(scene, motion)) from None
+        if isinstance(solver, CorotationalSteps):
+            links, exerted = solver.first(state, forcings(model, motion), motion_at)
+            yield from _finite(Block(k, motion, links, exerted=exerted))
+        else:
+            yield from _finite(Block(k, motion, solver.first(state, forcings(model, motion), motion)))
+
+
+def _unbalanced(scene: Scene, motion: RigidMotion) -> str:
+    """What to do about a position without a balance of forces."""
+    kind = scene.analysis.kind
+    advice = (
+        "a link that nothing holds, a load beyond buckling, or links that rotate too far under their loads for the "
+        "balance to be found: hold them by joints, springs or a drive, let loads grow in smaller steps over time, or "
+        "take kind = 'transient' with damping"
+        if kind == "static"
+        else "a drive near a natural frequency: take a slower drive, stiffer links or kind = 'steady'"
+    )
+    return (
+        f"analysis.kind: all forces must balance at each position of a {kind} analysis, got no balance at "
+        f"t = {motion.t[0]:.6g} s, drive angle {np.degrees(motion.phi[0]):.6g} deg; {advice}"
+    )
 
 
 def _motion(scene: Scene, linkage: Linkage, along: Path) -> Motion:

@@ -17,7 +17,7 @@ from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.audit import Account
 from kedfem.results.records import Channel
-from kedfem.scene import Scene
+from kedfem.scene import Scene, without_vibration
 
 Rows = Float[np.ndarray, "T c"]
 
@@ -120,7 +120,8 @@ class CrossChecks:
         ]
         self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
         self.account = account
-        self.worked = bool(self.drives) and all(each.effort for each in self.drives)
+        told = bool(self.drives) and all(each.effort for each in self.drives)
+        self.worked = told and not without_vibration(scene)  # else there is no account of energy
         self._last: tuple[float, float] | None = None
         self._work, self._left = 0.0, 0.0
         self.exchanged = 0.0  # largest energy or work so far [J]

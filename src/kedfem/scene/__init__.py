@@ -34,7 +34,7 @@ from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSecti
 from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
 from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
 from kedfem.scene.stops import AngleLimit, Limit, TravelLimit
-from kedfem.scene.timing import TimeGrid, cycle, time_grid, turn_steps
+from kedfem.scene.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
 
 __all__ = [
     "DIRECTED",
@@ -121,4 +121,5 @@ __all__ = [
     "spatial_beams",
     "time_grid",
     "turn_steps",
+    "without_vibration",
 ]  # fmt: skip

@@ -39,18 +39,22 @@ def accuracy_or_quick(value: object) -> float | str:
 class Analysis(Record):
     """How long, in which steps, from which state."""
 
-    kind: Literal["transient", "steady"] = "transient"
+    kind: Literal["transient", "steady", "static", "quasi-static"] = "transient"
     """transient: the motion from the start on; steady: the motion that repeats itself with the drive and the loads, found
     directly and written over one period, which is as many turns of the drive as it takes, or `end_time` where the
-    drive does not turn at a constant speed, or there are several"""
+    drive does not turn at a constant speed, or there are several. static: the mechanism stands still in each position of
+    its drive, or without one as a structure, and all loads balance, without inertia; quasi-static: it moves on, with
+    the inertia of its rigid-body motion, and does not vibrate. Both write a time point for each position"""
     stability: StrictBool = True
     """of a steady motion: whether it is found out by how much vibrations about it grow or fall in a period"""
     revolutions: Positive | None = None
     """revolutions of the drive; for drives that turn at a constant speed, or speed up to one"""
     end_time: PositiveTime | None = None
-    """end of the analysis, instead of `revolutions`"""
+    """end of the analysis, instead of `revolutions`; of a static analysis without a drive 1 s, reached in one step, if it
+    is not given"""
     steps_per_revolution: Annotated[StrictInt, Field(ge=4, le=10**9)] | None = None
-    """time steps in a revolution (at the final speed); 720 if neither this nor `step` is given"""
+    """time steps in a revolution (at the final speed); if neither this nor `step` is given 720, or 72 positions of a
+    static or quasi-static analysis"""
     step: PositiveTime | None = None
     """time step, instead of `steps_per_revolution`; shortened so that a whole number reaches the end"""
     extrapolation_levels: Annotated[StrictInt, Field(ge=1, le=3)] | None = None

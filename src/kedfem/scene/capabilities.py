@@ -58,6 +58,7 @@ class Refusal:
         return text.format_map(words)
 
 
+STILL = ("static", "quasi-static")
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",
     'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion tells",
     "a slot", 'take frames = "rigid-body", or a slide with a hinge')  # fmt: skip
@@ -154,12 +155,22 @@ REFUSALS = (
         'take frames = "co-rotational"') for key in ("initial_speeds", "initial_motions")),
     Refusal("analysis", {"kind": ("steady",), "drive": ("none",)}, "{where}.kind", "be combined with a drive as 'steady'",
         "a mechanism that moves freely has no period", "'steady' without one", "give a drive, or take 'transient'"),
-    Refusal("analysis", {"kind": ("steady",), "solver": ("monolithic",)}, "{where}.solver", "be 'condensed' for a steady "
-        "motion", "the monolithic solver marches from a start", "'monolithic'", "leave it out"),
+    Refusal("analysis", {"kind": ("quasi-static",), "drive": ("none",)}, "{where}.kind",
+        "be combined with a drive as 'quasi-static'", "nothing else says how a mechanism moves on", "it without one",
+        "give a drive, or take 'static' or 'transient'"),
+    Refusal("analysis", {"kind": ("steady", *STILL), "solver": ("monolithic",)}, "{where}.solver",
+        "be 'condensed' for a {kind} analysis", "the monolithic solver marches from a start", "'monolithic'",
+        "leave it out"),
+    Refusal("analysis", {"kind": STILL, "stiffening": ("on",)}, "{where}.stiffening",
+        "be left out of a {kind} analysis", "whose balance knows no stresses of the rigid-body motion", "it",
+        'take frames = "co-rotational", which know all of it'),
+    Refusal("analysis", {"kind": STILL, "levels": ("several",)}, "{where}.extrapolation_levels",
+        "be left out of a {kind} analysis", "which has no time steps", "more than 1", "leave it out"),
     Refusal("analysis", {"kind": ("steady",), "rho_inf": ("1",)}, "{where}.rho_inf", "be less than 1 for a steady motion",
         "vibrations that a step cannot resolve would have no end", "1", "take 0.95"),
-    *(Refusal("analysis", {"kind": ("steady",), "start": (key,)}, f"{{where}}.{key}", "be left out of a steady motion",
-        "which does not depend on how it began", "{given}", "leave it out, or take kind = 'transient'")
+    *(Refusal("analysis", {"kind": ("steady", *STILL), "start": (key,)}, f"{{where}}.{key}",
+        "be left out of a {kind} analysis", "which does not depend on how the motion began", "{given}",
+        "leave it out, or take kind = 'transient'")
         for key in ("initial_speeds", "initial_motions", "initial_deflection")),
     Refusal("analysis", {"start": ("initial_deflection",), "stiffening": ("on",)}, "{where}.initial_deflection",
         "not be combined with analysis.stiffening", "whose start knows no forces that are let go", "{given}",

@@ -144,7 +144,7 @@ def analysis(parts: Parts) -> Iterator[Told]:
     if parts.limits:
         yield "analysis", limited(parts), {**words, "elements": shown(list(parts.limits))}
     yield "analysis", {"drive": ""}, words
-    yield from steady(parts, words)
+    yield from kinds(parts, words)
     if entry.word("frames"):
         yield "analysis", only(frames=str(entry.word("frames"))), words
     if entry.word("initial"):
@@ -170,13 +170,18 @@ def analysis(parts: Parts) -> Iterator[Told]:
         yield "damping", {"damping": "in proportion to mass"}, words
 
 
-def steady(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
-    """What a steady motion is combined with."""
+def kinds(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
+    """What a steady motion, and positions without vibration, are combined with."""
     entry = parts.analysis
-    if entry.word("kind") != "steady":
+    kind = entry.word("kind") or "transient"
+    if kind == "transient":
         return
-    facts = only(kind="steady")
+    facts, words = only(kind=kind), {**words, "kind": kind}
     yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, words
+    stiffening = "on" if entry.raw.get("stiffening") is True else "off"
+    levels = "one" if entry.record is None or (entry.record.extrapolation_levels or 1) == 1 else "several"
+    for more in ({"stiffening": stiffening}, {"levels": levels}):
+        yield "analysis", {**facts, "drive": "", "rho_inf": "", **more}, words
     for key in ("initial_speeds", "initial_motions", "initial_deflection"):
         given = entry.raw.get(key)
         if isinstance(given, Mapping) and given:

@@ -55,6 +55,8 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
 def path_parameter(scene: Scene, t: Times) -> Law:
     """Place on the linkage's path and its derivatives: the drive's angle or travel; of several drives the time.
 
+    In a static analysis the mechanism stands still in each place: the derivatives are zero.
+
     Parameters
     ----------
     t : (t,) [s]
@@ -64,10 +66,12 @@ def path_parameter(scene: Scene, t: Times) -> Law:
     MotionError
         A time outside the table of a table law.
     """
-    if len(scene.driven_joints) < 2:
-        return drive_angle(scene.motion, t)
     t = np.asarray(t, dtype=float)
-    return t, np.ones_like(t), np.zeros_like(t)
+    several = len(scene.driven_joints) > 1
+    found = (t, np.ones_like(t), np.zeros_like(t)) if several else drive_angle(scene.motion, t)
+    if scene.analysis.kind != "static":
+        return found
+    return found[0], np.zeros_like(found[0]), np.zeros_like(found[0])
 
 
 def ramp(motion: Ramp, t: Times) -> Law:

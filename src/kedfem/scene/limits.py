@@ -93,10 +93,14 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
 
 
 def _repeats(parts: Parts) -> bool:
-    """Whether a steady motion is asked for of a drive whose law says after which time it repeats itself."""
+    """Whether the end need not be given: of a structure in static balance, or where the drive's law says after which time
+    it repeats itself, and the motion of one period is asked for.
+    """
+    if not parts.all_drives:
+        return parts.analysis.word("kind") == "static"
     drives = [drive.record for drive in parts.all_drives]
     known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
-    return parts.analysis.word("kind") == "steady" and known
+    return parts.analysis.word("kind") in {"steady", "static", "quasi-static"} and known
 
 
 def open_fidelity_faults(parts: Parts) -> Iterator[str]:

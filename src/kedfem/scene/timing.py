@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
 
 STEPS_PER_REVOLUTION = 720
+POSITIONS = 72  # in a revolution where the mechanism does not vibrate
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,11 @@ def cycle(motion: MotionLaw | None) -> float | None:
     return None
 
 
+def without_vibration(scene: Scene) -> bool:
+    """Whether each position is found by itself, static or quasi-static: there are no time steps then."""
+    return scene.analysis.kind in {"static", "quasi-static"}
+
+
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
     """Time [s] at which a drive that goes on turning has made so many turns."""
     angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
@@ -81,15 +87,17 @@ def time_grid(scene: Scene) -> TimeGrid:
 
     With ``steps_per_revolution`` the step is the turn at the drive's final speed, divided, and the last step may
     pass the end; ``step`` is shortened so that a whole number reaches the end. A steady motion has an even number of
-    steps, shortened so.
+    steps, shortened so. Where the mechanism does not vibrate one revolution is enough, and a structure needs no time.
     """
     analysis, motion = scene.analysis, scene.motion
     steady = analysis.kind == "steady"
     end = analysis.end_time
     if motion is not None and analysis.revolutions is not None:
         end = time_of_revolutions(motion, analysis.revolutions)
-    if end is None and steady:
+    if end is None and analysis.kind != "transient":
         end = cycle(motion)
+    if end is None and analysis.kind == "static" and not scene.driven_joints:
+        return TimeGrid(1.0, 1) if analysis.step is None else _grid(scene, 1.0)
     if end is None:
         raise ValueError("an analysis needs turns or an end time")
     grid = _grid(scene, end)
@@ -103,9 +111,10 @@ def _grid(scene: Scene, end: float) -> TimeGrid:
         steps = max(1, math.ceil(end / analysis.step - 1e-9))
         return TimeGrid(end / steps, steps)
     speed = scene_speed(scene)
+    usual = POSITIONS if without_vibration(scene) else STEPS_PER_REVOLUTION
     if not speed:
-        return TimeGrid(end / STEPS_PER_REVOLUTION, STEPS_PER_REVOLUTION)
-    step = 2.0 * math.pi / (speed * (analysis.steps_per_revolution or STEPS_PER_REVOLUTION))
+        return TimeGrid(end / usual, usual)
+    step = 2.0 * math.pi / (speed * (analysis.steps_per_revolution or usual))
     return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
 
 

@@ -194,7 +194,7 @@ def _since(scene: Scene, last: float) -> float:
     """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns
     and of a steady motion."""
     turn, grid = turn_steps(scene), time_grid(scene)
-    if turn is None or scene.analysis.kind == "steady":
+    if turn is None or scene.analysis.kind != "transient":
         return -0.5 * grid.step
     if last * turn > grid.steps + 0.5:
         said = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.dense import coordinates
-from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, mass_body, stepped_body
+from kedfem.dynamics.system.balance import Asked, Balance, Solved, held_body, stepped_body
 from kedfem.dynamics.system.instant import Flat, Instant
 from kedfem.dynamics.system.internal import drawn, own, rows, turned_rate
 from kedfem.dynamics.system.sparse import SparsePart
@@ -39,7 +39,7 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
     held = []
     for k, (P, part) in enumerate(zip(pure, of.parts, strict=True)):
         if P is None:
-            held.append(mass_body(of, k))
+            held.append(now.always.mass(k))
         else:
             held.append(held_body(P @ P.T + STIFFER * (np.eye(len(P)) - P @ P.T), part.W))
     balance = Balance(of, held, now.R, asked)

@@ -1,4 +1,5 @@
-"""Where a march begins deflected: quasi-static, so that nothing vibrates; in static balance; or plucked.
+"""Deflections without vibration: quasi-static, in static balance, or plucked. Marches begin there, and they are the
+positions of static and quasi-static analyses.
 
 With a drive the deflection turns with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own rigid-body
 motion: the matrix has that inertia in it, so that no frequency is too near. Its rate is a difference of fourth order over
@@ -28,6 +29,7 @@ from kedfem.motion.newton import cross_matrix
 SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 KRYLOV = 60
+LEAST = 1 / 64  # of loads, that an increment of theirs is
 CONVERGED = 1e-10  # change of a iteration, of the deflection
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 FREE = 1e-3  # the same where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
@@ -41,43 +43,87 @@ Rows = Sequence[Float[np.ndarray, "_ _"]]
 Spins = Float[np.ndarray, "L 3 3"]
 
 
-def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0) -> State:
+class NoBalanceError(SolveError):
+    """No deflection is found at which all forces balance."""
+
+
+def quasi_static(
+    of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0, like: Instant | None = None
+) -> State:
     """The state at a time with the deflection that its links have as they move on without vibrating.
 
     Parameters
     ----------
     motion_at : rigid-body motion at given times; of a system with a drive over a step from `time` on
     rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
+    like : another instant, with what does not depend on time
 
     Raises
     ------
-    SolveError
+    NoBalanceError
         If no deflection is found.
     """
-    now = Instant(of, motion_at, time)
+    now = Instant(of, motion_at, time, like)
     if not now.motion.drives.shape[1]:
         return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
     u, v = _moving(now, motion_at)
     return begun(now, u, v)
 
 
-def static(of: Ready, motion_at: Motion, time: float = 0.0, forces: Rows | None = None) -> State:
+def static(
+    of: Ready, motion_at: Motion, time: float = 0.0, forces: Rows | None = None,
+    near: State | None = None, like: Instant | None = None,
+) -> State:  # fmt: skip
     """The state at a time at rest in static balance.
 
     Parameters
     ----------
     forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
+    near : a state whose deflection the search begins with; none if not given
+    like : another instant, with what does not depend on time
 
     Raises
     ------
-    SolveError
+    NoBalanceError
         If no balance is found: as of a link that hangs, and is not held.
     """
-    now = Instant(of, motion_at, time)
+    now = Instant(of, motion_at, time, like)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    u = _balanced(now, none, lambda u, f: pull, None, None)
+    start = none if near is None else near.u.copy()
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            u = _balanced(now, start, _constant(pull), None, None)
+    except NoBalanceError:
+        if of.c.single:
+            raise
+        u = _in_increments(now, pull)
     return begun(now, u, none)
+
+
+def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
+    """Forces that do not depend on the deflection."""
+    return lambda u, f: forces
+
+
+def _in_increments(now: Instant, pull: Flat) -> Flat:
+    """The deflection under loads that grow from nothing, in parts as large as their balance can be found for."""
+    whole, amounts, u = now.F, now.amounts, np.zeros_like(pull)
+    share, part = 0.0, 0.25
+    while share < 1.0:
+        tried = min(1.0, share + part)
+        now.F, now.amounts = tried * whole, tried * amounts
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # of iterations that diverge
+                u = _balanced(now, u, _constant(tried * pull), None, None)
+        except NoBalanceError:
+            part /= 2
+            if part < LEAST:
+                raise
+            continue
+        share, part = tried, 1.5 * part
+    now.F, now.amounts = whole, amounts
+    return u
 
 
 def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> State:
@@ -90,7 +136,7 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
         return static(of, motion_at, time, forces)
     u, v = _moving(now, motion_at)
     pull = as_work(of, forces)
-    return begun(now, _balanced(now, u, lambda u, f: pull, _spins(now), now.interface(v)), v)
+    return begun(now, _balanced(now, u, _constant(pull), _spins(now), now.interface(v)), v)
 
 
 def as_work(of: Ready, forces: Rows) -> Flat:
@@ -181,7 +227,7 @@ def _balanced(
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
         stalls = size > last / 2 and size <= (LINEAR if of.c.single else rounding) * reached
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
-    raise SolveError(
+    raise NoBalanceError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
         'their weight, or a drive at a natural frequency; take initial = "rest", a slower drive or stiffer links'
     )

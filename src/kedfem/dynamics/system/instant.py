@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,7 +11,7 @@ from scipy.sparse.linalg import splu
 
 from kedfem.dynamics.dense import work_on
 from kedfem.dynamics.substructure import factored
-from kedfem.dynamics.system.balance import HeldBody, sparse_body
+from kedfem.dynamics.system.balance import HeldBody, mass_body, sparse_body
 from kedfem.dynamics.system.internal import Inside, Still, inside, own, rows
 from kedfem.dynamics.system.march import Ready, driving
 from kedfem.dynamics.system.rates import coordinates, gradients, places, term_values, travels
@@ -50,7 +50,7 @@ class Always:
     closed : z from displacements at all interface points, w = B z as nearly as can be
     still : internal forces of bodies
     least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
-    held : a sparse body with that stiffness, factored once
+    held, mass : a sparse body with that stiffness, and a body with its mass for a matrix, factored once
     """
 
     number: Int[np.ndarray, " k"]
@@ -58,6 +58,7 @@ class Always:
     still: Still
     least: Callable[[int], float]
     held: Callable[[int], HeldBody]
+    mass: Callable[[int], HeldBody]
 
 
 class Instant:
@@ -155,7 +156,9 @@ def always(of: Ready) -> Always:
     def held(k: int) -> HeldBody:
         return sparse_body(links[k], joints[k], factored(links[k], joints[k], least(k), 1.0))
 
-    return Always(renumbered(of), closure(of), still, cache(least), cache(held))
+    return Always(
+        renumbered(of), closure(of), still, cache(least), cache(held), cache(partial(mass_body, of))
+    )
 
 
 def _lowest(of: Ready, still: Still) -> float:

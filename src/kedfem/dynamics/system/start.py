@@ -14,7 +14,7 @@ from kedfem.dynamics.ports import turned_ports
 from kedfem.dynamics.state import LinkState
 from kedfem.dynamics.system.accelerations import accelerations
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.balance import DEPENDENT, Asked, Balance, Solved, mass_body
+from kedfem.dynamics.system.balance import DEPENDENT, Asked, Balance, Solved
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
@@ -125,6 +125,6 @@ def _closing(now: Instant, C: Float[np.ndarray, "r k"], open_: Flat) -> Flat:
     none = np.zeros(int(of.bodies.at[-1]))
     if not np.abs(open_).max(initial=0.0):
         return none
-    held = [mass_body(of, k) for k in range(len(of.parts))]
+    held = [now.always.mass(k) for k in range(len(of.parts))]
     asked = Asked(C, -open_, np.zeros(len(C)), np.zeros(of.system.unknowns))
     return Balance(of, held, now.R, asked).solved(none).x

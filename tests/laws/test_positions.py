@@ -1,0 +1,227 @@
+"""Positions without vibration, static and quasi-static: closed forms, all directions, kinds of links and frames."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_bvp
+
+from kedfem.analysis import analyse
+from kedfem.errors import SolveError
+from kedfem.kinematics import kinematics
+from kedfem.results import read_results
+from kedfem.scene import scene_from, time_grid
+from tests.laws.test_limits import AXES
+from tests.moving import beam_in_space, channels, inverted, ran, turning
+
+Raw = dict[str, Any]
+G, E, D, RHO = 9.81, 2e11, 0.02, 7850.0
+INERTIA, AREA = np.pi * D**4 / 64, np.pi * D**2 / 4
+L = 0.4
+MATERIALS = {"steel": {"youngs_modulus": E, "poisson_ratio": 0.3, "density": RHO}}
+
+
+def across(n: np.ndarray) -> np.ndarray:
+    """A direction across another."""
+    d = np.cross(n, [0.3, 0.5, 0.9])
+    return np.asarray(d / np.linalg.norm(d))
+
+
+def rod(n: np.ndarray, along: int = 8) -> Raw:
+    """A round rod of length L across a direction, from the origin."""
+    return beam_in_space((0, 0, 0), L * across(n), along, n)
+
+
+def values(raw: Raw) -> dict[str, np.ndarray]:
+    return channels(*ran({"materials": MATERIALS, **raw}))
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_loaded_cantilever_bends_as_in_closed_form(axis: str) -> None:
+    """F L³/3EI + F L/κGA at its end, which its wall bears; no time is asked for."""
+    n, force = AXES[axis], 10.0
+    joint = {"kind": "weld", "links": ["rod", "ground"], "at": [0, 0, 0]}
+    end = {"link": "rod", "at": (L * across(n)).tolist()}
+    got = values({
+        "links": {"rod": rod(n)}, "joints": {"W": joint}, "analysis": {"kind": "static"},
+        "loads": {"F": {"kind": "force", **end, "vector": (force * n).tolist()}},
+        "output": {"probes": {"end": {**end, "quantity": "travel"}}},
+    })  # fmt: skip
+    shear = E / 2.6 * AREA * 6 * 1.3 / (7 + 6 * 0.3)  # Cowper's κ of a round section
+    bent = force * L**3 / (3 * E * INERTIA) + force * L / shear
+    assert len(got["probes/end/travel"]) == 2
+    shortened = 0.6 * bent**2 / L  # of a slender one
+    assert_allclose(got["probes/end/travel"] @ n, bent, rtol=2e-5)
+    assert_allclose(got["probes/end/travel"] @ across(n), -shortened, rtol=2e-2)
+    assert_allclose(got["joints/W/force"], [-force * n] * 2, atol=1e-8 * force)
+
+
+def elastica(load: float) -> tuple[float, float]:
+    """Shortening and deflection of the end of a cantilever, by its length, under P L²/EI across it: EI θ'' = −P cos θ."""
+
+    def slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.stack([y[1], -load * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
+
+    def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.array([a[0], b[1], a[2], a[3]])
+
+    x = np.linspace(0, 1, 41)
+    y = solve_bvp(slopes, ends, x, np.stack([0 * x, 0 * x, x, 0 * x]), tol=1e-10).y
+    return float(y[2, -1] - 1), float(y[3, -1])
+
+
+def test_a_cantilever_bends_as_the_elastica() -> None:
+    """Loads that grow from position to position, each found from the one before."""
+    thin = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.002, "thickness": 0.02}
+    most, EI = 0.2, E * 0.02 * 0.002**3 / 12
+    got = values({
+        "links": {"rod": {"fidelity": "beam", "material": "steel", "shape": thin, "mesh": {"elements": 8}}},
+        "joints": {"W": {"kind": "weld", "links": ["rod", "ground"], "at": [0, 0]}},
+        "loads": {"P": {"kind": "force", "link": "rod", "at": [1, 0], "vector": [0, most * EI], "frame": "world",
+                        "factor": {"over": "time", "at": [0, 1], "value": [0, 1]}}},
+        "output": {"probes": {"end": {"link": "rod", "at": [1, 0], "quantity": "travel"}}},
+        "analysis": {"kind": "static", "end_time": 1.0, "step": 0.25},
+    })["probes/end/travel"]  # fmt: skip
+    for k in range(1, 5):
+        assert_allclose(got[k, :2], elastica(k / 4 * most), atol=1e-5)
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
+def test_a_turned_rod_sags_by_its_weight_in_each_position(axis: str, frames: str) -> None:
+    """w L⁴/8EI cos φ, a torque of m g L/2 cos φ: whatever the speed."""
+    n, d = AXES[axis], across(AXES[axis])
+    up = np.cross(n, d)
+    got = values({
+        "gravity": (-G * up).tolist(), "links": {"rod": rod(n)},
+        "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}},
+        "drive": turning("3000 rpm"), "analysis": {"kind": "static", "steps_per_revolution": 8, "frames": frames},
+        "output": {"probes": {"end": {"link": "rod", "at": (L * d).tolist(), "quantity": "displacement",
+                                      "frame": "world"}}},
+    })  # fmt: skip
+    phi = 2 * np.pi * np.arange(9) / 8
+    w = RHO * AREA * G
+    sag = w * L**4 / (8 * E * INERTIA)
+    assert_allclose(got["drive/torque"][:, 0], 0.5 * w * L**2 * np.cos(phi), atol=1e-4 * w * L**2)
+    tangent = -np.outer(np.sin(phi), d) + np.outer(np.cos(phi), up)
+    assert_allclose(
+        (got["probes/end/displacement"] * tangent).sum(axis=1), -sag * np.cos(phi), atol=5e-3 * sag
+    )  # shear: 0.4 %
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_rod_on_a_spring_turns_until_moments_balance(axis: str) -> None:
+    """k θ = F L cos θ, without a drive; the rod bends besides, by F cos θ L³/3EI."""
+    n, d = AXES[axis], across(AXES[axis])
+    k, F, theta = 20.0, 3.0, 0.0
+    for _ in range(60):
+        bends = F * np.cos(theta) * L**2 / (3 * E * INERTIA)
+        theta = F * L * (np.cos(theta) - bends * np.sin(theta)) / k
+    end = values({
+        "links": {"rod": rod(n, 2)},
+        "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}},
+        "springs": {"k": {"kind": "torsion", "joint": "A", "stiffness": k}},
+        "loads": {"F": {"kind": "force", "link": "rod", "at": (L * d).tolist(), "frame": "world",
+                        "vector": (F * np.cross(n, d)).tolist()}},
+        "analysis": {"kind": "static"},
+        "output": {"probes": {"end": {"link": "rod", "at": (L * d).tolist(), "quantity": "position"}}},
+    })["probes/end/position"][-1]  # fmt: skip
+    bends = F * np.cos(theta) * L**2 / (3 * E * INERTIA)
+    assert np.arctan2(end @ np.cross(n, d), end @ d) == pytest.approx(theta + bends, abs=2e-6)
+    assert bends > 10 * 2e-6
+
+
+KINDS = [
+    (fidelity, kind, frames)
+    for fidelity in ("beam", "plane", "solid")
+    for kind in ("prismatic", "slot")
+    for frames in ("rigid-body", "co-rotational")
+    if kind == "prismatic" or (fidelity == "beam" and frames == "rigid-body")
+]
+
+
+@pytest.mark.parametrize(("fidelity", "kind", "frames"), KINDS)
+def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(
+    fidelity: str, kind: str, frames: str
+) -> None:
+    """And static positions do not depend on the drive's speed."""
+    raw = inverted(fidelity, kind, initial=None, revolutions=1, steps_per_revolution=4, frames=frames)
+    raw |= {"gravity": [0, -G]}
+    probe = {"link": "arm", "at": [0.5, 0], "quantity": "displacement"}
+    raw["output"] = {"probes": {"end": probe}}
+    found = []
+    for name, speed, turns in (("static", 600, 1), ("static", 1, 0.25), ("quasi-static", 0.01, 0.25)):
+        raw["analysis"] |= {"kind": name, "revolutions": turns}
+        raw["drive"] = turning(f"{speed} rpm")
+        found.append(values(raw))
+    for name, unit in (
+        ("probes/end/displacement", "m"),
+        ("drive/torque", "N m"),
+        ("joints/S/force", "N"),
+        ("joints/B/force", "N"),
+    ):
+        size = np.abs(found[0][name]).max()
+        assert size > 1e-9, unit
+        near = (
+            1e-6 if kind == "prismatic" else 1e-5
+        ) * size  # places along a slot go with its travel; (ω/ω₁)² is 1e-12
+        assert_allclose(found[1][name], found[0][name][:2], atol=near)
+        assert_allclose(found[2][name], found[0][name][:2], atol=near)
+        assert_allclose(found[2][name], found[1][name], atol=1e-6 * size)
+        assert_allclose(found[0][name][0], found[0][name][-1], atol=1e-6 * size)  # a whole revolution
+
+
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
+def test_a_quasi_static_motion_begins_as_a_march_with_that_start_does(frames: str) -> None:
+    """Two routes to one state: deflections and forces with the inertia of the rigid-body motion."""
+    raw = inverted("beam", initial="quasi-static", revolutions=4e-4, steps_per_revolution=7200, frames=frames)
+    raw["output"] = {"probes": {"end": {"link": "arm", "at": [0.5, 0], "quantity": "displacement"}}}
+    marched = values(raw)
+    raw["analysis"] |= {"kind": "quasi-static"}
+    del raw["analysis"]["initial"]
+    found = values(raw)
+    for name in ("probes/end/displacement", "drive/torque", "joints/S/force"):
+        size = np.abs(marched[name]).max()
+        assert_allclose(found[name][0], marched[name][0], atol=1e-7 * size)
+        assert_allclose(found[name], marched[name], atol=2e-2 * size)  # it hardly vibrates
+
+
+def test_a_whole_run_has_positions_without_steps(tmp_path: Path) -> None:
+    """A plan, its mesh's error, stresses: neither an error of steps nor an account of energy, which sums over them."""
+    raw = inverted("beam", initial=None, revolutions=None, steps_per_revolution=None)
+    raw["analysis"] = {"kind": "static"}
+    raw["links"]["arm"]["mesh"] = {"elements": 8}
+    raw |= {"gravity": [0, -G], "output": {"plots": False, "picture": False}}
+    scene = scene_from(raw, tmp_path)
+    run = analyse(scene)
+    assert time_grid(scene).steps == 72
+    assert len(run.results.time) == 73
+    assert run.results.status == "complete"
+    assert run.balance is None
+    assert not [x for x in run.warnings if "step" in x]
+    assert run.budget is not None
+    assert {share.source for share in run.budget.shares} >= {"mesh"}
+    assert "step" not in {share.source for share in run.budget.shares}
+    assert max(run.budget.together.values()) < 0.01
+    energies = [name for name in run.results.channels if name.startswith("energy/")]
+    assert energies == ["energy/strain"]
+    assert run.peak is not None
+    assert run.peak.stress > 1e5
+    moved = read_results(kinematics(scene).folder / "results.h5")
+    assert np.abs(moved.channels["links/arm/angular_velocity"][1]).max() > 1.0
+
+
+def test_what_nothing_holds_is_told_in_words() -> None:
+    hanging = {
+        "gravity": [0, -G],
+        "links": {"rod": {"fidelity": "beam", "material": "steel", "mesh": {"elements": 2},
+                          "shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}}},
+        "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0]}},
+        "analysis": {"kind": "static"},
+    }  # fmt: skip
+    with pytest.raises(
+        SolveError, match="must balance at each position of a static analysis, got no balance at t = 0 s"
+    ):
+        values(hanging)
