@@ -178,6 +178,7 @@ def test_a_quasi_static_motion_begins_as_a_march_with_that_start_does(frames: st
     """Two routes to one state: deflections and forces with the inertia of the rigid-body motion."""
     raw = inverted("beam", initial="quasi-static", revolutions=4e-4, steps_per_revolution=7200, frames=frames)
     raw["output"] = {"probes": {"end": {"link": "arm", "at": [0.5, 0], "quantity": "displacement"}}}
+    raw |= {"gravity": [0, -G], "drive": turning("600 rpm")}
     marched = values(raw)
     raw["analysis"] |= {"kind": "quasi-static"}
     del raw["analysis"]["initial"]

@@ -13,7 +13,7 @@ from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
 from kedfem.report.plan import chosen_table
 from kedfem.results import Peak
 from kedfem.results.balance import Balance
-from kedfem.scene import Scene
+from kedfem.scene import Scene, without_vibration
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
@@ -36,7 +36,9 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
         table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), at)
     balance = [] if done.balance is None else [balance_table(done.balance)]
-    spent = Table(title=f"{len(done.results.time) - 1} steps; seconds", show_header=False)
+    count = len(done.results.time)
+    taken = f"{count} positions" if without_vibration(scene) else f"{count - 1} steps"
+    spent = Table(title=f"{taken}; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
     errors = [] if done.budget is None else [budget_table(done.budget)]
