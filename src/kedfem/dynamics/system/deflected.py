@@ -28,6 +28,9 @@ from kedfem.motion.newton import cross_matrix
 
 SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
+DIRECT = (
+    2  # iterations whose matrix has some mass; what is soft beside rigid links would take hundreds of them
+)
 KRYLOV = 60
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 CONVERGED = 1e-10  # change of a iteration, of the deflection
@@ -212,12 +215,14 @@ def _balanced(
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
-    for _ in range(SWEEPS):
+    for n in range(SWEEPS):
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
-            change = bodies.change(Balance(of, bodies.held(R), R, _asked(now, u, z1)), r)
-        except SolveError:
+            change = bodies.change(
+                Balance(of, bodies.held(R), R, _asked(now, u, z1)), r, of.c.single and n >= DIRECT
+            )
+        except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
             break
@@ -225,7 +230,11 @@ def _balanced(
             return np.asarray(u + change)
         u = u + (change if of.c.single else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        stalls = size > last / 2 and size <= (LINEAR if of.c.single else rounding) * reached
+        stalls = (
+            (n > DIRECT or not of.c.single)
+            and size > last / 2
+            and size <= (LINEAR if of.c.single else rounding) * reached
+        )
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise NoBalanceError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
@@ -267,10 +276,15 @@ class _Held:
             self._made.append(held_body(A, self.now.of.parts[k].W))
         return self._made
 
-    def change(self, balance: Balance, r: Flat) -> Flat:
-        """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass."""
+    def change(self, balance: Balance, r: Flat, exact: bool = False) -> Flat:
+        """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass.
+
+        Parameters
+        ----------
+        exact : whether it takes out the mass of dense bodies too
+        """
         direct = balance.solved(r).x
-        if not any(self.sparse):
+        if not any(self.sparse) and not exact:
             return direct
         none = balance.solved(0 * r).x
 
@@ -287,6 +301,7 @@ class _Held:
         for k, S in enumerate(spins):
             link, here = of.system.model.links[k], own(of, k)
             if left_out and not self.sparse[k]:
+                out[here] = -self.now.always.least(k) * u[here]
                 continue
             more = S - self.now.always.least(k) * np.eye(3) if left_out else S
             turned = (more[: link.d, : link.d] @ u[here].reshape(link.d, -1)).ravel()
