@@ -23,6 +23,15 @@ def flat(points: np.ndarray) -> np.ndarray:
     return np.asarray(points @ VIEW.T)
 
 
+def circle(centre: Vector, axis: Vector, radius: float, degrees: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of a circle about an axis, by the right hand."""
+    d = np.asarray(axis, float) / np.linalg.norm(axis)
+    u = np.cross(d, Z if abs(d[2]) < 0.9 else X)
+    u /= np.linalg.norm(u)
+    t = np.radians(degrees)[:, None]
+    return np.asarray(np.asarray(centre, float) + radius * (np.cos(t) * u + np.sin(t) * np.cross(d, u)))
+
+
 class Sheet:
     """One drawing; what is drawn later lies above."""
 
@@ -54,16 +63,12 @@ class Sheet:
     def rod(self, a: Vector, b: Vector, radius: float, colour: str) -> None:
         """A round bar from one point to another."""
         a, b = np.asarray(a, float), np.asarray(b, float)
-        d = (b - a) / np.linalg.norm(b - a)
-        u = np.cross(d, Z if abs(d[2]) < 0.9 else X)
-        u /= np.linalg.norm(u)
-        t = np.linspace(0, 2 * np.pi, 60)[:, None]
-        ring = radius * (np.cos(t) * u + np.sin(t) * np.cross(d, u))
-        across = np.array([-1, 1]) * (VIEW @ d)[::-1]
+        ends = [circle(end, b - a, radius, np.linspace(0, 360, 60)) for end in (a, b)]
+        across = np.array([-1, 1]) * (VIEW @ (b - a))[::-1]
         width = radius * across / np.linalg.norm(across)
         body = np.array([flat(a) + width, flat(b) + width, flat(b) - width, flat(a) - width])
         z = self._next()
-        for points in (flat(a + ring), body, flat(b + ring)):
+        for points in (flat(ends[0]), body, flat(ends[1])):
             self.ax.add_patch(Polygon(points, facecolor=colour, edgecolor="#333", lw=0.7, zorder=z))
 
     def ball(self, centre: Vector, radius: float, colour: str) -> None:
@@ -83,34 +88,22 @@ class Sheet:
 
     def slide(self, a: Vector, b: Vector) -> None:
         """An arrow of positive travel."""
-        p, q = flat(np.array([a, b], float))
-        self.ax.add_patch(
-            FancyArrowPatch(
-                tuple(p), tuple(q), arrowstyle="-|>", mutation_scale=15, lw=2.2, color=MOTION, zorder=55
-            )
+        self._arrow(*flat(np.array([a, b], float)))
+
+    def _arrow(self, p: np.ndarray, q: np.ndarray) -> None:
+        """An arrow on paper, of a positive motion."""
+        arrow = FancyArrowPatch(
+            tuple(p), tuple(q), arrowstyle="-|>", mutation_scale=15, lw=2.2, color=MOTION, zorder=55
         )
+        self.ax.add_patch(arrow)
 
     def rotation(
         self, centre: Vector, axis: Vector, radius: float, since: float = -150, to: float = 110
     ) -> None:
         """An arrow of positive rotation, by the right hand about an axis."""
-        d = np.asarray(axis, float) / np.linalg.norm(axis)
-        u = np.cross(d, Z if abs(d[2]) < 0.9 else X)
-        u /= np.linalg.norm(u)
-        t = np.radians(np.linspace(since, to, 60))[:, None]
-        p = flat(np.asarray(centre, float) + radius * (np.cos(t) * u + np.sin(t) * np.cross(d, u)))
+        p = flat(circle(centre, axis, radius, np.linspace(since, to, 60)))
         self.ax.plot(p[:-2, 0], p[:-2, 1], color=MOTION, lw=2.2, zorder=55)
-        self.ax.add_patch(
-            FancyArrowPatch(
-                tuple(p[-6]),
-                tuple(p[-1]),
-                arrowstyle="-|>",
-                mutation_scale=15,
-                lw=2.2,
-                color=MOTION,
-                zorder=55,
-            )
-        )
+        self._arrow(p[-6], p[-1])
 
 
 def _revolute(s: Sheet) -> None:

@@ -107,9 +107,8 @@ def test_a_turned_rod_sags_by_its_weight_in_each_position(axis: str, frames: str
     sag = w * L**4 / (8 * E * INERTIA)
     assert_allclose(got["drive/torque"][:, 0], 0.5 * w * L**2 * np.cos(phi), atol=1e-4 * w * L**2)
     tangent = -np.outer(np.sin(phi), d) + np.outer(np.cos(phi), up)
-    assert_allclose(
-        (got["probes/end/displacement"] * tangent).sum(axis=1), -sag * np.cos(phi), atol=5e-3 * sag
-    )  # shear: 0.4 %
+    across_it = (got["probes/end/displacement"] * tangent).sum(axis=1)
+    assert_allclose(across_it, -sag * np.cos(phi), atol=5e-3 * sag)  # shear: 0.4 %
 
 
 @pytest.mark.parametrize("axis", AXES)
@@ -157,17 +156,11 @@ def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(
         raw["analysis"] |= {"kind": name, "revolutions": turns}
         raw["drive"] = turning(f"{speed} rpm")
         found.append(values(raw))
-    for name, unit in (
-        ("probes/end/displacement", "m"),
-        ("drive/torque", "N m"),
-        ("joints/S/force", "N"),
-        ("joints/B/force", "N"),
-    ):
+    within = 1e-6 if kind == "prismatic" else 1e-5  # places along a slot go with its travel; (ω/ω₁)² is 1e-12
+    for name in ("probes/end/displacement", "drive/torque", "joints/S/force", "joints/B/force"):
         size = np.abs(found[0][name]).max()
-        assert size > 1e-9, unit
-        near = (
-            1e-6 if kind == "prismatic" else 1e-5
-        ) * size  # places along a slot go with its travel; (ω/ω₁)² is 1e-12
+        assert size > 1e-9
+        near = within * size
         assert_allclose(found[1][name], found[0][name][:2], atol=near)
         assert_allclose(found[2][name], found[0][name][:2], atol=near)
         assert_allclose(found[2][name], found[1][name], atol=1e-6 * size)
@@ -176,7 +169,7 @@ def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(
 
 @pytest.mark.parametrize("joint", ["universal", "screw"])
 def test_rigid_links_beside_elastic_ones_balance_too(joint: str) -> None:
-    """A drive that hardly moves: static and quasi-static are one; what is soft beside rigid links takes no iterations."""
+    """A drive that hardly moves: static and quasi-static are one; also what is soft beside rigid links."""
     raw = scene_of(Cell(joint, "rigid-body", True, "rigid", "loads"))
     del raw["analysis"]["initial"]
     raw["analysis"] |= {"end_time": 5e-4, "step": 5e-4}
@@ -192,10 +185,9 @@ def test_rigid_links_beside_elastic_ones_balance_too(joint: str) -> None:
         assert_allclose(one.u, other.u, atol=1e-6 * size)  # 2e-8 found
     names = [name for name in forces if name.endswith("/force")]
     largest = max(np.abs(forces[name]).max() for name in names)
+    near = 5e-4 * largest  # rounding of stiff links: 2e-5 found
     for name in names:
-        assert_allclose(
-            forces[name][0], others[name][0], atol=5e-4 * largest
-        )  # rounding of stiff links: 2e-5
+        assert_allclose(forces[name][0], others[name][0], atol=near)
 
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])

@@ -165,9 +165,9 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     Channels whose differences do not fall with the step hold vibration that is not resolved: they are given PATIENCE
     shorter steps; then they are told, and the others choose. What the scene states of step and levels stays.
     """
-    trial = shortened(scene)
     if without_vibration(scene):
         return scene, 0.0
+    trial = shortened(scene)
     if not open_step(scene):
         error = _stated_error(search, trial)
         if error > allowed:

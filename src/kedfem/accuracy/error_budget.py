@@ -121,15 +121,14 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
 
     Parameters
     ----------
+    balance : of energy and momentum; none where there are no time steps
     unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
     stiffened : the run has geometric stiffening, whose work is in the energy's residual too
     """
     worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
-    left = {"the drive's work": unworked}
-    if balance is not None:
-        left |= {"momentum": balance.linear, "angular momentum": balance.angular}
-    if balance is not None and not stiffened:
-        left["energy"] = balance.energy
+    momenta = {"momentum": balance.linear, "angular momentum": balance.angular} if balance else {}
+    energy = {"energy": balance.energy} if balance and not stiffened else {}
+    left = momenta | {"the drive's work": unworked} | energy
     said = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
     said += [
         f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED

@@ -173,6 +173,7 @@ def _positions(
         mark.set(k, state, solver)
         t = k * grid.step
         motion = motion_at(np.array([t]))
+        forcing = forcings(model, motion)
         try:
             if scene.analysis.kind == "static":
                 state = static(of, motion_at, t, near=state, like=shared)
@@ -181,10 +182,10 @@ def _positions(
         except NoBalanceError:
             raise SolveError(_unbalanced(scene, motion)) from None
         if isinstance(solver, CorotationalSteps):
-            links, exerted = solver.first(state, forcings(model, motion), motion_at)
-            yield from _finite(Block(k, motion, links, exerted=exerted))
+            links, exerted = solver.first(state, forcing, motion_at, shared)
         else:
-            yield from _finite(Block(k, motion, solver.first(state, forcings(model, motion), motion)))
+            links, exerted = solver.first(state, forcing, motion), None
+        yield from _finite(Block(k, motion, links, exerted=exerted))
 
 
 def _unbalanced(scene: Scene, motion: RigidMotion) -> str:

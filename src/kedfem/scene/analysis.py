@@ -26,6 +26,7 @@ from kedfem.scene.units import PositiveTime, Quantity, fault
 Positive = Annotated[float, Quantity("1", above=0.0)]
 
 
+WITHOUT_VIBRATION = ("static", "quasi-static")  # kinds that find each position by itself
 ACCURACY: TypeAdapter[float] = TypeAdapter(Annotated[float, Quantity("1", above=0.0, below=1.0)])
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import get_args
 
+from kedfem.scene.analysis import WITHOUT_VIBRATION
 from kedfem.scene.links import JointKind
 
 Facts = Mapping[str, str]
@@ -58,7 +59,6 @@ class Refusal:
         return text.format_map(words)
 
 
-STILL = ("static", "quasi-static")
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",
     'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion tells",
     "a slot", 'take frames = "rigid-body", or a slide with a hinge')  # fmt: skip
@@ -158,17 +158,17 @@ REFUSALS = (
     Refusal("analysis", {"kind": ("quasi-static",), "drive": ("none",)}, "{where}.kind",
         "be combined with a drive as 'quasi-static'", "nothing else says how a mechanism moves on", "it without one",
         "give a drive, or take 'static' or 'transient'"),
-    Refusal("analysis", {"kind": ("steady", *STILL), "solver": ("monolithic",)}, "{where}.solver",
+    Refusal("analysis", {"kind": ("steady", *WITHOUT_VIBRATION), "solver": ("monolithic",)}, "{where}.solver",
         "be 'condensed' for a {kind} analysis", "the monolithic solver marches from a start", "'monolithic'",
         "leave it out"),
-    Refusal("analysis", {"kind": STILL, "stiffening": ("on",)}, "{where}.stiffening",
+    Refusal("analysis", {"kind": WITHOUT_VIBRATION, "stiffening": ("on",)}, "{where}.stiffening",
         "be left out of a {kind} analysis", "whose balance knows no stresses of the rigid-body motion", "it",
         'take frames = "co-rotational", which know all of it'),
-    Refusal("analysis", {"kind": STILL, "levels": ("several",)}, "{where}.extrapolation_levels",
+    Refusal("analysis", {"kind": WITHOUT_VIBRATION, "levels": ("several",)}, "{where}.extrapolation_levels",
         "be left out of a {kind} analysis", "which has no time steps", "more than 1", "leave it out"),
     Refusal("analysis", {"kind": ("steady",), "rho_inf": ("1",)}, "{where}.rho_inf", "be less than 1 for a steady motion",
         "vibrations that a step cannot resolve would have no end", "1", "take 0.95"),
-    *(Refusal("analysis", {"kind": ("steady", *STILL), "start": (key,)}, f"{{where}}.{key}",
+    *(Refusal("analysis", {"kind": ("steady", *WITHOUT_VIBRATION), "start": (key,)}, f"{{where}}.{key}",
         "be left out of a {kind} analysis", "which does not depend on how the motion began", "{given}",
         "leave it out, or take kind = 'transient'")
         for key in ("initial_speeds", "initial_motions", "initial_deflection")),

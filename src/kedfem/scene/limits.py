@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from kedfem.errors import SceneError
+from kedfem.scene.analysis import WITHOUT_VIBRATION
 from kedfem.scene.checks import NOUNS, fidelity
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
@@ -100,7 +101,7 @@ def _repeats(parts: Parts) -> bool:
         return parts.analysis.word("kind") == "static"
     drives = [drive.record for drive in parts.all_drives]
     known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
-    return parts.analysis.word("kind") in {"steady", "static", "quasi-static"} and known
+    return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
 
 
 def open_fidelity_faults(parts: Parts) -> Iterator[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kedfem.scene.analysis import WITHOUT_VIBRATION
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp
 from kedfem.scene.laws import drive_angle
 
@@ -62,7 +63,7 @@ def cycle(motion: MotionLaw | None) -> float | None:
 
 def without_vibration(scene: Scene) -> bool:
     """Whether each position is found by itself, static or quasi-static: there are no time steps then."""
-    return scene.analysis.kind in {"static", "quasi-static"}
+    return scene.analysis.kind in WITHOUT_VIBRATION
 
 
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:

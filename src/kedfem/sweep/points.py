@@ -192,7 +192,7 @@ def _ran(job: Job) -> Row:
 
 def _since(scene: Scene, last: float) -> float:
     """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns
-    and of a steady motion."""
+    and where one period, or each position by itself, is found."""
     turn, grid = turn_steps(scene), time_grid(scene)
     if turn is None or scene.analysis.kind != "transient":
         return -0.5 * grid.step

@@ -109,10 +109,10 @@ class CorotationalSteps:
         return quasi_static(self.ready, motion_at, rates)
 
     def first(
-        self, state: State, forcing: Sequence[Forcing], motion_at: Motion
+        self, state: State, forcing: Sequence[Forcing], motion_at: Motion, like: Instant | None = None
     ) -> tuple[list[LinkHistory], Exerted]:
-        """The time point at which a state is, as histories."""
-        now = Instant(self.ready, motion_at, float(state.time[0]))
+        """The time point at which a state is, as histories; `like` is another instant of the same system."""
+        now = Instant(self.ready, motion_at, float(state.time[0]), like)
         return self._handed_on(_as_history(now, state), forcing, now.motion)
 
     def advance(

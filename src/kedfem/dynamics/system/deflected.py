@@ -7,6 +7,7 @@ one step. Without a drive links accelerate as rigid bodies where they are, and K
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from jaxtyping import Float
@@ -29,7 +30,7 @@ from kedfem.motion.newton import cross_matrix
 SWEEPS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 DIRECT = (
-    2  # iterations whose matrix has some mass; what is soft beside rigid links would take hundreds of them
+    2  # iterations of a linear system of dense bodies before its matrix gets rid of what makes it definite
 )
 KRYLOV = 60
 LEAST = 1 / 64  # of loads, that an increment of theirs is
@@ -93,10 +94,8 @@ def static(
     now = Instant(of, motion_at, time, like)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    start = none if near is None else near.u.copy()
     try:
-        with np.errstate(over="ignore", invalid="ignore"):
-            u = _balanced(now, start, _constant(pull), None, None)
+        u = _balanced(now, none if near is None else near.u, _constant(pull), None, None)
     except NoBalanceError:
         if of.c.single:
             raise
@@ -111,21 +110,19 @@ def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
 
 def _in_increments(now: Instant, pull: Flat) -> Flat:
     """The deflection under loads that grow from nothing, in parts as large as their balance can be found for."""
-    whole, amounts, u = now.F, now.amounts, np.zeros_like(pull)
+    part_loaded, u = copy(now), np.zeros_like(pull)
     share, part = 0.0, 0.25
     while share < 1.0:
         tried = min(1.0, share + part)
-        now.F, now.amounts = tried * whole, tried * amounts
+        part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # of iterations that diverge
-                u = _balanced(now, u, _constant(tried * pull), None, None)
+            u = _balanced(part_loaded, u, _constant(tried * pull), None, None)
         except NoBalanceError:
             part /= 2
             if part < LEAST:
                 raise
             continue
         share, part = tried, 1.5 * part
-    now.F, now.amounts = whole, amounts
     return u
 
 
@@ -159,7 +156,7 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
             if again == 0 and k:  # joints are closed in all before, and so in what these go on to
                 guess = AHEAD[k] @ u[:k]
             z1 = now.interface(v[k]) if again else None
-            u[k] = _balanced(now, guess, lambda u, f: np.zeros_like(u), _spins(now), z1)
+            u[k] = _balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
         if again and (change > last / 2 or change <= CONVERGED * float(np.linalg.norm(u[0]))):
             break
@@ -201,6 +198,7 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
     return u, rate(u)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of iterations that diverge
 def _balanced(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
     z1: Flat | None, rounding: float = ROUNDING,
@@ -215,26 +213,23 @@ def _balanced(
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
+    linear = of.c.single
     for n in range(SWEEPS):
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
-            change = bodies.change(
-                Balance(of, bodies.held(R), R, _asked(now, u, z1)), r, of.c.single and n >= DIRECT
-            )
+            balance = Balance(of, bodies.held(R), R, _asked(now, u, z1))
+            change = bodies.change(balance, r, exact=linear and (n >= DIRECT or any(bodies.sparse)))
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
             break
         if settled:  # once more: what is left of stiff hubs would be large accelerations
             return np.asarray(u + change)
-        u = u + (change if of.c.single else mixing.step(change))
+        u = u + (change if linear else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        stalls = (
-            (n > DIRECT or not of.c.single)
-            and size > last / 2
-            and size <= (LINEAR if of.c.single else rounding) * reached
-        )
+        stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
+        stalls = stalls and (n > DIRECT or not linear)
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise NoBalanceError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
@@ -289,21 +284,34 @@ class _Held:
         none = balance.solved(0 * r).x
 
         def applied(x: Flat) -> Flat:
-            return np.asarray(x + balance.solved(self.inertia(x, left_out=True)).x - none)
+            return np.asarray(x + balance.solved(self.left_out(x, exact)).x - none)
 
         whole = LinearOperator((len(r),) * 2, applied, dtype=float)
         return np.asarray(gmres(whole, direct, rtol=CONVERGED, restart=KRYLOV, maxiter=4)[0])
 
-    def inertia(self, u: Flat, left_out: bool = False) -> Flat:
-        """M ([α]× + [ω]×²) u of all bodies; or what matrices of sparse ones leave out, less what they have of mass."""
-        of, out = self.now.of, np.zeros_like(u)
-        spins = np.zeros((len(of.parts), 3, 3)) if self.spins is None else self.spins
-        for k, S in enumerate(spins):
-            link, here = of.system.model.links[k], own(of, k)
-            if left_out and not self.sparse[k]:
-                out[here] = -self.now.always.least(k) * u[here]
-                continue
-            more = S - self.now.always.least(k) * np.eye(3) if left_out else S
-            turned = (more[: link.d, : link.d] @ u[here].reshape(link.d, -1)).ravel()
-            out[here] = momentum(link, turned) if self.sparse[k] else turned
+    def inertia(self, u: Flat) -> Flat:
+        """M ([α]× + [ω]×²) u of all bodies."""
+        out = np.zeros_like(u)
+        for k, S in enumerate(() if self.spins is None else self.spins):
+            out[own(self.now.of, k)] = self._momentum(k, S, u)
         return out
+
+    def left_out(self, u: Flat, dense: bool) -> Flat:
+        """What matrices of sparse bodies leave out of that, less what they have of mass.
+
+        Parameters
+        ----------
+        dense : whether what matrices of dense bodies have of mass is taken off too
+        """
+        out, none = np.zeros_like(u), np.zeros((3, 3))
+        for k, sparse in enumerate(self.sparse):
+            if sparse or dense:
+                S = self.spins[k] if sparse and self.spins is not None else none
+                out[own(self.now.of, k)] = self._momentum(k, S - self.now.always.least(k) * np.eye(3), u)
+        return out
+
+    def _momentum(self, k: int, S: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
+        """M S u of body k; the mass of dense ones is one."""
+        link = self.now.of.system.model.links[k]
+        turned = np.asarray(S[: link.d, : link.d] @ u[own(self.now.of, k)].reshape(link.d, -1)).ravel()
+        return momentum(link, turned) if self.sparse[k] else turned
