@@ -17,8 +17,8 @@ from kedfem.accuracy.study import Seconds, Study, pareto_front, studied
 from kedfem.accuracy.study_files import read_study, study_rows, write_study, write_study_plot
 from kedfem.accuracy.study_variants import fidelities
 from kedfem.cli import INTERRUPTED, USER_ERROR
-from kedfem.report import study_tables
 from kedfem.scene import read_scene
+from kedfem.tables import study_tables
 from tests.rooms import test_cli
 from tests.rooms.test_cli import Command
 

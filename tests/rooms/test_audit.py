@@ -12,10 +12,10 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.analysis import analyse
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.transient import steps_of, transient
-from kedfem.report import run_tables
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance
 from kedfem.scene import read_scene, scene_from
+from kedfem.tables import run_tables
 from tests import scenes
 from tests.runs import quick
 from tests.scenes import bar, material

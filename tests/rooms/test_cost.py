@@ -8,10 +8,10 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics import cost
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.dynamics.transient import steps_of
-from kedfem.report import check
-from kedfem.report.check import forecast
 from kedfem.scene import scene_from, time_grid
 from kedfem.stepping import frame_steps, stepped
+from kedfem.tables import check
+from kedfem.tables.check import forecast
 
 from .test_dynamics import four_bar
 

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.errors import SceneError
 from kedfem.frequencies import Wanted, crossed, frequencies
-from kedfem.report import frequencies_tables
 from kedfem.scene import scene_from
+from kedfem.tables import frequencies_tables
 from tests.rooms.test_resolution import FIRST, arm
 
 

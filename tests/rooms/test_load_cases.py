@@ -20,9 +20,9 @@ from kedfem.links.recovery import von_mises
 from kedfem.load_cases import LoadCases, load_cases
 from kedfem.mesh.hexahedra import HEX8, HEX20, shape_gradients
 from kedfem.mesh.simplices import TET10
-from kedfem.report.loads import case_tables
 from kedfem.results import read_results
 from kedfem.scene import scene_from
+from kedfem.tables.loads import case_tables
 from tests.scenes import arm, bar, constant_speed, cycloidal, four_bar
 
 OMEGA, LENGTH, SIDE = 100.0, 0.5, 0.02

@@ -14,10 +14,10 @@ from kedfem.analysis import analyse
 from kedfem.errors import OutputError
 from kedfem.kinematics import kinematics
 from kedfem.loads import loads
-from kedfem.report.loads import loads_tables
 from kedfem.results import read_results
 from kedfem.results.loads import BALL, ROLLER, equivalent_load, facing, in_axes
 from kedfem.scene import scene_from
+from kedfem.tables.loads import loads_tables
 from tests.reliability.fuzz import short
 from tests.scenes import example
 

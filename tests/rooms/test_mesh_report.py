@@ -9,7 +9,7 @@ from rich.console import Console
 from kedfem.links.part_candidates import offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.hexahedra import HEX8, Face
-from kedfem.report import mesh_tables
+from kedfem.tables import mesh_tables
 
 
 @pytest.mark.parametrize("width", [60, 80, 140])

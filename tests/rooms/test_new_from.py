@@ -16,8 +16,8 @@ from geometry.step_files import write_step
 from kedfem.cli import USER_ERROR
 from kedfem.mesh.cad.assembly import AssemblySolid, RoundFace, assembly_solids
 from kedfem.mesh.cad.meetings import meetings
-from kedfem.report.draft import link_names, scene_text
 from kedfem.scene import GROUND, read_scene
+from kedfem.tables.draft import link_names, scene_text
 
 from .cad_files import lever, written
 from .test_cli import Command, run_kedfem  # noqa: F401

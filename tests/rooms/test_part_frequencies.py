@@ -13,8 +13,8 @@ from kedfem.errors import KedfemError
 from kedfem.frequencies import Wanted, frequencies, link_of_scene, part_frequencies
 from kedfem.mesh import SolidMesh
 from kedfem.output.vtu import write_mesh
-from kedfem.report import part_tables
 from kedfem.scene import scene_from
+from kedfem.tables import part_tables
 from tests.rooms.test_resolution import arm
 from tests.verification.meshes import box, mapped_mesh
 

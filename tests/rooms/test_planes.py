@@ -21,8 +21,8 @@ from kedfem.motion.linkage import linkage
 from kedfem.output.picture import write_picture
 from kedfem.output.rendering import lifted
 from kedfem.output.vtu import AnimationWriter, LinkField
-from kedfem.report import check_tables
 from kedfem.scene import LinkScene, scene_from
+from kedfem.tables import check_tables
 from tests.runs import quick
 
 from .test_dynamics import four_bar, run, slider_crank

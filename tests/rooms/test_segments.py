@@ -23,8 +23,8 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery
 from kedfem.output.frames import link_fields
-from kedfem.report import check_tables
 from kedfem.scene import scene_from
+from kedfem.tables import check_tables
 from tests.runs import quick
 from tests.scenes import arm, bar
 

@@ -19,7 +19,6 @@ from kedfem.dynamics.start import initial_rates
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting
-from kedfem.report import check_tables, moment
 from kedfem.scene import (
     corotational,
     corotational_links,
@@ -30,6 +29,7 @@ from kedfem.scene import (
     turn_steps,
 )
 from kedfem.stepping import frame_steps
+from kedfem.tables import check_tables, moment
 from tests.scenes import arm, bar
 
 ARM = """

@@ -56,10 +56,10 @@ def run(
 ) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
-    from kedfem.report import run_tables, size_line
     from kedfem.results import abandoned_rows
     from kedfem.resume import has_state
     from kedfem.scene import read_scene
+    from kedfem.tables import run_tables, size_line
 
     loaded = read_scene(scene, within=within)
     loaded = _quick(loaded) if quick else loaded
@@ -91,8 +91,8 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     from kedfem.accuracy.reduction import prepared
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
-    from kedfem.report import assembly_tables, check_tables, size_line
     from kedfem.scene import read_scene
+    from kedfem.tables import assembly_tables, check_tables, size_line
 
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(_quick(read) if quick else read)
@@ -118,8 +118,8 @@ def kinematics(
 ) -> None:
     """Move a scene's links as rigid bodies: motion, transmission, forces."""
     from kedfem.kinematics import kinematics as moved_by
-    from kedfem.report import kinematics_tables
     from kedfem.scene import read_scene
+    from kedfem.tables import kinematics_tables
 
     loaded = read_scene(scene, sketch=True, within=within)
     with progress() as watch:
@@ -155,9 +155,9 @@ def mesh(
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
     from kedfem.output.vtu import write_mesh
-    from kedfem.report import mesh_tables
     from kedfem.results import ready_folder
     from kedfem.scene import link_from
+    from kedfem.tables import mesh_tables
 
     shape = {"kind": "cad", "file": part.name, "solid": solid, "scale": scale}
     sizes = {"size": size, "elements_across": across, "unknowns": unknowns}
@@ -199,9 +199,9 @@ def accuracy(
     from kedfem.accuracy.study import studied
     from kedfem.accuracy.study_files import write_study, write_study_plot
     from kedfem.bench.machine import machine
-    from kedfem.report import study_tables
     from kedfem.results import ready_folder
     from kedfem.scene import read_scene
+    from kedfem.tables import study_tables
 
     if repeats < 1:
         raise SceneError(f"--repeats: must be at least 1, got {repeats}")
@@ -261,7 +261,7 @@ def new(
 
 
 def _new_from(assembly: Path, target: Path, scale: float | None) -> None:
-    from kedfem.report.draft import draft_scene
+    from kedfem.tables.draft import draft_scene
 
     if target.exists():
         raise _exists(target)

@@ -60,8 +60,8 @@ def frequencies(
     from kedfem.frequencies import Wanted, link_of_scene, part_frequencies, part_from_file
     from kedfem.frequencies import frequencies as found_of
     from kedfem.mesh import CAD_ENDINGS, MESH_ENDINGS
-    from kedfem.report import frequencies_tables, part_tables
     from kedfem.scene import face_from, link_from, material_from, read_scene
+    from kedfem.tables import frequencies_tables, part_tables
 
     cad = what.suffix.lower() in CAD_ENDINGS
     of_file = cad or what.suffix.lower() in MESH_ENDINGS

@@ -46,11 +46,11 @@ def sweep(
 ) -> None:
     """Run a scene at many values of its keys: peak stresses, joint forces, torque over them. Started again it goes on."""
     from kedfem.errors import SceneError
-    from kedfem.report import sweep_tables
     from kedfem.scene import read_keys
     from kedfem.sweep import Asked, Base, axes_of, sweep_folder
     from kedfem.sweep import sweep as swept_by
     from kedfem.sweep.cluster import cluster as on_cluster
+    from kedfem.tables import sweep_tables
 
     raw, _ = read_keys(scene, within=within)
     base = Base(raw, scene.parent, scene.stem)

@@ -35,9 +35,22 @@ def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
     """Beams in the xy plane with their sections, curved as they are bent; mitred where two elements of one meet."""
     import pyvista
 
+    points, faces, values = rims(lines, sizes)
+    every = pyvista.PolyData(points, faces)
+    every.point_data["MPa"] = values
+    return every.clean(tolerance=JOINED, absolute=False)
+
+
+def rims(
+    lines: Any, sizes: Float[np.ndarray, "e 2"]
+) -> tuple[Float[np.ndarray, "k 3"], list[int], Float[np.ndarray, " k"]]:
+    """Points of the sections along beams, faces between them as VTK counts them, and what "MPa" is there.
+
+    Lines of the same elements have the same faces, however they are bent.
+    """
     round_ = lines.cell_data[SECTION][:, 2] > 0 if SECTION in lines.cell_data else np.zeros(len(sizes), bool)
     tangents, elements = end_tangents(lines)
-    pieces = []
+    points, faces, values, first = [], list[int](), [], 0
     for kind, nodes in LINES.items():
         which = np.flatnonzero(lines.celltypes == kind)
         for e, cell in zip(which, lines.cells_dict.get(kind, ()), strict=True):
@@ -52,12 +65,11 @@ def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
                 across[end] = mitred / max(0.5, mitred @ across[end])
             profile = (ELLIPSE if round_[e] else RECTANGLE) * sizes[e] / 2
             rim = axis[:, None] + profile[:, :1] * across[:, None] + profile[:, 1:] * [0.0, 0.0, 1.0]
-            faces = swept(len(r), len(profile), [elements[node] == 1 for node in cell[:2]])
-            piece = pyvista.PolyData(rim.reshape(-1, 3), faces)
-            piece.point_data["MPa"] = np.repeat(weights @ lines.point_data["MPa"][cell], len(profile))
-            pieces.append(piece)
-    every = pyvista.merge(pieces, merge_points=False) if len(pieces) > 1 else pieces[0]
-    return every.clean(tolerance=JOINED, absolute=False)
+            points.append(rim.reshape(-1, 3))
+            values.append(np.repeat(weights @ lines.point_data["MPa"][cell], len(profile)))
+            faces += swept(len(r), len(profile), [elements[node] == 1 for node in cell[:2]], first)
+            first += len(points[-1])
+    return np.concatenate(points), faces, np.concatenate(values)
 
 
 def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
@@ -73,13 +85,14 @@ def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, 
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12), count
 
 
-def swept(stations: int, corners: int, closed: list[bool]) -> list[int]:
-    """Faces of a prism through rims of so many corners, closed at its first end, its last or both."""
-    first, last = range(corners), range((stations - 1) * corners, stations * corners)
+def swept(stations: int, corners: int, closed: list[bool], start: int) -> list[int]:
+    """Faces of a prism through rims of so many corners, closed at its first end, its last or both; `start`: first point."""
+    stop = start + (stations - 1) * corners
+    first, last = range(start, start + corners), range(stop, stop + corners)
     sides = [
         (4, at + i, at + j, at + corners + j, at + corners + i)
         for at in range(0, (stations - 1) * corners, corners)
-        for i, j in zip(first, (*first[1:], 0), strict=True)
+        for i, j in zip(first, (*first[1:], start), strict=True)
     ]
     ends = (corners, *reversed(first)), (corners, *last)
     return [

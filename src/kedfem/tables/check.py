@@ -27,9 +27,6 @@ from kedfem.motion.released_motions import of_joints
 from kedfem.output.derived import fields
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
-from kedfem.report.links import link_table, way_tables
-from kedfem.report.mobility import mobility_table
-from kedfem.report.plan import plan_tables, reduction_table
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.force_elements import measured_actions
@@ -37,6 +34,9 @@ from kedfem.results.recording import recording
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
 from kedfem.scene.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
+from kedfem.tables.links import link_table, way_tables
+from kedfem.tables.mobility import mobility_table
+from kedfem.tables.plan import plan_tables, reduction_table
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:

@@ -10,10 +10,10 @@ from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
-from kedfem.report.plan import chosen_table
 from kedfem.results import Peak
 from kedfem.results.balance import Balance
 from kedfem.scene import Scene, without_vibration
+from kedfem.tables.plan import chosen_table
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:

@@ -1,0 +1,26 @@
+"""Summary tables of what the commands find, for the terminal."""
+
+from kedfem.output.words import moment
+from kedfem.tables.assembly import assembly_tables
+from kedfem.tables.check import check_tables
+from kedfem.tables.frequencies import frequencies_tables, part_tables
+from kedfem.tables.kinematics import kinematics_tables
+from kedfem.tables.mesh import mesh_tables
+from kedfem.tables.run import run_tables
+from kedfem.tables.sizes import size_line
+from kedfem.tables.study import study_tables
+from kedfem.tables.sweep import sweep_tables
+
+__all__ = [
+    "assembly_tables",
+    "check_tables",
+    "frequencies_tables",
+    "kinematics_tables",
+    "mesh_tables",
+    "moment",
+    "part_tables",
+    "run_tables",
+    "size_line",
+    "study_tables",
+    "sweep_tables",
+]
