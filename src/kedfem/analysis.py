@@ -35,6 +35,7 @@ from kedfem.output.derived import (
 )
 from kedfem.output.stress_files import Extremes, write_envelope, write_top
 from kedfem.output.vtu import write_cells, write_frame
+from kedfem.report import require_report, write_report
 from kedfem.results import Channel, Peak, Results, add_notes, claimed, read_results
 from kedfem.results.additions import add_account, add_peaks, mark_doubtful
 from kedfem.results.audit import Account, balance_warning
@@ -112,12 +113,21 @@ def analyse(
     """
     if scene.output.parquet:
         require_parquet("output.parquet")
+    if scene.output.report:
+        require_report("output.report")
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
         run = _analysed(scene, folder, watch, keeper, stresses_since)
         remove_state(folder)
-        return run
+        return _reported(run, watch) if scene.output.report else run
+
+
+def _reported(run: Run, watch: Watch) -> Run:
+    """The run with its page for a browser."""
+    clock = Clock(watch, run.seconds)
+    missing = clock.timed("report", lambda: write_report(run.folder)).warnings
+    return replace(run, warnings=(*run.warnings, *(f"report: {text}" for text in missing)))
 
 
 def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float) -> Run:

@@ -61,7 +61,7 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
     results = read_results(path)
     _refuse(path, results, last)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)
-    linked, motion, why = _moved(scene, results)
+    linked, motion, why = moved(scene, results)
     rows = last_turns(results, last)
     joints = joint_loads(scene, results, linked, motion)
     drives = drive_loads(scene, results, linked, motion)
@@ -101,7 +101,7 @@ def _refuse(path: FilePath, results: Results, last: float | None) -> None:
         raise OutputError("--last: counts revolutions of the drive, got a drive that slides: leave it out")
 
 
-def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:
+def moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:
     """The rigid motion at the rows of the results; where it is not known why."""
     left = "loads are in the world's axes alone, without bearing loads and power"
     if scene.driven is None:

@@ -1,9 +1,10 @@
 """All time steps of a run: rows to the results file, frames to the animation, states to go on from."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -28,6 +29,7 @@ from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.envelope import Envelope
+from kedfem.results.modelled import modelled
 from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
 from kedfem.resume import Keeper, remove_state
@@ -87,11 +89,6 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
-    notes: dict[str, str | float] = {"unknowns": model.unknowns, "step [s]": time_grid(scene).step}
-    corotational = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
-    notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
-    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
-    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
     marks = Marks.of(len(solvers), keeper is not None)
     memories = {
         "marks": marks, "frames": frames, "envelope": envelope, "seen": seen, "errors": errors,
@@ -105,8 +102,9 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     for each in solvers:
         if not isinstance(each, LiteralSteps):
             each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
+    notes, drive = _notes(ready, watched), drive_channel(scene)
     written = ResultsWriter(
-        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
+        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive
     )
     with written.of_run(keeper.run, keeper.rows) if keeper else written as writer:
         table = _Table(writer, channels, folder)
@@ -136,6 +134,20 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
             writer.note(errors.estimate.notes)
     envelope.flush()
     return envelope, seen, errors.estimate
+
+
+def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping[str, Any]]:
+    """What a run says of itself before its first step."""
+    model = ready.model
+    notes: dict[str, str | float | Mapping[str, Any]] = {
+        "unknowns": model.unknowns,
+        "step [s]": time_grid(ready.scene).step,
+    }
+    corotational = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
+    notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
+    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
+    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
+    return notes | modelled(ready.scene, ready.linkage, model)
 
 
 def _one_file(scene: Scene) -> bool:

@@ -1,5 +1,6 @@
 """The command line as a user meets it: tables, messages, exit codes, Ctrl-C, and what --help does not load."""
 
+import json
 import os
 import re
 import signal
@@ -15,12 +16,13 @@ import h5py
 import pytest
 
 import kedfem
+from kedfem import cli
 from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
 from kedfem.mesh.file import mesh_from_file
 from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Results, read_results
-from kedfem.scene import read_scene
+from kedfem.scene import read_scene, scene_from, time_grid
 
 SOURCE = Path(kedfem.__file__).parents[1]
 ARM = """
@@ -500,3 +502,35 @@ def expect_whole_animation(folder: Path, results: Results) -> None:
     assert all((folder / name).read_bytes().rstrip().endswith(b"</VTKFile>") for name in there)
     assert float(listed[-1][0]) <= results.time[-1] + 1e-9
     assert not [path.name for path in folder.iterdir() if ".part" in path.name]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_scene_of_a_quick_run_can_be_read_again(kind: str, run_kedfem: Command, tmp_path: Path) -> None:
+    """What takes results up, such as `kedfem loads`, reads their scene: with several drives its step was not in it."""
+    assert run_kedfem("new", kind).code == 0
+    quick = cli._quick(read_scene(tmp_path / f"{kind}.toml"))
+    again = scene_from(json.loads(quick.model_dump_json()), tmp_path)
+    assert time_grid(again) == time_grid(quick)
+
+
+def test_a_page_of_a_scene_runs_it_once_and_is_of_its_text(run_kedfem: Command, arm: Path) -> None:
+    """Without results the scene is run; with those of an earlier text it is not, nor are they shown as its own."""
+    said = run_kedfem("report", arm)
+    assert (said.code, Path("arm-results/report.html").exists()) == (0, True)
+    before = Path("arm-results/results.h5").stat().st_mtime_ns
+    assert run_kedfem("report", arm, "--file", "page.html").code == 0
+    assert Path("page.html").stat().st_size > 1e6
+    assert Path("arm-results/results.h5").stat().st_mtime_ns == before
+    arm.write_text(arm.read_text() + "\n# changed\n")
+    said = run_kedfem("report", arm)
+    assert said.code == USER_ERROR
+    assert "must be of arm.toml as it is now, got those of an earlier text" in said.err.replace("\n", " ")
+    assert run_kedfem("report", "arm-results").code == 0
+
+
+def test_a_page_is_opened(run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("typer.launch", lambda url: opened.append(url) or len(opened) - 1)
+    assert "could be opened" not in run_kedfem("view", arm).err
+    assert opened == [Path("arm-results/report.html").resolve().as_uri()]
+    assert "no browser could be opened here" in run_kedfem("view", arm).err.replace("\n", " ")

@@ -11,6 +11,7 @@ from kedfem.cli.comparing import compare
 from kedfem.cli.frequencies import frequencies
 from kedfem.cli.loading import loads
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
+from kedfem.cli.reporting import WRITTEN, report, view
 from kedfem.cli.screen import err, out, progress, show
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
@@ -353,11 +354,21 @@ app.command()(sweep)
 app.command()(frequencies)
 app.command()(loads)
 app.command()(compare)
+app.command()(report)
+app.command()(view)
 
 
 def _quick(scene: Any) -> Any:
-    """The scene with plain defaults for what it leaves open."""
-    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"accuracy": "quick"})})
+    """The scene with plain defaults for what it leaves open; the step is stated where no turns of a drive tell it."""
+    from kedfem.scene import time_grid
+    from kedfem.scene.timing import scene_speed
+
+    analysis = scene.analysis.model_copy(update={"accuracy": "quick"})
+    quick = scene.model_copy(update={"analysis": analysis})
+    if not scene.driven_joints or scene_speed(scene) or analysis.step is not None:
+        return quick
+    step = {"step": time_grid(quick).step}
+    return quick.model_copy(update={"analysis": analysis.model_copy(update=step)})
 
 
 def _version(file: Path) -> tuple[int, int] | None:
@@ -391,6 +402,7 @@ def _say_where(folder: Path) -> None:
         ("peaks.csv", "top ten of each link"),
         ("worst.png", "picture of the highest stress"),
         ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
+        ("report.html", WRITTEN),
     ):
         if (folder / name).exists():
             out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)

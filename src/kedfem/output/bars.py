@@ -86,7 +86,7 @@ def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, 
 
 
 def swept(stations: int, corners: int, closed: list[bool], start: int) -> list[int]:
-    """Faces of a prism through rims of so many corners, closed at its first end, its last or both; `start`: first point."""
+    """Faces of a prism through rims of so many corners from a point on, closed at its first end, its last or both."""
     stop = start + (stations - 1) * corners
     first, last = range(start, start + corners), range(stop, stop + corners)
     sides = [

@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -82,30 +83,43 @@ def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bo
     OutputError
         The file cannot be written.
     """
-    if load.axis is None or not load.inside or load.bearing is None:
+    if not has_polar(load):
         return False
-    e1, e2 = facing(load.axis)
-    divisor, unit = prefixed(float(load.bearing[rows].max()), "N")
-    with figure_saved(
-        path, f"Joint {load.joint}: radial load ({unit}) about axis {_vector(load.axis)}"
-    ) as figure:
-        sides = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-        for ax, link, force in zip(sides, load.links, load.inside, strict=True):
-            a, b = force[rows] @ e1, force[rows] @ e2
-            angle, size = np.arctan2(b, a), np.hypot(a, b) / divisor
-            k = int(size.argmax())
-            ax.plot(
-                angle,
-                size,
-                linewidth=1.2,
-                marker="o" if np.ptp(np.column_stack([a, b]), axis=0).max() == 0 else "",
-            )
-            ax.plot(angle[k], size[k], "o", color="C3", label=f"peak {size[k]:.4g} {unit}")
-            ax.set_ylim(0.0, 1.1 * max(float(size.max()), 1e-300))
-            ax.set_title(f"on {link}, in its axes: 0° is {_vector(e1)}, 90° {_vector(e2)}", fontsize=10)
-            ax.legend(loc="upper left", bbox_to_anchor=(-0.05, -0.02), frameon=False)
-            ax.set_rlabel_position(22.5)
+    with figure_saved(path, polar_title(load, rows)) as figure:
+        draw_polar(figure, load, rows)
     return True
+
+
+def has_polar(load: JointLoad) -> bool:
+    """Whether the joint is a hinge whose links' orientations are known."""
+    return load.axis is not None and bool(load.inside)
+
+
+def polar_title(load: JointLoad, rows: Bool[np.ndarray, " T"]) -> str:
+    """What a polar diagram shows, with its unit."""
+    return f"Joint {load.joint}: radial load ({_polar_unit(load, rows)[1]}) about axis {_vector(np.asarray(load.axis))}"
+
+
+def _polar_unit(load: JointLoad, rows: Bool[np.ndarray, " T"]) -> tuple[float, str]:
+    return prefixed(float(np.asarray(load.bearing)[rows].max()), "N")
+
+
+def draw_polar(figure: Any, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> None:
+    """The diagram of a hinge: the load on each of its links."""
+    e1, e2 = facing(np.asarray(load.axis))
+    divisor, unit = _polar_unit(load, rows)
+    sides = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
+    for ax, link, force in zip(sides, load.links, load.inside, strict=True):
+        a, b = force[rows] @ e1, force[rows] @ e2
+        angle, size = np.arctan2(b, a), np.hypot(a, b) / divisor
+        k = int(size.argmax())
+        marker = "o" if np.ptp(np.column_stack([a, b]), axis=0).max() == 0 else ""
+        ax.plot(angle, size, linewidth=1.2, marker=marker)
+        ax.plot(angle[k], size[k], "o", color="C3", label=f"peak {size[k]:.4g} {unit}")
+        ax.set_ylim(0.0, 1.1 * max(float(size.max()), 1e-300))
+        ax.set_title(f"on {link}, in its axes: 0° is {_vector(e1)}, 90° {_vector(e2)}", fontsize=10)
+        ax.legend(loc="upper left", bbox_to_anchor=(-0.05, -0.02), frameon=False)
+        ax.set_rlabel_position(22.5)
 
 
 def _vector(x: Float[np.ndarray, "3"]) -> str:

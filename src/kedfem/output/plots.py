@@ -1,23 +1,29 @@
 """Curves over the drive angle, as PNG: how pictures are drawn; `plot_groups` says which there are."""
 
+import io
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.output.abscissa import Abscissa, abscissa, draw_abscissa
-from kedfem.output.plot_groups import STIFF, Curves, Panel, pictures
+from kedfem.output.plot_groups import STIFF, Curves, Panel, Picture, pictures
 from kedfem.output.units import prefixed
 from kedfem.results import Channel, Results, ready_folder, replacing
 
+T = TypeVar("T")
+
 SIZE = (11.0, 6.2)
 """Inches, at DPI dots each."""
+
+PAGE_SIZE = (8.4, 4.8)
+"""Inches of a figure that is one of many on a page."""
 
 DPI = 120
 
@@ -62,15 +68,10 @@ def write_plots(results: Results, folder: Path) -> list[Path]:
         return []
     along = drawn_over(results)
     written = []
-    highest: dict[str, float] = {}
-    for channel, values in results.channels.values():
-        highest[channel.unit] = max(highest.get(channel.unit, 0.0), _largest(values))
-    for picture in pictures(results):
-        if picture.channel and _negligible(picture.panels, highest.get(picture.channel.unit, 0.0)):
-            continue
+    for picture in worth_drawing(results):
         path = Path(folder) / f"{picture.name}.png"
-        with figure_saved(path, _title(picture.title, picture.channel, results)) as figure:
-            _draw_panels(figure, along, picture.panels)
+        with figure_saved(path, heading(picture.title, picture.channel, results)) as figure:
+            draw_panels(figure, along, picture.panels)
         written.append(path)
     return written
 
@@ -79,10 +80,16 @@ def _largest(values: Float[np.ndarray, "..."]) -> float:
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
-def _negligible(panels: list[Panel], highest: float) -> bool:
-    """Whether there is rounding only, which the table of a run tells as ≈ 0; nothing at all is drawn, once."""
-    largest = [_largest(y) for _, _, curves in panels for y in curves.values()]
-    return highest > 0 and max(largest, default=0.0) <= NEGLIGIBLE * highest
+def worth_drawing(results: Results) -> Iterator[Picture]:
+    """All pictures but those of rounding only, which the table of a run tells as ≈ 0; nothing at all is drawn, once."""
+    highest: dict[str, float] = {}
+    for channel, values in results.channels.values():
+        highest[channel.unit] = max(highest.get(channel.unit, 0.0), _largest(values))
+    for picture in pictures(results):
+        above = highest.get(picture.channel.unit, 0.0) if picture.channel else 0.0
+        largest = max((_largest(y) for _, _, curves in picture.panels for y in curves.values()), default=0.0)
+        if not above or largest > NEGLIGIBLE * above:
+            yield picture
 
 
 def drawn_over(results: Results) -> Abscissa:
@@ -122,8 +129,13 @@ def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarra
     return np.union1d(np.minimum(kept, n - 1), [n - 1])
 
 
-def _draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> None:
-    """The panels one above the other on one abscissa; below, where needed, the drive angle over time."""
+def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
+    """The panels one above the other on one abscissa; below, where needed, the drive angle over time.
+
+    Returns
+    -------
+    The axes of matplotlib, from top to bottom.
+    """
     strip = 0 if along.degrees is None else 1
     ratios = [3, 2, 2][: len(panels)] + [1] * strip
     axes = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
@@ -134,6 +146,7 @@ def _draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> None:
         axes[-1].set_ylabel("drive (°)")
         axes[-1].grid(alpha=0.3)
     draw_abscissa(axes[0], axes[-1], along)
+    return axes
 
 
 def _draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: str) -> None:
@@ -166,7 +179,7 @@ def _draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: 
     ax.grid(alpha=0.3)
 
 
-def _title(text: str, channel: Channel | None, results: Results) -> str:
+def heading(text: str, channel: Channel | None, results: Results) -> str:
     """The title, then the channel with its axes and, for a run that did not end, its status."""
     below = [channel.name] if channel else []
     if channel and channel.frame:
@@ -185,16 +198,36 @@ def _plain(text: str) -> str:
 @contextmanager
 def figure_saved(path: Path, title: str) -> Iterator[Any]:
     """A figure of its own (no global state), written to a PNG when it is drawn."""
+    figure = _figure(SIZE)
+    yield figure
+    with replacing(path) as part:
+        _save(figure, part, title, "png")
+
+
+def figure_svg(title: str, draw: Callable[[Any], T]) -> tuple[str, T]:
+    """A figure as SVG for a page, and what drawing it returned; the places of its axes are final then."""
+    figure = _figure(PAGE_SIZE)
+    drawn = draw(figure)
+    file = io.BytesIO()
+    _save(figure, file, title, "svg")
+    return file.getvalue().decode(), drawn
+
+
+def _figure(size: tuple[float, float]) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    yield figure
+    return figure
+
+
+def _save(figure: Any, file: Path | io.BytesIO, title: str, kind: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=12)
-    with replacing(path) as part, warnings.catch_warnings():
+    said = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
+    with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
-        figure.savefig(part, format="png", metadata={"Software": MARK})
+        figure.savefig(file, format=kind, metadata=said)
 
 
 def remove_plots(folder: Path) -> None:

@@ -162,6 +162,8 @@ def _note_texts(file: Any) -> Iterator[str]:
     """What is said of the run."""
     yield from _said("", file)
     yield from _said("notes", file["notes"])
+    for name in sorted(file["notes"]):
+        yield from _said(name, file["notes"][name])
     for name in ADDED:
         if name in file:
             yield from _all_said(file[name])

@@ -140,6 +140,7 @@ def _results(file: Any) -> Results:
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
         warnings=_warnings(file),
         seconds=read_facts(file[TIMING]) if TIMING in file else {},
+        links={name: read_facts(group) for name, group in file["notes"].items()},
     )
 
 

@@ -103,6 +103,9 @@ class Results:
         Link → its highest stress over all steps; of a whole elastic run, of links that have stress.
     drive
         Name and unit of `angle`; of several drives it is the first one's.
+    links
+        Link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass [kg]`,
+        `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of an elastic run.
     """
 
     time: Float[np.ndarray, " n"]
@@ -118,6 +121,7 @@ class Results:
     drive: Channel = ANGLE
     warnings: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
+    links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def to_xarray(self) -> Any:
         """All channels as an xarray.DataTree, which is laid out as the file: `tree["joints/B/force"].sel(xyz="x")`.

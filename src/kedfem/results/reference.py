@@ -134,6 +134,7 @@ brackets). Energies apart, nothing is summed up over time.
 |---|---|
 | `/` | `status` (`complete`, `doubtful`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
 | `/notes` | what the run said of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), residuals of energy and momentum |
+| `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what the user was told; seconds of each stage; both of a run that came to its end |
 | `/peaks/LINK` | highest von Mises stress over all steps, its place as drawn, time, step and drive; `away` from places where it means little |
 | `/scene` | the scene that was analysed, as `json` and `toml` |

@@ -57,7 +57,7 @@ class ResultsWriter:
     scene_json, scene_toml
         The scene, stored in the file.
     notes
-        Facts about the run, stored as attributes.
+        Facts about the run, stored as attributes; those about a link, by their names, as attributes of a group.
     drive
         Name and unit of the drive's position.
 
@@ -86,7 +86,7 @@ class ResultsWriter:
         channels: Sequence[Channel],
         scene_json: str,
         scene_toml: str | None,
-        notes: Mapping[str, str | float],
+        notes: Mapping[str, str | float | Mapping[str, Any]],
         drive: Channel = ANGLE,
     ) -> None:
         self.drive = drive
@@ -220,7 +220,12 @@ class ResultsWriter:
         scene = self._file.create_group("scene")
         for key, text in self._scene.items():
             write_text(scene, key, text)
-        write_facts(self._file.create_group("notes"), self._notes)
+        notes = self._file.create_group("notes")
+        for name, fact in self._notes.items():
+            if isinstance(fact, Mapping):
+                write_facts(notes.create_group(name), fact)
+            else:
+                write_facts(notes, {name: fact})
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if len(channel.columns) > 1 else ()
             rows = new_rows(self._file, channel.name, width)
@@ -248,7 +253,8 @@ class ResultsWriter:
             self._file.pop(name, None)
         for rows in found.values():
             rows.resize(self._before, axis=0)
-        write_facts(self._file["notes"], self._notes)
+        plain = {name: fact for name, fact in self._notes.items() if not isinstance(fact, Mapping)}
+        write_facts(self._file["notes"], plain)
         write_facts(self._file, {"status": "running", "reason": ""})
         seal(self._file)
         self.rows = self._before

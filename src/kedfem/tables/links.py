@@ -1,24 +1,12 @@
 """The links of a model in a table."""
 
-from collections.abc import Sequence
-
 from rich.table import Table
 from rich.text import Text
 
 from kedfem.dynamics.model import Model, segments, ways
 from kedfem.links.record import Link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
-
-ELEMENTS = {
-    "hexahedron27": "hex27",
-    "hexahedron20": "hex20",
-    "hexahedron": "hex8",
-    "tetra10": "tet10",
-    "quad9": "quad9",
-    "line3": "beam3",
-    "line": "beam2",
-    **{f"line{nodes}": f"beam{nodes}" for nodes in (4, 5, 7, 9)},
-}
+from kedfem.results.modelled import element_words
 
 
 def link_table(model: Model) -> Table:
@@ -30,7 +18,7 @@ def link_table(model: Model) -> Table:
         elements, unknowns = (
             str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
         )
-        table.add_row(name, _kind(parts), elements, unknowns, _mass(*parts), _quality(*parts))
+        table.add_row(name, element_words(parts), elements, unknowns, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
     for slider in model.sliders:
@@ -53,21 +41,6 @@ def way_tables(model: Model) -> list[Table]:
     for name, way in ways(model).items():
         table.add_row(name, Text(way))
     return [table] if table.row_count else []
-
-
-def _kind(parts: Sequence[Link]) -> str:
-    """Its elements, and what was made of them."""
-    first, functions = parts[0], [link.n for link in parts]
-    kind = "rigid" if first.rigid else ELEMENTS[first.cell_type]
-    if first.fit is not None and not first.rigid:
-        kind += f", {len(parts)} co-rotational segments" if len(parts) > 1 else ", 1 co-rotational segment"
-    elif first.fit is not None:
-        kind += ", co-rotational"
-    if first.full and not first.rigid:
-        low, high = min(functions), max(functions)
-        kind += f", {low} modes" if low == high else f", {low} to {high} modes"
-        kind += " each" if len(parts) > 1 else ""
-    return kind
 
 
 def _mass(*parts: Link) -> str:

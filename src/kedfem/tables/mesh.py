@@ -11,7 +11,7 @@ from kedfem.links.part_candidates import Offer, axis_in_words
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.places import in_mm
 from kedfem.output.words import with_prefix
-from kedfem.tables.links import ELEMENTS
+from kedfem.results.modelled import ELEMENTS
 
 
 def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Table]:

@@ -1,0 +1,76 @@
+"""`kedfem report` and `kedfem view`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kedfem.cli.screen import err, out, progress
+from kedfem.errors import OutputError
+
+Given = Annotated[
+    Path, typer.Argument(metavar="SCENE|RESULTS", help="A scene, results.h5, or the folder that has it.")
+]
+WRITTEN = "the run in one page, for any browser"
+
+
+def report(
+    given: Given,
+    file: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where it goes; default: report.html beside the results."),
+    ] = None,
+) -> None:
+    """One page about a run for any browser, without network: motion in three dimensions, curves, loads, warnings.
+
+    Of a scene without results the analysis is run first.
+    """
+    out.print(f"{_written(given, file)}  {WRITTEN}", markup=False, soft_wrap=True)
+
+
+def view(given: Given) -> None:
+    """Write the same page, and open it."""
+    path = _written(given, None)
+    out.print(f"{path}  {WRITTEN}", markup=False, soft_wrap=True)
+    if typer.launch(path.resolve().as_uri()) != 0:
+        err.print("warning: no browser could be opened here; open the page by hand", style="yellow")
+
+
+def _written(given: Path, file: Path | None) -> Path:
+    """The page of results that are there, or of a scene that is run now."""
+    from kedfem.report import require_report, write_report
+
+    require_report("kedfem report")
+    folder = _of_scene(given) if given.suffix in {".toml", ".json"} else given
+    with progress() as watch:
+        watch("report", 0, 0)
+        done = write_report(folder, file)
+    for text in done.warnings:
+        err.print(f"warning: {text}", style="yellow", markup=False, soft_wrap=True)
+    return done.path
+
+
+def _of_scene(file: Path) -> Path:
+    """The results of a scene, found now where there are none.
+
+    Raises
+    ------
+    OutputError
+        There are results of the scene as it was before.
+    """
+    from kedfem.analysis import analyse
+    from kedfem.results import read_results
+    from kedfem.scene import read_scene
+
+    scene = read_scene(file)
+    results = scene.results_folder / "results.h5"
+    if not results.exists():
+        with progress() as watch:
+            return analyse(scene, watch).folder
+    found = read_results(results)
+    if found.scene_toml != scene.source:
+        raise OutputError(
+            f"{results}: must be of {file.name} as it is now, got those of an earlier text; run it again "
+            f"(kedfem run {file}), or give the folder to see the earlier ones"
+        )
+    return scene.results_folder

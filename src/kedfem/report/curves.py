@@ -1,0 +1,78 @@
+"""Curves of a run as SVG, with what a cursor on them needs."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.output.abscissa import Abscissa
+from kedfem.output.load_files import draw_polar, has_polar, polar_title
+from kedfem.output.plots import draw_panels, drawn_over, figure_svg, heading, worth_drawing
+from kedfem.results import Results
+from kedfem.results.loads import JointLoad
+
+GROUPS = {
+    "probes": "Probes", "drive": "Drive", "joints": "Joints", "energy": "Energy", "gears": "Gears",
+    "motors": "Motors", "springs": "Springs", "limits": "Limits", "links": "Links",
+}  # fmt: skip
+"""What the first part of a channel's name means to a reader, in the order of the page."""
+
+FIRST = {"joint_forces": "joints", "joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
+"""Pictures of several channels: to which group they belong, and that they come before the others there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A picture of the page.
+
+    title, svg : what it shows, and how
+    box : left, right, top and bottom of the axes, as parts of the picture's width and height; None of a polar diagram
+    """
+
+    title: str
+    svg: str
+    box: tuple[float, float, float, float] | None
+
+
+def curve_groups(results: Results) -> dict[str, list[Curve]]:
+    """Pictures of all channels by their group, in the order of the page."""
+    if not len(results.time):
+        return {}
+    along = drawn_over(results)
+    found: dict[str, list[Curve]] = {title: [] for title in GROUPS.values()}
+    for picture in worth_drawing(results):
+        where = FIRST.get(picture.name) or picture.name.split("-")[0]
+        title = heading(picture.title, picture.channel, results)
+
+        svg, axes = figure_svg(title, partial(draw_panels, along=along, panels=picture.panels))
+        boxes = [each.get_position() for each in axes]
+        box = boxes[0].x0, boxes[0].x1, 1 - boxes[0].y1, 1 - boxes[-1].y0
+        group = found.setdefault(GROUPS.get(where, "Others"), [])
+        group.insert(0 if picture.name in FIRST else len(group), Curve(picture.title, _alone(svg), box))
+    return {name: curves for name, curves in found.items() if curves}
+
+
+def polar_curves(loads: list[JointLoad], rows: Bool[np.ndarray, " T"]) -> Iterator[Curve]:
+    """Polar diagrams of bearing loads."""
+    for load in loads:
+        if has_polar(load):
+            title = polar_title(load, rows)
+            svg, _ = figure_svg(title, partial(draw_polar, load=load, rows=rows))
+            yield Curve(title, _alone(svg), None)
+
+
+def cursor_places(results: Results, times: Float[np.ndarray, " f"]) -> list[float]:
+    """Where the cursor stands in each frame, as a part of the axes' width; empty without curves."""
+    if len(results.time) < 2:
+        return []
+    along: Abscissa = drawn_over(results)
+    at = np.interp(times, results.time, along.values)
+    width = along.values[-1] - along.values[0]
+    return [float(x) for x in (at - along.values[0]) / width] if width else []
+
+
+def _alone(svg: str) -> str:
+    """The drawing without the file's head, as HTML has it."""
+    return svg[svg.index("<svg") :]

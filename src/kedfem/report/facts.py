@@ -1,0 +1,202 @@
+"""What a report tells in tables, from results and the scene that they are of."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool
+
+from kedfem.accuracy.error_budget import percent
+from kedfem.output.words import place_of, with_prefix
+from kedfem.results import Peak, Results
+from kedfem.results.loads import DriveLoad, JointLoad, drive_summary, summary
+
+ERROR = "error of "
+TOGETHER = "error together, "
+Rows = list[tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of the page.
+
+    title, head : what it tells; names of its columns, empty of a table of names and values
+    rows : texts; the first of each is a name
+    note : below it
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: Rows
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A number of the first look: its name, the number in words, more about it."""
+
+    name: str
+    value: str
+    more: str = ""
+
+
+def facts(results: Results, highest: Peak | None, moment: Callable[[float, float], str]) -> list[Fact]:
+    """The numbers of the first look."""
+    out = []
+    if highest is not None:
+        more = f"link {highest.link}, {moment(highest.time, highest.angle)}"
+        if highest.near:
+            more += f"; at {highest.near}"
+            more += f", away from it {with_prefix(highest.away.stress, 'Pa')}" if highest.away else ""
+        out.append(Fact("Highest von Mises stress", with_prefix(highest.stress, "Pa"), more))
+    for what, beginning, endings in (
+        ("Largest joint force", "joints/", ("/force",)),
+        ("Largest drive effort", "drive/", ("torque", "/force")),
+        ("Largest elastic displacement", "probes/", ("/displacement", "/deflection")),
+    ):
+        if found := _largest(results, beginning, endings):
+            name, value, unit, at = found
+            said = f"{name}, {moment(float(results.time[at]), float(results.angle[at]))}"
+            out.append(Fact(what, with_prefix(value, unit), said))
+    errors = {
+        key.removeprefix(TOGETHER): float(x) for key, x in results.notes.items() if key.startswith(TOGETHER)
+    }
+    if errors:
+        worst = max(errors, key=lambda kind: errors[kind])
+        out.append(Fact("Estimated error", percent(errors[worst]), f"of {worst}, the largest; see below"))
+    return out
+
+
+def _largest(
+    results: Results, beginning: str, endings: tuple[str, ...]
+) -> tuple[str, float, str, int] | None:
+    """What the channel is, largest magnitude, unit and row among channels of elastic links, or of rigid ones."""
+    found = None
+    for name, (channel, values) in results.channels.items():
+        if not (name.startswith(beginning) and name.endswith(endings) and len(values)) or "rigid_" in name:
+            continue
+        size = np.linalg.norm(values, axis=1)
+        if np.isfinite(size).any() and (found is None or np.nanmax(size) > found[1]):
+            k = int(np.nanargmax(size))
+            found = channel.description.partition(";")[0] or name, float(size[k]), channel.unit, k
+    return found
+
+
+def links_table(scene: Mapping[str, Any], results: Results) -> Table:
+    """What each link is and was made of."""
+    rows: Rows = []
+    for name, link in scene["links"].items():
+        said = results.links.get(name, {})
+        mass, centre = said.get("mass [kg]"), said.get("centre of mass [m]")
+        shape = link.get("shape") or {}
+        rows.append(
+            (
+                name,
+                str(said.get("model", link.get("fidelity", ""))),
+                str(link.get("material") or "–"),
+                str(shape.get("kind", "–")) + (f" {shape['file']}" if "file" in shape else ""),
+                *(_count(said.get(key)) for key in ("elements", "unknowns")),
+                "–" if mass is None else with_prefix(float(mass), "kg"),
+                "–" if centre is None else place_of(centre),
+            )
+        )
+    head = ("link", "model", "material", "shape", "elements", "unknowns", "mass", "centre of mass")
+    note = "Mass with what is attached; centre of mass as drawn, in the reference position."
+    return Table("Links", head, rows, note)
+
+
+def _count(number: Any) -> str:
+    return "–" if number is None else f"{int(number):,}"
+
+
+def joints_table(scene: Mapping[str, Any]) -> Table:
+    """Where joints are as drawn."""
+    rows: Rows = [
+        (name, joint["kind"], " – ".join(joint["links"]), place_of(joint["at"]), _axis(joint))
+        for name, joint in scene["joints"].items()
+    ]
+    return Table("Joints", ("joint", "kind", "links", "at, as drawn", "axis"), rows)
+
+
+def _axis(joint: Mapping[str, Any]) -> str:
+    axes = joint.get("axes") or ([joint["axis"]] if joint.get("axis") else [])
+    return "; ".join(place_of(axis).removesuffix(" m") for axis in axes) or "–"
+
+
+def peaks_table(results: Results, moment: Callable[[float, float], str]) -> Table:
+    """The highest stress of each link, and away from where it is not what it seems."""
+    rows: Rows = []
+    for name, peak in results.peaks.items():
+        for label, each in ((name, peak), ("away from it", peak.away)):
+            if each is not None:
+                at = moment(each.time, each.angle)
+                rows.append((label, with_prefix(each.stress, "Pa"), place_of(each.place), at, each.near))
+    head = ("link", "von Mises stress", "at, as drawn", "when", "near")
+    return Table("Highest stress of each link, over all steps", head, rows)
+
+
+def loads_tables(
+    joints: Sequence[JointLoad], drives: Sequence[DriveLoad], results: Results, rows: Bool[np.ndarray, " T"]
+) -> list[Table]:
+    """Numbers for suppliers of bearings and motors."""
+    out = []
+    if joints:
+        told = {each.joint: summary(each, results, rows) for each in joints}
+        note = "Equivalent bearing loads: mean by the power 3 (ball) or 10/3 (roller), ISO 281, over the whole run."
+        out.append(_numbers("Joint forces", "joint", told, note))
+    if drives:
+        told = {each.joint: drive_summary(each, results, rows) for each in drives}
+        out.append(_numbers("Drive", "joint", told, "Power is positive where the drive drives."))
+    return out
+
+
+def _numbers(title: str, what: str, told: Mapping[str, Mapping[str, float]], note: str) -> Table:
+    """A line for each name; columns that no line has are left out."""
+    every = dict.fromkeys(key for numbers in told.values() for key in numbers)
+    keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in told.values())]
+    rows: Rows = [
+        (name, *(with_prefix(x.get(key, np.nan), _unit(key)) for key in keys)) for name, x in told.items()
+    ]
+    return Table(title, (what, *(key.rpartition(" [")[0] for key in keys)), rows, note)
+
+
+def _unit(key: str) -> str:
+    return key.rpartition("[")[2].removesuffix("]")
+
+
+def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
+    """Estimated errors: a line for each source, a column for each kind of channel."""
+    cells = {
+        tuple(key.removeprefix(ERROR).split(", ", 1)): float(x)
+        for key, x in notes.items()
+        if key.startswith(ERROR) and ", " in key
+    }
+    cells |= {
+        ("together", key.removeprefix(TOGETHER)): float(x)
+        for key, x in notes.items()
+        if key.startswith(TOGETHER)
+    }
+    if not cells:
+        return []
+    kinds = list(dict.fromkeys(kind for _, kind in cells))
+    rows: Rows = [
+        (source, *(percent(cells[source, kind]) if (source, kind) in cells else "–" for kind in kinds))
+        for source in dict.fromkeys(source for source, _ in cells)
+    ]
+    said = "; ".join(str(x) for key, x in notes.items() if key.startswith("no estimate"))
+    note = "Of each channel's largest value." + (f" No estimate of {said}." if said else "")
+    return [Table("Estimated error", ("from", *kinds), rows, note)]
+
+
+def notes_table(notes: Mapping[str, str | float]) -> Table:
+    """All else that the run said of itself."""
+    told = (ERROR, TOGETHER, "no estimate")
+    plain = {key: x for key, x in notes.items() if not key.startswith(told)}
+    return named_table("What the run said of itself", plain.items())
+
+
+def named_table(title: str, items: Iterable[tuple[str, str | float]], unit: str = "") -> Table:
+    """Names and values."""
+    rows: Rows = [(key, x if isinstance(x, str) else f"{x:.4g}{unit}") for key, x in items]
+    return Table(title, (), rows)

@@ -1,0 +1,207 @@
+"""One HTML file about a run: what was modelled, what moves, curves, loads, warnings; it needs no network."""
+
+import json
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kedfem.errors import KedfemError, OutputError
+from kedfem.loads import moved
+from kedfem.output.derived import PICTURE, REPORT
+from kedfem.output.words import with_prefix
+from kedfem.report.curves import Curve, cursor_places, curve_groups, polar_curves
+from kedfem.report.facts import (
+    Table,
+    budget_table,
+    facts,
+    joints_table,
+    links_table,
+    loads_tables,
+    named_table,
+    notes_table,
+    peaks_table,
+)
+from kedfem.report.surfaces import Animated, animated
+from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
+from kedfem.results import Peak, Results, read_results, replacing, results_file
+from kedfem.results.extras import of_extra
+from kedfem.results.loads import drive_loads, joint_loads
+from kedfem.scene import scene_from
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A report that was written.
+
+    path : of the HTML file
+    warnings : what is missing in it, and why
+    """
+
+    path: Path
+    warnings: tuple[str, ...]
+
+
+def require_report(where: str) -> None:
+    """What a report needs is installed.
+
+    Raises
+    ------
+    OutputError
+    """
+    for package in ("jinja2", "k3d"):
+        of_extra(package, where, EXTRA)
+
+
+def write_report(given: Path, path: Path | None = None) -> Report:
+    """Write one HTML file about the results of a run, or of `kedfem kinematics`.
+
+    Parameters
+    ----------
+    given : `results.h5`, or the folder that has it
+    path : the file; `report.html` beside the results if not given
+
+    Raises
+    ------
+    OutputError
+        The results cannot be read, the file cannot be written, or what is needed is not installed.
+    """
+    require_report("kedfem report")
+    file = results_file(Path(given))
+    results, folder = read_results(file), file.parent
+    missing: list[str] = []
+    content = _content(results, folder, missing)
+    target = folder / REPORT if path is None else path
+    with replacing(target) as part:
+        part.write_text(_template().render(content, missing=missing), encoding="utf-8")
+    return Report(target, tuple(missing))
+
+
+def _template() -> Any:
+    import jinja2
+
+    loader = jinja2.PackageLoader("kedfem.report", "")
+    return jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True).get_template("page.html")
+
+
+def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, Any]:
+    """All that the template shows; what cannot be shown is added to what is missing, in words."""
+    scene: Mapping[str, Any] = json.loads(results.scene_json)
+    highest = max(results.peaks.values(), key=lambda peak: peak.stress, default=None)
+    if not len(results.time):
+        missing.append("no time step was written: there are no curves")
+    elif results.status in {"interrupted", "abandoned", "running"}:
+        missing.append(
+            "highest stresses, estimated errors and timing are found at the end of a run, which this is not"
+        )
+
+    def moment(time: float, angle: float) -> str:
+        return _moment(scene, results, time, angle)
+
+    loads, polars = _loads(scene, results, folder, missing)
+    picture = folder / PICTURE
+    return {
+        "title": scene.get("title") or folder.name.removesuffix("-results"),
+        "results": results,
+        "colours": gradient(),
+        "facts": facts(results, highest, moment),
+        "moving": _moving(scene, results, folder, highest, missing),
+        "picture": b64encode(picture.read_bytes()).decode() if picture.exists() else "",
+        "peaks": [peaks_table(results, moment)] if results.peaks else [],
+        "modelled": [links_table(scene, results), joints_table(scene)],
+        "loads": loads,
+        "groups": curve_groups(results) | ({"Bearing loads": polars} if polars else {}),
+        "trust": [*budget_table(results.notes), notes_table(results.notes)],
+        "seconds": [named_table("Seconds", results.seconds.items())] if results.seconds else [],
+        "scene": results.scene_toml or json.dumps(scene, indent=1),
+    }
+
+
+def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
+    """A time, with the drive's position if there is a drive."""
+    said = f"t = {with_prefix(time, 's')}"
+    if not (scene.get("drive") or scene.get("drives")):
+        return said
+    return f"{said}, {results.drive.name.replace('_', ' ')} {with_prefix(angle, results.drive.unit)}"
+
+
+def _moving(
+    scene: Mapping[str, Any], results: Results, folder: Path, highest: Peak | None, missing: list[str]
+) -> dict[str, Any] | None:
+    """The viewer, what each frame is in words, where the cursor stands in it, the frame that is shown first."""
+    animation = scene.get("output", {}).get("animation") or {}
+    scale = float(animation.get("deformation_scale", 1.0))
+    try:
+        shown = animated(folder, scale)
+    except OutputError as error:
+        missing.append(f"the mechanism is not drawn: {error}")
+        return None
+    if shown is None:
+        missing.append("the mechanism is not drawn: the run left neither an animation nor highest stresses")
+        return None
+    if not len(shown.times):
+        missing.append("the mechanism does not move: the run left no animation")
+    missing += shown.thinned
+    first = 0
+    if highest is not None and len(shown.times):
+        first = int(np.abs(shown.times - highest.time).argmin())
+    gravity = np.array(scene.get("gravity") or (0.0, 0.0, 0.0), float)
+    return {
+        "document": viewer(
+            shown, 0.0 if highest is None else highest.stress, _marks(scene, highest), gravity, first
+        ),
+        "frames": _frames(scene, results, shown, highest),
+        "cursor": cursor_places(results, shown.times),
+        "first": first,
+        "scale": f"{scale:g}" if any(each.stressed for each in shown.surfaces) else "",
+        "top": None if highest is None else _scale_of(highest.stress),
+    }
+
+
+def _scale_of(highest: float) -> list[str]:
+    """Numbers at the colour bar, from its upper end."""
+    return [with_prefix(highest * part, "Pa") for part in (1.0, 0.75, 0.5, 0.25)] + ["0"]
+
+
+def _frames(
+    scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None
+) -> Sequence[str]:
+    """What each frame is; after the last one links are as drawn, and no instant."""
+    angles = np.interp(shown.times, results.time, results.angle) if len(results.time) else 0 * shown.times
+    said = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
+    drawn = "links as drawn" + (", with the highest stress of each point over all steps" if highest else "")
+    return [*said, drawn]
+
+
+def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
+    """Joints, on a link that is not the ground, and the highest stress."""
+    marks = [
+        Mark(name, next(x for x in joint["links"] if x != "ground"), np.array(joint["at"], float))
+        for name, joint in scene["joints"].items()
+    ]
+    if highest is not None:
+        place = np.array(highest.place, float)
+        marks.append(Mark(with_prefix(highest.stress, "Pa"), highest.link, place, hot=True))
+    return marks
+
+
+def _loads(
+    raw: Mapping[str, Any], results: Results, folder: Path, missing: list[str]
+) -> tuple[list[Table], list[Curve]]:
+    """Tables of loads, and polar diagrams of those of bearings."""
+    if not len(results.time):
+        return [], []
+    try:
+        scene = scene_from(raw, folder.parent)
+    except KedfemError as error:
+        missing.append(f"loads of joints are left out, as the scene cannot be read again: {error}")
+        return [], []
+    linked, motion, why = moved(scene, results)
+    missing += why
+    rows = np.ones(len(results.time), bool)
+    joints = joint_loads(scene, results, linked, motion)
+    drives = drive_loads(scene, results, linked, motion)
+    return loads_tables(joints, drives, results, rows), list(polar_curves(joints, rows))

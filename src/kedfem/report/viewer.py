@@ -1,0 +1,190 @@
+"""The moving mechanism as a document that a browser draws, with nothing to fetch: a full snapshot of k3d."""
+
+import json
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.output.rendering import sight
+from kedfem.report.surfaces import Animated, Placement, Surface, bounds, extent
+from kedfem.results.extras import of_extra
+
+EXTRA = "report"
+"""The extra with what a report needs."""
+
+FINE = 1e-4
+"""Of the mechanism's size: to what places are rounded, so that the document packs well."""
+
+SHADES = 400
+"""Steps of the colour scale."""
+
+COMPRESSION = 6  # of zlib; 9 takes much longer for a hundredth
+LEAST = 0.08  # where the colour scale begins on matplotlib's turbo, whose lowest end is nearly black
+GREY, DARK, HOT = 0xB8BEC6, 0x1F2933, 0xC01030
+FIELD_OF_VIEW = 25.0  # degrees
+
+LISTENS = """
+const flat = %s;
+function look() {
+  const box = document.getElementById('canvasTarget').getBoundingClientRect();
+  const aspect = Math.max(box.width, 1) / Math.max(box.height, 1);
+  const half = 1.12 * Math.max(flat.high, flat.wide / aspect);
+  const far = half / Math.tan(flat.view * Math.PI / 360) + flat.deep;
+  K3DInstance.setCamera([...flat.middle.map((x, k) => x + far * flat.towards[k]), ...flat.middle, ...flat.up]);
+}
+window.addEventListener('message', (event) => {
+  if (event.source !== window.parent) return;
+  if (typeof event.data.frame === 'number') K3DInstance.setTime(event.data.frame);
+  if (event.data.look) look();
+});
+look();
+K3DInstance.setTime(flat.first);
+window.parent.postMessage({ready: true}, '*');
+"""
+"""What the viewer does when the page around it sends it a frame, or asks for the first view again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A point that goes with a link, with its name.
+
+    name, link : the link is None for a point of the ground
+    at : (3,) as drawn [m]
+    hot : whether it is the highest stress
+    """
+
+    name: str
+    link: str | None
+    at: Float[np.ndarray, "3"]
+    hot: bool = False
+
+
+def viewer(
+    shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int
+) -> str:
+    """An HTML document; it is told the frame by messages, the last but one of which is the highest stresses as drawn.
+
+    Parameters
+    ----------
+    highest : stress at the upper end of the colour scale [Pa]
+    first : the frame that is shown at first
+
+    Raises
+    ------
+    OutputError
+        k3d is not installed.
+    """
+    k3d = of_extra("k3d", "kedfem report", EXTRA)
+    size = float(np.linalg.norm(extent(shown.surfaces))) or 1.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of arrays that are copied
+        plot = k3d.plot(
+            snapshot_type="full", menu_visibility=False, grid_visible=False, camera_auto_fit=False,
+            time_interpolation=False, camera_fov=FIELD_OF_VIEW, axes_helper=0.9, colorbar_object_id=0,
+            label_color=DARK, lighting=2.0,
+        )  # fmt: skip
+        for surface in shown.surfaces:
+            plot += _mesh(k3d, surface, highest, FINE * size)
+        for mark in marks:
+            for drawn in _mark(k3d, mark, shown, size):
+                plot += drawn
+        return str(plot.get_snapshot(COMPRESSION, additional_js_code=_listens(shown, gravity, first)))
+
+
+def gradient() -> str:
+    """The colour scale for a style sheet, from its lower end."""
+    colours = (f"rgb({', '.join(f'{255 * x:.0f}' for x in rgb)}) {100 * part:.0f}%" for part, rgb in _scale())
+    return ", ".join(colours)
+
+
+def _scale() -> list[tuple[float, tuple[float, ...]]]:
+    """Parts of the highest stress and their red, green and blue."""
+    from matplotlib import colormaps
+
+    parts = np.linspace(0.0, 1.0, 41)
+    return [
+        (float(part), tuple(map(float, colormaps["turbo"](LEAST + (1 - LEAST) * part)[:3]))) for part in parts
+    ]
+
+
+def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
+    """A link over the frames; after the last one as drawn, with the highest stresses."""
+    count = len(surface.placements)
+    order = [*range(1, count + 1), 0]
+    vertices = _series([np.round(surface.points[k] / fine) * fine for k in order])
+    look: dict[str, Any] = {"color": GREY}
+    if surface.stressed and highest > 0:
+        shade = highest / SHADES
+        stress = [np.round(np.nan_to_num(surface.stress[k]) / shade) * shade for k in order]
+        look = {"attribute": _series(stress), "color_range": [0.0, highest]}
+        look["color_map"] = [x for part, rgb in _scale() for x in (part, *rgb)]
+    triangles = surface.triangles.astype(np.uint32)
+    mesh = k3d.mesh(
+        vertices, triangles, flat_shading=False, side="double", roughness=0.9, name=surface.name, **look
+    )
+    mesh.model_matrix = _series([*map(_matrix, surface.placements), np.eye(4)])
+    return mesh
+
+
+def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
+    """A ball and a name where a point of a link is in each frame."""
+    of = next((each for each in shown.surfaces if each.name == mark.link), None)
+    if mark.link is not None and of is None:
+        return []
+    places = [mark.at] * (len(shown.times) + 1)
+    if of is not None:
+        near = int(((of.points[0] - mark.at) ** 2).sum(axis=1).argmin())
+        places = [
+            placed.p + placed.R @ (points[near] if mark.hot else mark.at)
+            for points, placed in zip(of.points[1:], of.placements, strict=True)
+        ]
+        places.append(mark.at)
+    colour, radius = (HOT, 0.014) if mark.hot else (DARK, 0.011)
+    look = {"color": colour, "name": mark.name}
+    positions = _series([place[None] for place in places])
+    ball = k3d.points(positions, point_size=radius * size, shader="3d", **look)
+    word = {"size": 0.8, "reference_point": "lt", "is_html": True}
+    return [ball, k3d.text(escape(mark.name), position=_lists(places), **word, **look)]
+
+
+def _series(frames: Sequence[np.ndarray]) -> Any:
+    """A value for each frame, or one where there is a single one."""
+    if len(frames) == 1:
+        return frames[0].astype(np.float32)
+    return {str(float(k)): x.astype(np.float32) for k, x in enumerate(frames)}
+
+
+def _lists(places: Sequence[np.ndarray]) -> Any:
+    if len(places) == 1:
+        return places[0].tolist()
+    return {str(float(k)): x.tolist() for k, x in enumerate(places)}
+
+
+def _matrix(placed: Placement) -> Float[np.ndarray, "4 4"]:
+    out = np.eye(4)
+    out[:3, :3], out[:3, 3] = placed.R, placed.p
+    return out
+
+
+def _listens(shown: Animated, gravity: Float[np.ndarray, "3"], first: int) -> str:
+    """The script with the first view: all links in all frames, gravity downwards if it is known."""
+    towards, up = sight(extent(shown.surfaces))
+    if shown.seen_from is not None:
+        towards = shown.seen_from
+    if np.linalg.norm(np.cross(gravity, towards)) > 0.5 * np.linalg.norm(gravity) > 0:
+        up = -gravity
+    across = np.cross(up, towards)
+    across /= np.linalg.norm(across)
+    axes = np.array([across, np.cross(towards, across), towards])
+    low, high = bounds(shown.surfaces, axes)
+    wide, tall, deep = (high - low) / 2
+    told: Mapping[str, Any] = {
+        "middle": ((low + high) / 2 @ axes).tolist(), "towards": towards.tolist(), "up": axes[1].tolist(),
+        "wide": wide, "high": tall, "deep": deep, "view": FIELD_OF_VIEW, "first": first,
+    }  # fmt: skip
+    return LISTENS % json.dumps(told)

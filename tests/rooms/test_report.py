@@ -1,0 +1,313 @@
+"""The page about a run: it shows what the run wrote, fetches nothing, and tells what is missing."""
+
+import contextlib
+import json
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista
+from numpy.testing import assert_allclose
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from kedfem.analysis import analyse
+from kedfem.errors import OutputError
+from kedfem.kinematics import kinematics
+from kedfem.output.bars import bars, heights
+from kedfem.output.words import with_prefix
+from kedfem.report import surfaces, write_report
+from kedfem.report.curves import cursor_places, curve_groups
+from kedfem.report.surfaces import Animated, animated, placement
+from kedfem.results import read_results
+from kedfem.scene import scene_from
+from tests.browser import Browser, needs_browser
+from tests.scenes import arm, bar, cycloidal, four_bar
+
+SCALE = 50.0
+FRAMES = {"frames_per_revolution": 5, "deformation_scale": SCALE}
+TIMES = {"end_time": 0.1, "step": 2e-3, "accuracy": "quick", "initial": "quasi-static"}
+
+
+def output(**more: Any) -> dict[str, Any]:
+    return {"animation": FRAMES, "plots": False, "picture": False, **more}
+
+
+def swung(**more: Any) -> dict[str, Any]:
+    """A solid arm that a drive swings, with a probe."""
+    probes = {"tip": {"link": "arm", "at": [0.5, 0], "quantity": "displacement"}}
+    link = bar(0.5, 0.02, 0.02, mesh={"elements": [4, 1, 1]})
+    return arm(link, cycloidal(1.0, 0.1), analysis=TIMES, output=output(probes=probes, **more))
+
+
+def beams() -> dict[str, Any]:
+    link = {
+        "material": "steel", "fidelity": "beam", "mesh": {"elements": 2},
+        "shape": {"kind": "bar", "width": 0.02, "thickness": 0.01},
+    }  # fmt: skip
+    return four_bar((0.12, 0.35, 0.3, 0.38), link, cycloidal(1.0, 0.1), analysis=TIMES, output=output())
+
+
+def run(raw: Mapping[str, Any], folder: Path) -> Path:
+    return analyse(scene_from(raw, folder)).folder
+
+
+@pytest.fixture(scope="module")
+def solid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of the arm, with the page that the run itself wrote."""
+    return run(swung(report=True) | {"title": "An <arm> & its $drive$"}, tmp_path_factory.mktemp("solid"))
+
+
+@pytest.fixture(scope="module")
+def lines(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run(beams(), tmp_path_factory.mktemp("lines"))
+
+
+def page(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+AXES = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1], "oblique": [0.6, -0.5, 0.8]}
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+@pytest.mark.parametrize("angle", [0.0, 1.0, np.pi, 5.0])
+def test_rigid_motions_are_found_again(axis: list[float], angle: float) -> None:
+    X = np.random.default_rng(1).normal(size=(30, 3))
+    R = Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()
+    p = np.array([0.3, -2.0, 1.1])
+    found = placement(X, p + X @ R.T)
+    assert_allclose(found.R, R, atol=1e-12)
+    assert_allclose(found.p, p, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, np.pi / 2, 3.0, -2.0])
+def test_points_on_a_line_stay_in_their_plane(angle: float) -> None:
+    X = np.array([[0.1, 0.2, 0.5], [0.2, 0.2, 0.5], [0.6, 0.2, 0.5]])
+    R = Rotation.from_rotvec([0, 0, angle]).as_matrix()
+    found = placement(X, X @ R.T + [1.0, 2.0, 0.0], flat=True)
+    assert_allclose(found.R, R, atol=1e-12)
+    assert_allclose(found.p, [1.0, 2.0, 0.0], atol=1e-12)
+
+
+def frames_of(folder: Path) -> list[Any]:
+    return [pyvista.read(path) for path in sorted(folder.glob("animation_*.vtu"))]
+
+
+def shown(folder: Path) -> Animated:
+    found = animated(folder, SCALE)
+    assert found is not None
+    return found
+
+
+def test_solids_are_drawn_where_frames_have_them(solid: Path) -> None:
+    """Every point and its stress, in each frame; the links' axes move as the drive does; then as drawn."""
+    found, written = shown(solid), frames_of(solid)
+    (surface,) = found.surfaces
+    drawn, *placed = surface.world()
+    assert len(placed) == len(written) == 6
+    for points, stress, grid in zip(placed, surface.stress[1:], written, strict=True):
+        distance, near = KDTree(grid.points).query(points)
+        assert distance.max() < 1e-9
+        assert_allclose(stress, grid.point_data["von_mises"][near], rtol=1e-9)
+    envelope = pyvista.read(solid / "envelope.vtu")
+    distance, near = KDTree(envelope.points).query(drawn)
+    assert distance.max() < 1e-12
+    assert_allclose(surface.stress[0], envelope.point_data["highest von Mises stress [Pa]"][near], rtol=1e-12)
+    results = read_results(solid / "results.h5")
+    angles = [np.arctan2(each.R[1, 0], each.R[0, 0]) for each in surface.placements]
+    assert_allclose(angles, np.interp(found.times, results.time, results.angle), atol=1e-9)
+    outline = pyvista.PolyData(drawn, np.insert(surface.triangles, 0, 3, axis=1).ravel()).clean()
+    assert outline.volume == pytest.approx(0.5 * 0.02 * 0.02, rel=1e-9)
+
+
+def test_beams_are_drawn_with_their_sections_where_frames_have_them(lines: Path) -> None:
+    found, written = shown(lines), frames_of(lines)
+    assert {each.name for each in found.surfaces} == {"crank", "coupler", "rocker"}
+    for k, grid in enumerate(written):
+        grid.point_data["MPa"] = grid.point_data["von_mises"]
+        for surface in found.surfaces:
+            cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[f"link {surface.name}"][0]))
+            part = grid.extract_cells(cells)
+            tree = KDTree(bars(part, heights(part)).points)
+            assert (
+                tree.query(list(surface.world())[k + 1])[0].max() < 2e-6 * part.length
+            )  # corners are merged
+
+
+def test_large_models_are_thinned_and_say_so(solid: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(surfaces, "NODES", 60)
+    monkeypatch.setattr(surfaces, "FRAMES", 3)
+    found = shown(solid)
+    assert [text.partition(" of ")[0] for text in found.thinned[1:]] == ["3"]
+    assert "nodes on the links' surfaces are drawn" in found.thinned[0]
+    assert len(found.surfaces[0].points[0]) <= 80
+    low, high = surfaces.bounds(found.surfaces, np.eye(3))
+    assert_allclose(high - low, surfaces.bounds(found.surfaces[:1], np.eye(3))[1] - low, rtol=1e-12)
+
+
+def test_the_page_tells_the_run(solid: Path) -> None:
+    """Title, highest stress, probe, mass in closed form, the scene; escaped, and without anything to fetch."""
+    text, results = page(solid), read_results(solid / "results.h5")
+    assert "<h1>An &lt;arm&gt; &amp; its $drive$</h1>" in text
+    assert f"<b>{with_prefix(results.peaks['arm'].stress, 'Pa')}</b>" in text
+    assert f"{7850 * 0.5 * 0.02**2:.4g} kg" in text  # ρ V
+    assert results.warnings == read_results(solid / "results.h5").warnings
+    outside = re.sub(r'srcdoc="[^"]*"', "", text)
+    links = re.findall(r"""(?:src|href)\s*=\s*["']?([^"'\s>]+)""", outside)
+    assert all(each.startswith(("#", "data:")) for each in links)
+    assert not re.search(r"https?://(?!www\.w3\.org|purl\.org|creativecommons\.org)", outside)
+    assert "In this page" not in text
+    said = json.loads(re.search(r"const frames = (\[.*?\]), cursor", text)[1])  # type: ignore[index]
+    assert len(said) == 7
+    assert said[5].startswith("t = 100 ms, drive angle 57.3°")
+    assert "highest stress" in said[6]
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+def test_mass_properties_are_those_of_a_box(axis: list[float], tmp_path: Path) -> None:
+    """m = ρ a b c, its centre, and J = R diag(…) Rᵀ along x, y, z and oblique."""
+    from kedfem.accuracy.prepared import meshed
+    from kedfem.results.modelled import modelled
+
+    e = np.array(axis) / np.linalg.norm(axis)
+    link = {
+        "material": "steel", "mesh": {"elements": [2, 1, 1]},
+        "shape": {"kind": "bar", "between": [[0, 0, 0], list(0.4 * e)], "width": 0.03, "thickness": 0.02},
+    }  # fmt: skip
+    across = np.cross(e, [0.3, 0.9, -0.2])
+    raw = arm(link, cycloidal(1.0, 0.1), analysis=TIMES, output=output())
+    raw["joints"] = {
+        "A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0], "axis": list(across)}
+    }
+    ready = meshed(scene_from(raw, tmp_path))
+    found = modelled(ready.scene, ready.linkage, ready.model)["arm"]
+    m, (a, b, c) = 7850 * 0.4 * 0.03 * 0.02, (0.4, 0.03, 0.02)
+    assert found["mass [kg]"] == pytest.approx(m, rel=1e-9)
+    assert_allclose(found["centre of mass [m]"], 0.2 * e, atol=1e-9)
+    xx, yy, zz, xy, yz, zx = found["inertia [kg m^2]"]
+    J = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+    own = sorted(m / 12 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]))
+    assert_allclose(np.linalg.eigvalsh(J), own, rtol=1e-8)
+    assert_allclose(J @ e, own[0] * e, atol=1e-8 * own[2])
+
+
+def test_the_cursor_is_at_the_drive(solid: Path) -> None:
+    """Over the angle of a cycloid, τ − sin 2πτ/2π, in frames a fifth of the run apart."""
+    results = read_results(solid / "results.h5")
+    tau = np.linspace(0, 1, 6)
+    places = tau - np.sin(2 * np.pi * tau) / (2 * np.pi)
+    assert_allclose(cursor_places(results, shown(solid).times), places, atol=1e-9)
+    every = [curve for group in curve_groups(results).values() for curve in group]
+    assert list(curve_groups(results))[:2] == ["Probes", "Drive"]
+    for left, right, top, bottom in (curve.box for curve in every if curve.box):
+        assert 0 < left < right < 1
+        assert 0 < top < bottom < 1
+
+
+def told(folder: Path) -> str:
+    done = write_report(folder)
+    assert all(text in page(folder).replace("&#39;", "'") for text in done.warnings)
+    return "; ".join(done.warnings)
+
+
+def test_what_is_missing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without animation as drawn; without anything to draw; damaged frames; rows of a run that was stopped; no rows."""
+    folder = run(swung(animation=False), tmp_path)
+    assert "does not move: the run left no animation" in told(folder)
+    for name in ("envelope.vtu", "worst.vtu"):
+        (folder / name).unlink()
+    assert "not drawn: the run left neither an animation nor highest stresses" in told(folder)
+    (folder / "worst.vtu").write_bytes(b"<VTKFile>")
+    assert "worst.vtu: must be a file of kedfem's, got one that cannot be read" in told(folder)
+    from kedfem.results import ResultsWriter
+
+    before = read_results(folder / "results.h5")
+    channels = [channel for channel, _ in before.channels.values()]
+    rows = {name: values[:3] for name, (_, values) in before.channels.items()}
+    stopped = ResultsWriter(folder / "results.h5", channels, before.scene_json, None, {})
+    with contextlib.suppress(KeyboardInterrupt), stopped as writer:
+        writer.append(before.time[:3], before.angle[:3], rows)
+        raise KeyboardInterrupt
+    assert "found at the end of a run, which this is not" in told(folder)
+    assert "Not a whole run: interrupted" in page(folder)
+    with ResultsWriter(folder / "results.h5", channels, before.scene_json, None, {}):
+        pass
+    assert "no time step was written" in told(folder)
+
+
+def test_loads_of_a_scene_that_cannot_be_read_again_are_left_out(solid: Path, tmp_path: Path) -> None:
+    import shutil
+
+    import h5py
+
+    from kedfem.results.layout import OF_CHANNELS, seal
+
+    folder = Path(shutil.copytree(solid, tmp_path / "results"))
+    with h5py.File(folder / "results.h5", "r+") as file:
+        scene = json.loads(file["scene/json"][()])
+        del file["scene/json"], file.attrs[OF_CHANNELS]
+        file["scene/json"] = json.dumps(scene | {"unknown": 1})
+        seal(file)
+    assert "loads of joints are left out, as the scene cannot be read again: unknown" in told(folder)
+    assert "Highest stress of each link" in page(folder)
+
+
+def test_rigid_motions_have_a_page_too(tmp_path: Path) -> None:
+    done = kinematics(scene_from(beams(), tmp_path), tmp_path / "moved")
+    assert told(done.folder) == ""
+    found = animated(done.folder, 1.0)
+    assert found is not None
+    assert {each.name for each in found.surfaces} == {"crank", "coupler", "rocker"}
+    assert not any(each.stressed for each in found.surfaces)
+
+
+@pytest.mark.parametrize("package", ["k3d", "jinja2"])
+def test_a_missing_package_is_told_before_the_run(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(OutputError, match=rf"output.report: needs {package}.*pip install 'kedfem\[report\]'"):
+        run(swung(report=True), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@needs_browser
+@pytest.mark.long
+def test_a_browser_draws_moves_and_prints_it(solid: Path) -> None:
+    """Links are drawn, the slider moves them and the cursor, nothing is fetched, no error; on a phone and on paper."""
+    with Browser(1280, 800) as browser:
+        browser.open(solid / "report.html", "document.body?.dataset.ready === '1'")
+        browser.value("document.querySelector('.view').scrollIntoView()")
+        slide = "(slider.value = {0}, slider.oninput(), cursorAt())"
+        browser.value("window.cursorAt = () => parseFloat(document.querySelector('figure i').style.left)")
+
+        def coloured() -> np.ndarray:
+            return np.ptp(browser.pixels()[:500, :1000].astype(int), axis=2) > 60
+
+        first = browser.value(slide.format(0))
+        browser.wait(lambda: coloured().sum() > 2000)
+        start = coloured()
+        last = browser.value(slide.format(5))
+        browser.wait(lambda: (coloured() != start).sum() > 2000)
+        box = browser.value("Object.assign({}, document.querySelector('figure i').dataset)")
+        assert [first, last] == pytest.approx([100 * float(box["left"]), 100 * float(box["right"])])
+        browser.value("document.getElementById('highest').click()")
+        assert "highest stress" in browser.value("document.getElementById('when').textContent")
+        browser.resize(390, 800)
+        assert browser.value("document.documentElement.scrollWidth") <= 390
+        printed = browser.call("Page.printToPDF")["data"]
+        assert len(printed) > 20_000
+        kinds = [event["method"] for event in browser.events]
+        assert "Runtime.exceptionThrown" not in kinds
+        assert "Log.entryAdded" not in kinds
+        asked = [
+            event["params"]["request"]["url"]
+            for event in browser.events
+            if event["method"] == "Network.requestWillBeSent"
+        ]
+        assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in asked)
