@@ -8,6 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from kedfem.cli.comparing import compare
+from kedfem.cli.exporting import export
 from kedfem.cli.frequencies import frequencies
 from kedfem.cli.loading import loads
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
@@ -355,6 +356,7 @@ app.command()(frequencies)
 app.command()(loads)
 app.command()(compare)
 app.command()(report)
+app.command()(export)
 app.command()(view)
 
 

@@ -1,0 +1,218 @@
+"""An elastic link as matrices for other programs: mass, stiffness, modes, and what its ports mean."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+
+from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.model import segments
+from kedfem.dynamics.places import seat_of
+from kedfem.errors import MeshError, OutputError, SceneError
+from kedfem.links.coupling_surfaces import CouplingSurface, port_weights, seat_couples
+from kedfem.links.record import Link
+from kedfem.links.reduced import rigid_modes
+from kedfem.motion.assembly import assembled
+from kedfem.results import replacing
+from kedfem.results.files import reason
+from kedfem.results.modelled import element_words
+from kedfem.scene import Scene, corotational, rayleigh
+from kedfem.scene.faults import one_of
+
+MOST = 6000
+"""Unknowns up to which dense matrices are written: 300 MB each."""
+
+FORMAT = "kedfem link 1"
+ENDINGS = (".npz", ".mat")
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedLink:
+    """A link alone, in its own frame, which is the world's axes as drawn: M q'' + (α M + β K) q' + K q = Tᵀ F + Θᵀ N.
+
+    name, model : of the link; what it was made from, in words
+    mass, stiffness : (k, k) M [kg], K [N/m]
+    damping : (2,) α [1/s], β [s]
+    ports : (p,) names of its joints
+    places : (p, 3) of the joints as drawn [m]
+    translation : (p, 3, k) T: displacement of each port [-]
+    rotation : (p, 3, k) Θ: small rotation of each port [1/m]; zero where `turns` is false
+    turns : (p, 3) whether the port's rotation about x, y, z is known: not of a single node, of planar links about z alone
+    rigid : (k, r) small motions without strain: 1 m along x, y, z, 1 rad about x, y, z through the origin; of planar
+        links along x, y and about z
+    nodes : (n, 3) of the mesh as drawn [m]; none of beams
+    modes : (n, s) node a moves by Σ_m modes[a, m] q[d m : d m + d], d = k / s directions
+    cells : (e, m) elements, nodes in VTK's order
+    """
+
+    name: str
+    model: str
+    mass: Float[np.ndarray, "k k"]
+    stiffness: Float[np.ndarray, "k k"]
+    damping: Float[np.ndarray, "2"]
+    ports: tuple[str, ...]
+    places: Float[np.ndarray, "p 3"]
+    translation: Float[np.ndarray, "p 3 k"]
+    rotation: Float[np.ndarray, "p 3 k"]
+    turns: Bool[np.ndarray, "p 3"]
+    rigid: Float[np.ndarray, "k r"]
+    nodes: Float[np.ndarray, "n 3"]
+    modes: Float[np.ndarray, "n s"]
+    cells: Int[np.ndarray, "e m"]
+
+
+def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda name: None) -> ExportedLink:
+    """The matrices that a run of a scene has of one link, with what is attached to it.
+
+    Raises
+    ------
+    KedfemError
+        There is no such elastic link, its frames are co-rotational, it has too many unknowns, or cannot be meshed.
+    """
+    if name not in scene.links:
+        raise SceneError(f"--link: {one_of(list(scene.links), name)}")
+    if scene.links[name].fidelity == "rigid":
+        raise SceneError("--link: must be an elastic link, got a rigid one")
+    scene, _ = assembled(scene)
+    plan = plan_for(scene, stage)
+    scene = plan.scene if plan else scene
+    if corotational(scene):
+        raise SceneError(
+            "analysis.frames: must be rigid-body for the matrices of a link, got co-rotational ones, whose stiffness "
+            'goes with many frames: take `frames = "rigid-body"`'
+        )
+    ready, _ = prepared(scene, stage)
+    found = segments(ready.model)
+    if name not in found:
+        raise SceneError(f"--link: must be an elastic link, got '{name}', which moves as a rigid body")
+    (link,) = found[name]
+    if link.unknowns > MOST:
+        raise SceneError(
+            f"links.{name}: must have {MOST:,} unknowns at most, as its matrices are dense, got {link.unknowns:,}: take "
+            '`fidelity = "reduced"`'
+        )
+    return _exported(scene, name, link)
+
+
+def _exported(scene: Scene, name: str, link: Link) -> ExportedLink:
+    joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
+    k = link.unknowns
+    translation, rotation = np.zeros((2, len(joints), 3, k))
+    turns = np.zeros((len(joints), 3), bool)
+    for p, (key, joint) in enumerate(joints.items()):
+        seat = seat_of(scene, key, link)
+        translation[p] = _translation(link, seat, np.asarray(joint.at))
+        turns[p], rotation[p] = _rotation(link, seat)
+    shown, meshed = link.full or link, link.meshed
+    modes = link.Q if link.Q is not None else np.eye(link.n)
+    places = np.array([joint.at for joint in joints.values()], float).reshape(-1, 3)
+    return ExportedLink(
+        name, element_words([link]), _mass(link), _dense(link.K0), np.array(rayleigh(scene.damping)), tuple(joints),
+        places, translation, rotation, turns, _rigid(link), shown.X if meshed else np.zeros((0, 3)),
+        modes if meshed else np.zeros((0, link.n)), shown.cells if meshed else np.zeros((0, 0), int),
+    )  # fmt: skip
+
+
+def _dense(A: Any) -> Float[np.ndarray, "k k"]:
+    return np.asarray(A.toarray() if sp.issparse(A) else A, float)
+
+
+def _mass(link: Link) -> Float[np.ndarray, "k k"]:
+    """The scalar mass matrices of all components, dof d·function + component."""
+    d, out = link.d, np.zeros((link.unknowns, link.unknowns))
+    for c, m in enumerate(link.mass):
+        out[c::d, c::d] = _dense(m)
+    return out
+
+
+def _rigid(link: Link) -> Float[np.ndarray, "k r"]:
+    """Its motions without strain, turns in the order x, y, z."""
+    found = rigid_modes(link)
+    return found if link.planar else found[:, [0, 1, 2, 4, 5, 3]]
+
+
+def _translation(link: Link, seat: CouplingSurface, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 k"]:
+    """Of the affine field of a coupling surface at a joint's place."""
+    weights = port_weights(seat, at[None])[0]
+    out = np.zeros((3, link.n, link.d))
+    for c in range(2 if link.planar else 3):
+        out[c, :, c] = weights
+    return out.reshape(3, -1)
+
+
+def _rotation(link: Link, seat: CouplingSurface) -> tuple[Bool[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
+    """Of the affine field of a coupling surface, of a planar beam its section's; about which axes it is known."""
+    out = np.zeros((3, link.n, link.d))
+    if link.kind == "beam":
+        out[2, :, 2] = seat.fit[0]
+        return np.array([False, False, True]), out.reshape(3, -1)
+    try:
+        out[:] = seat_couples(link, seat, "joint")
+    except MeshError:
+        return np.zeros(3, bool), np.zeros((3, link.unknowns))
+    return np.array([not link.planar, not link.planar, True]), out.reshape(3, -1)
+
+
+def write_link(link: ExportedLink, path: Path) -> None:
+    """Write the matrices as `.npz` of NumPy or `.mat` of MATLAB, version 5.
+
+    Raises
+    ------
+    OutputError
+        The file has another ending, or cannot be written.
+    """
+    require_ending(path)
+    data = {each.name: getattr(link, each.name) for each in fields(link)} | {"format": FORMAT}
+    with replacing(path) as part, part.open("wb") as file:
+        if path.suffix == ".npz":
+            np.savez_compressed(file, **data)
+        else:
+            from scipy.io import savemat
+
+            savemat(file, data | {"ports": np.array(link.ports, object)}, do_compression=True)
+
+
+def require_ending(path: Path) -> None:
+    """A file of a kind that is known.
+
+    Raises
+    ------
+    OutputError
+    """
+    if path.suffix not in ENDINGS:
+        raise OutputError(f"{path}: must end in .npz or .mat, got '{path.suffix}'")
+
+
+def read_link(path: Path) -> ExportedLink:
+    """The matrices of a file that :func:`write_link` wrote.
+
+    Raises
+    ------
+    OutputError
+        It is not such a file.
+    """
+    try:
+        if path.suffix == ".mat":
+            from scipy.io import loadmat
+
+            data = loadmat(path)
+            data |= {key: data[key].ravel()[0] for key in ("name", "model", "format")}
+            data["ports"] = [str(each.ravel()[0]) for each in data["ports"].ravel()]
+            data["damping"] = data["damping"].ravel()
+        else:
+            with np.load(path, allow_pickle=False) as file:
+                data = dict(file)
+        if str(data["format"]) != FORMAT:
+            raise ValueError(f"format '{data['format']}'")
+        texts = {key: str(data[key]) for key in ("name", "model")}
+        ports = {"ports": tuple(map(str, data["ports"])), "turns": data["turns"].astype(bool)}
+        return ExportedLink(**{each.name: data[each.name] for each in fields(ExportedLink)} | texts | ports)
+    except OSError as error:
+        raise OutputError(f"{path}: must be a link that kedfem wrote, got {reason(error)}") from error
+    except Exception as error:
+        raise OutputError(f"{path}: must be a link that kedfem wrote, got another file ({error})") from error
