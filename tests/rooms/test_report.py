@@ -3,6 +3,7 @@
 import contextlib
 import json
 import re
+import shutil
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -222,8 +223,6 @@ def test_what_is_missing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     for name in ("envelope.vtu", "worst.vtu"):
         (folder / name).unlink()
     assert "not drawn: the run left neither an animation nor highest stresses" in told(folder)
-    (folder / "worst.vtu").write_bytes(b"<VTKFile>")
-    assert "worst.vtu: must be a file of kedfem's, got one that cannot be read" in told(folder)
     from kedfem.results import ResultsWriter
 
     before = read_results(folder / "results.h5")
@@ -240,9 +239,25 @@ def test_what_is_missing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "no time step was written" in told(folder)
 
 
-def test_loads_of_a_scene_that_cannot_be_read_again_are_left_out(solid: Path, tmp_path: Path) -> None:
-    import shutil
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.7, 0.999])
+def test_damaged_frames_are_told_in_words_alone(
+    part: float, solid: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Cut off, or with other bytes in the middle; the rest of the page is there, VTK says nothing."""
+    folder = Path(shutil.copytree(solid, tmp_path / "r"))
+    frame = folder / "animation_0002.vtu"
+    whole = frame.read_bytes()
+    cut = int(part * len(whole))
+    for content in (whole[:cut], whole[:cut] + b"%&/()" * 20 + whole[cut + 100 :]):
+        frame.write_bytes(content)
+        done = write_report(folder)
+        assert all("animation_0002.vtu: must be a file of kedfem's" in text for text in done.warnings)
+        assert done.warnings or len(content) == len(whole)
+        assert "Highest stress of each link" in page(folder)
+    assert capfd.readouterr() == ("", "")
 
+
+def test_loads_of_a_scene_that_cannot_be_read_again_are_left_out(solid: Path, tmp_path: Path) -> None:
     import h5py
 
     from kedfem.results.layout import OF_CHANNELS, seal

@@ -125,15 +125,24 @@ def _axis(joint: Mapping[str, Any]) -> str:
 
 
 def peaks_table(results: Results, moment: Callable[[float, float], str]) -> Table:
-    """The highest stress of each link, and away from where it is not what it seems."""
-    rows: Rows = []
-    for name, peak in results.peaks.items():
-        for label, each in ((name, peak), ("away from it", peak.away)):
-            if each is not None:
-                at = moment(each.time, each.angle)
-                rows.append((label, with_prefix(each.stress, "Pa"), place_of(each.place), at, each.near))
+    """The highest stress of each link, over all steps."""
     head = ("link", "von Mises stress", "at, as drawn", "when", "near")
-    return Table("Highest stress of each link, over all steps", head, rows)
+    return Table("Highest stress of each link, over all steps", head, peak_rows(results.peaks, moment))
+
+
+def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) -> Rows:
+    """Link, stress, place, when and near what, of each link's peak, and of that away from where it is not what it seems.
+
+    Parameters
+    ----------
+    moment : a time [s] and the drive's position there [rad or m] in words
+    """
+    return [
+        (label, with_prefix(x.stress, "Pa"), place_of(x.place), moment(x.time, x.angle), x.near)
+        for name, peak in peaks.items()
+        for label, x in ((name, peak), ("  away from it", peak.away))
+        if x is not None
+    ]
 
 
 def loads_tables(

@@ -1,6 +1,9 @@
 """The surfaces of a mechanism's links over an animation, from its frames: what a browser draws."""
 
+import logging
+import warnings
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -138,15 +141,39 @@ def _frames(folder: Path) -> list[Path]:
 
 
 def _read(path: Path) -> Any:
+    """A VTU file.
+
+    Raises
+    ------
+    OutputError
+        It is not one of kedfem's, or damaged.
+    """
     import pyvista
 
-    try:
-        grid = pyvista.read(path)
-    except Exception as error:
-        raise OutputError(f"{path}: must be a file of kedfem's, got one that cannot be read") from error
-    if not grid.n_points or "link" not in grid.cell_data:
-        raise OutputError(f"{path}: must be a file of kedfem's, got one without links")
+    wanted = f"{path}: must be a file of kedfem's"
+    with _quiet():
+        try:
+            grid = pyvista.read(path)
+            known = "link" in grid.cell_data and np.isfinite(grid.points).all()
+        except Exception as error:
+            raise OutputError(f"{wanted}, got one that cannot be read") from error
+    if not grid.n_points or not known:
+        raise OutputError(f"{wanted}, got one that is damaged or has no links")
     return grid
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """VTK, and those who tell its messages again, say nothing on the terminal."""
+    import pyvista
+
+    with pyvista.vtk_verbosity("off"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        logging.disable()
+        try:
+            yield
+        finally:
+            logging.disable(logging.NOTSET)
 
 
 class _Source:

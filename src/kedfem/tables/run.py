@@ -1,6 +1,7 @@
 """What a run found: largest values, balance, seconds."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from rich.table import Table
@@ -9,7 +10,8 @@ from rich.text import Text
 from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
-from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
+from kedfem.output.words import NOTHING, clock, moment, with_prefix
+from kedfem.report.facts import peak_rows
 from kedfem.results import Peak
 from kedfem.results.balance import Balance
 from kedfem.scene import Scene, without_vibration
@@ -66,11 +68,8 @@ def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
     table = Table(title="Highest von Mises stress, over all steps")
     for column in ("link", "stress", "at, as drawn", clock(scene), "near"):
         table.add_column(column, justify="right" if column == "stress" else "left", overflow="fold")
-    for name, peak in peaks.items():
-        for label, each in ((name, peak), ("  away from it", peak.away)):
-            if each is not None:
-                at = moment(scene, each.time, each.angle)
-                table.add_row(label, with_prefix(each.stress, "Pa"), place_of(each.place), at, each.near)
+    for row in peak_rows(peaks, partial(moment, scene)):
+        table.add_row(*row)
     return table
 
 
