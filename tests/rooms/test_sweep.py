@@ -1,5 +1,10 @@
 """`kedfem sweep`: keys, values, rows of points, continuing, files, refusals."""
 
+import json
+import signal
+import subprocess
+import sys
+import time
 from concurrent.futures import Executor, Future
 from itertools import pairwise
 from pathlib import Path
@@ -248,3 +253,46 @@ def test_a_point_whose_worker_is_lost_is_a_failed_row(tmp_path: Path) -> None:
     again = run(Inline())
     assert again.before == 2
     assert [row.status for row in again.rows] == ["complete"] * 3
+
+
+def inline(value: Any) -> str:
+    """A value in TOML."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {inline(each)}' for key, each in value.items())} }}"
+    return f"[{', '.join(map(inline, value))}]" if isinstance(value, (list, tuple)) else json.dumps(value)
+
+
+@pytest.mark.long
+def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_path: Path) -> None:
+    """SIGKILL after some rows, workers being at work: these rows stay, the table is that of a whole sweep."""
+    raw, over = arm(), "drive.speed=100rpm:400rpm:10"
+    scene = tmp_path / "arm.toml"
+    scene.write_text("\n".join(f"{key} = {inline(value)}" for key, value in raw.items()), encoding="utf-8")
+    command = [
+        sys.executable,
+        "-m",
+        "kedfem",
+        "sweep",
+        str(scene),
+        "--over",
+        over,
+        "--quick",
+        "--workers",
+        "2",
+    ]
+    killed = subprocess.Popen([*command, "--folder", str(tmp_path / "killed")], stderr=subprocess.DEVNULL)
+    end = time.monotonic() + 120
+    while len(kept := list((tmp_path / "killed").glob("rows/*.json"))) < 2 and killed.poll() is None:
+        assert time.monotonic() < end, "no point was finished"
+        time.sleep(0.01)
+    killed.kill()
+    assert killed.wait() == -signal.SIGKILL
+    before = {path.name: path.read_bytes() for path in kept}
+    subprocess.run([*command, "--folder", str(tmp_path / "killed")], check=True, capture_output=True)
+    for name, content in before.items():
+        assert (tmp_path / "killed" / "rows" / name).read_bytes() == content
+    assert len(list((tmp_path / "killed").glob("rows/*"))) == 10
+    sweep(Base(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "whole", executor=Inline())
+    tables = [(tmp_path / folder / "sweep.csv").read_text() for folder in ("killed", "whole")]
+    assert tables[0] == tables[1]
+    assert tables[0].count("complete") == 10

@@ -41,7 +41,7 @@ def _written(given: Path, file: Path | None) -> Path:
     from kedfem.report import require_report, write_report
 
     require_report("kedfem report")
-    folder = _of_scene(given) if given.suffix in {".toml", ".json"} else given
+    folder = _of_scene(given) if given.suffix == ".toml" else given
     with progress() as watch:
         watch("report", 0, 0)
         done = write_report(folder, file)
