@@ -174,7 +174,8 @@ def _ran(job: Job) -> Row:
         folder = job.folder or FilePath(stack.enter_context(TemporaryDirectory(prefix="kedfem-sweep-")))
         update: dict[str, Any] = {"folder": str(folder.absolute())}
         if job.folder is None:
-            update |= dict.fromkeys(("csv", "parquet", "plots", "picture", "report"), False) | {"animation": None}
+            update |= dict.fromkeys(("csv", "parquet", "plots", "picture", "report"), False)
+            update["animation"] = None
         output = scene.output.model_copy(update=update)
         run = analyse(scene.model_copy(update={"output": output}), stresses_since=since)
         results = run.results
