@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.dense import as_dense
 from kedfem.dynamics.model import segments
 from kedfem.dynamics.places import seat_of
 from kedfem.errors import MeshError, OutputError, SceneError
@@ -21,8 +20,7 @@ from kedfem.motion.assembly import assembled
 from kedfem.results import replacing
 from kedfem.results.files import reason
 from kedfem.results.modelled import element_words
-from kedfem.scene import Scene, corotational, rayleigh
-from kedfem.scene.faults import one_of
+from kedfem.scene import Scene, corotational, rayleigh, require_elastic
 
 MOST = 6000
 """Unknowns up to which dense matrices are written: 300 MB each."""
@@ -74,10 +72,7 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
     KedfemError
         There is no such elastic link, its frames are co-rotational, it has too many unknowns, or cannot be meshed.
     """
-    if name not in scene.links:
-        raise SceneError(f"--link: {one_of(list(scene.links), name)}")
-    if scene.links[name].fidelity == "rigid":
-        raise SceneError("--link: must be an elastic link, got a rigid one")
+    require_elastic(scene.links, name)
     scene, _ = assembled(scene)
     plan = plan_for(scene, stage)
     scene = plan.scene if plan else scene
@@ -112,21 +107,17 @@ def _exported(scene: Scene, name: str, link: Link) -> ExportedLink:
     modes = link.Q if link.Q is not None else np.eye(link.n)
     places = np.array([joint.at for joint in joints.values()], float).reshape(-1, 3)
     return ExportedLink(
-        name, element_words([link]), _mass(link), _dense(link.K0), np.array(rayleigh(scene.damping)), tuple(joints),
+        name, element_words([link]), _mass(link), as_dense(link.K0), np.array(rayleigh(scene.damping)), tuple(joints),
         places, translation, rotation, turns, _rigid(link), shown.X if meshed else np.zeros((0, 3)),
         modes if meshed else np.zeros((0, link.n)), shown.cells if meshed else np.zeros((0, 0), int),
     )  # fmt: skip
-
-
-def _dense(A: Any) -> Float[np.ndarray, "k k"]:
-    return np.asarray(A.toarray() if sp.issparse(A) else A, float)
 
 
 def _mass(link: Link) -> Float[np.ndarray, "k k"]:
     """The scalar mass matrices of all components, dof d·function + component."""
     d, out = link.d, np.zeros((link.unknowns, link.unknowns))
     for c, m in enumerate(link.mass):
-        out[c::d, c::d] = _dense(m)
+        out[c::d, c::d] = as_dense(m)
     return out
 
 

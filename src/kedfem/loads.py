@@ -61,10 +61,8 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
     results = read_results(path)
     _refuse(path, results, last)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)
-    linked, motion, why = moved(scene, results)
     rows = last_turns(results, last)
-    joints = joint_loads(scene, results, linked, motion)
-    drives = drive_loads(scene, results, linked, motion)
+    joints, drives, why = loads_of(scene, results)
     if not joints and not drives:
         raise OutputError(f"{path}: must have forces of joints or of a drive, got none")
     target = ready_folder(folder or path.parent / "loads")
@@ -73,13 +71,20 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
         write_polar(target / f"joint {joint.joint}.png", joint, rows)
     for drive in drives:
         write_drive_load(target / f"drive {drive.joint}.csv", drive, results, rows)
-    told = _told(joints, drives, results, rows)
+    told = summaries(joints, drives, results, rows)
     write_summary(target / JOINTS, "joint", told[0])
     write_summary(target / DRIVES, "drive", told[1])
     return Loads(target, *told, (*why, *_missing(scene, joints), *_partial(results)))
 
 
-def _told(
+def loads_of(scene: Scene, results: Results) -> tuple[list[JointLoad], list[DriveLoad], tuple[str, ...]]:
+    """Of all joints and drives whose forces the results tell, over time; and what is not known of them, and why."""
+    linked, motion, why = _moved(scene, results)
+    joints = joint_loads(scene, results, linked, motion)
+    return joints, drive_loads(scene, results, linked, motion), why
+
+
+def summaries(
     joints: list[JointLoad], drives: list[DriveLoad], results: Results, rows: Bool[np.ndarray, " T"]
 ) -> tuple[dict[str, Mapping[str, float]], dict[str, Mapping[str, float]]]:
     """Numbers of all joints and drives."""
@@ -101,7 +106,7 @@ def _refuse(path: FilePath, results: Results, last: float | None) -> None:
         raise OutputError("--last: counts revolutions of the drive, got a drive that slides: leave it out")
 
 
-def moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:
+def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:
     """The rigid motion at the rows of the results; where it is not known why."""
     left = "loads are in the world's axes alone, without bearing loads and power"
     if scene.driven is None:

@@ -13,6 +13,7 @@ TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
 UNACCOUNTED = 0.5  # of energy or momentum
 LEAST = 0.005  # what no run warns of
+OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,13 +155,13 @@ def percent(error: float) -> str:
 def attributes(budget: Budget) -> dict[str, float | str]:
     """The budget as notes of a results file."""
     notes: dict[str, float | str] = {
-        f"error of {share.source}, {kind}": error
+        f"{OF_SOURCE}{share.source}, {kind}": error
         for share in budget.shares
         for kind, error in share.errors.items()
     }
-    notes |= {f"error together, {kind}": error for kind, error in budget.together.items()}
+    notes |= {f"{TOGETHER}{kind}": error for kind, error in budget.together.items()}
     notes |= {f"mesh error of {link}, energy norm": error for link, error in budget.links.items()}
-    notes |= {f"no estimate {k}": text for k, text in enumerate(budget.limits, start=1)}
+    notes |= {f"{UNKNOWN}{k}": text for k, text in enumerate(budget.limits, start=1)}
     return notes
 
 

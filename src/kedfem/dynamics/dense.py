@@ -49,7 +49,7 @@ class Coordinates(Protocol):
 def dense_part(link: Link, joint: Attachment, c_M: float, c_K: float) -> DensePart:
     """A link in mass-orthonormal coordinates; its ports are held by a null-space basis, so that a long step, where A
     nearly lets a free link go, does no harm."""
-    T = tuple(_mass_orthonormal(_dense(m)) for m in link.mass)
+    T = tuple(_mass_orthonormal(as_dense(m)) for m in link.mass)
     n, unit = link.n, all(np.array_equal(t, np.eye(link.n)) for t in T)
     A = c_K * _symmetric(component_first(T, link.K0))
     A[np.diag_indices(len(A))] += c_M
@@ -81,7 +81,7 @@ def _mass_orthonormal(m: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
 def component_first(T: Sequence[Float[np.ndarray, "n n"]], K: Any) -> Float[np.ndarray, "N N"]:
     """Tᵀ K T of a matrix on states, component by component."""
     n, d = len(T[0]), len(T)
-    blocks = _dense(K).reshape(n, d, n, d).transpose(1, 0, 3, 2)
+    blocks = as_dense(K).reshape(n, d, n, d).transpose(1, 0, 3, 2)
     return np.concatenate(
         [np.concatenate([T[i].T @ blocks[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)]
     )
@@ -119,5 +119,6 @@ def _symmetric(A: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:
     return np.asarray((A + A.T) / 2)
 
 
-def _dense(matrix: Any) -> np.ndarray:
+def as_dense(matrix: Any) -> np.ndarray:
+    """A matrix, sparse or not, as an array."""
     return matrix.toarray() if sp.issparse(matrix) else np.asarray(matrix)

@@ -33,7 +33,7 @@ from kedfem.output.shapes import Shape, write_shapes
 from kedfem.output.vtu import LinkField
 from kedfem.results import claimed
 from kedfem.results.frequencies import write_part_frequencies
-from kedfem.scene import ChosenFace, LinkScene, Material, Scene
+from kedfem.scene import ChosenFace, LinkScene, Material, Scene, require_elastic
 from kedfem.scene.faults import either, one_of
 
 Watch = Callable[[str, int, int], None]
@@ -125,10 +125,7 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
     KedfemError
         With a message for the user.
     """
-    if name not in scene.links:
-        raise SceneError(f"--link: {one_of(list(scene.links), name)}")
-    if scene.links[name].fidelity == "rigid":
-        raise SceneError("--link: must be an elastic link, got a rigid one")
+    require_elastic(scene.links, name)
     for joint in joints:
         _check(scene, name, joint)
     plan = plan_for(scene, lambda stage: None)

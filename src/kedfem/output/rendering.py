@@ -139,15 +139,29 @@ def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
     seen = next((each for each in sides(direction) if not hidden(grid, each)), None)
     cut = grid.points[int(np.nanargmax(grid.point_data["von_mises"]))] if seen is None else None
     direction = direction if seen is None else seen
-    if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
-        upwards = -gravity
-    across = np.cross(upwards, direction)
-    across /= np.linalg.norm(across)
-    up = np.cross(direction, across)
+    across, up = picture_axes(direction, upwards, gravity)
     drawn = grid.points @ np.column_stack([across, up])
     low, high = drawn.min(axis=0), drawn.max(axis=0)
     edge = max(4 * THINNEST * grid.length, *heights(grid).max(axis=0, initial=0.0))
     return View(direction, across, up, (low + high) / 2, high - low + edge, cut)
+
+
+def picture_axes(
+    direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"], gravity: Float[np.ndarray, " 3"]
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Unit vectors to the right and upwards in a picture: against gravity, unless it is looked along or unknown.
+
+    Parameters
+    ----------
+    direction : (3,) [-], towards the eye
+    upwards : (3,) [-], about upwards where gravity does not tell
+    gravity : (3,) [m/s²]
+    """
+    if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
+        upwards = -gravity
+    across = np.cross(upwards, direction)
+    across /= np.linalg.norm(across)
+    return across, np.cross(direction, across)
 
 
 def sides(direction: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:

@@ -1,19 +1,15 @@
 """What a report tells in tables, from results and the scene that they are of."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
 
-from kedfem.accuracy.error_budget import percent
+from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
 from kedfem.output.words import place_of, with_prefix
 from kedfem.results import Peak, Results
-from kedfem.results.loads import DriveLoad, JointLoad, drive_summary, summary
 
-ERROR = "error of "
-TOGETHER = "error together, "
 Rows = list[tuple[str, ...]]
 
 
@@ -146,17 +142,15 @@ def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) 
 
 
 def loads_tables(
-    joints: Sequence[JointLoad], drives: Sequence[DriveLoad], results: Results, rows: Bool[np.ndarray, " T"]
+    joints: Mapping[str, Mapping[str, float]], drives: Mapping[str, Mapping[str, float]]
 ) -> list[Table]:
-    """Numbers for suppliers of bearings and motors."""
+    """Numbers for suppliers of bearings and motors, by name of the joint."""
     out = []
     if joints:
-        told = {each.joint: summary(each, results, rows) for each in joints}
         note = "Equivalent bearing loads: mean by the power 3 (ball) or 10/3 (roller), ISO 281, over the whole run."
-        out.append(_numbers("Joint forces", "joint", told, note))
+        out.append(_numbers("Joint forces", "joint", joints, note))
     if drives:
-        told = {each.joint: drive_summary(each, results, rows) for each in drives}
-        out.append(_numbers("Drive", "joint", told, "Power is positive where the drive drives."))
+        out.append(_numbers("Drive", "joint", drives, "Power is positive where the drive drives."))
     return out
 
 
@@ -177,9 +171,9 @@ def _unit(key: str) -> str:
 def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
     """Estimated errors: a line for each source, a column for each kind of channel."""
     cells = {
-        tuple(key.removeprefix(ERROR).split(", ", 1)): float(x)
+        tuple(key.removeprefix(OF_SOURCE).split(", ", 1)): float(x)
         for key, x in notes.items()
-        if key.startswith(ERROR) and ", " in key
+        if key.startswith(OF_SOURCE) and ", " in key
     }
     cells |= {
         ("together", key.removeprefix(TOGETHER)): float(x)
@@ -193,19 +187,19 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
         (source, *(percent(cells[source, kind]) if (source, kind) in cells else "–" for kind in kinds))
         for source in dict.fromkeys(source for source, _ in cells)
     ]
-    said = "; ".join(str(x) for key, x in notes.items() if key.startswith("no estimate"))
+    said = "; ".join(str(x) for key, x in notes.items() if key.startswith(UNKNOWN))
     note = "Of each channel's largest value." + (f" No estimate of {said}." if said else "")
     return [Table("Estimated error", ("from", *kinds), rows, note)]
 
 
 def notes_table(notes: Mapping[str, str | float]) -> Table:
     """All else that the run said of itself."""
-    told = (ERROR, TOGETHER, "no estimate")
+    told = (OF_SOURCE, TOGETHER, UNKNOWN)
     plain = {key: x for key, x in notes.items() if not key.startswith(told)}
     return named_table("What the run said of itself", plain.items())
 
 
-def named_table(title: str, items: Iterable[tuple[str, str | float]], unit: str = "") -> Table:
+def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:
     """Names and values."""
-    rows: Rows = [(key, x if isinstance(x, str) else f"{x:.4g}{unit}") for key, x in items]
+    rows: Rows = [(key, x if isinstance(x, str) else f"{x:.4g}") for key, x in items]
     return Table(title, (), rows)

@@ -4,13 +4,14 @@ import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kedfem.errors import KedfemError, OutputError
-from kedfem.loads import moved
+from kedfem.loads import loads_of, summaries
 from kedfem.output.derived import PICTURE, REPORT
 from kedfem.output.words import with_prefix
 from kedfem.report.curves import Curve, cursor_places, curve_groups, polar_curves
@@ -29,7 +30,6 @@ from kedfem.report.surfaces import Animated, animated
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
 from kedfem.results.extras import of_extra
-from kedfem.results.loads import drive_loads, joint_loads
 from kedfem.scene import scene_from
 
 
@@ -98,9 +98,7 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
             "highest stresses, estimated errors and timing are found at the end of a run, which this is not"
         )
 
-    def moment(time: float, angle: float) -> str:
-        return _moment(scene, results, time, angle)
-
+    moment = partial(_moment, scene, results)
     loads, polars = _loads(scene, results, folder, missing)
     picture = folder / PICTURE
     return {
@@ -199,9 +197,7 @@ def _loads(
     except KedfemError as error:
         missing.append(f"loads of joints are left out, as the scene cannot be read again: {error}")
         return [], []
-    linked, motion, why = moved(scene, results)
+    joints, drives, why = loads_of(scene, results)
     missing += why
     rows = np.ones(len(results.time), bool)
-    joints = joint_loads(scene, results, linked, motion)
-    drives = drive_loads(scene, results, linked, motion)
-    return loads_tables(joints, drives, results, rows), list(polar_curves(joints, rows))
+    return loads_tables(*summaries(joints, drives, results, rows)), list(polar_curves(joints, rows))

@@ -95,11 +95,8 @@ def animated(folder: Path, deformation_scale: float) -> Animated | None:
         A file is not one that kedfem wrote.
     """
     files = _frames(folder)
-    shown = (
-        [files[k] for k in np.unique(np.linspace(0, len(files) - 1, FRAMES).round().astype(int))]
-        if files
-        else []
-    )
+    count = min(len(files), FRAMES)
+    shown = [files[k] for k in np.linspace(0, len(files) - 1, count).round().astype(int)]
     drawn = folder / ENVELOPE
     pattern = shown[0] if shown else folder / WORST if (folder / WORST).exists() else drawn
     if not pattern.exists():
@@ -288,11 +285,10 @@ def placement(X: Places, x: Places, flat: bool = False) -> Placement:
 
 def _sources(first: Any, reference: Any) -> tuple[list[_Source], tuple[str, ...]]:
     """The links of a frame with surfaces that are small enough, and what was left out."""
-    known = 0 if reference is None else reference.n_points  # sliders without a shape are not in the envelope
-    same = known <= first.n_points
     X = np.array(first.points, float)
     highest = np.full(first.n_points, np.nan)
-    if reference is not None and same:
+    if reference is not None and reference.n_points <= first.n_points:
+        known = reference.n_points  # sliders without a shape are not in the envelope
         X[:known] = reference.points
         if HIGHEST in reference.point_data:
             highest[:known] = reference.point_data[HIGHEST]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.rendering import sight
+from kedfem.output.rendering import picture_axes, sight
 from kedfem.report.surfaces import Animated, Placement, Surface, bounds, extent
 from kedfem.results.extras import of_extra
 
@@ -67,7 +67,7 @@ class Mark:
 def viewer(
     shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int
 ) -> str:
-    """An HTML document; it is told the frame by messages, the last but one of which is the highest stresses as drawn.
+    """An HTML document that is told the frame by messages; after the last one links are as drawn, with highest stresses.
 
     Parameters
     ----------
@@ -80,7 +80,8 @@ def viewer(
         k3d is not installed.
     """
     k3d = of_extra("k3d", "kedfem report", EXTRA)
-    size = float(np.linalg.norm(extent(shown.surfaces))) or 1.0
+    taken = extent(shown.surfaces)
+    size = float(np.linalg.norm(taken)) or 1.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of arrays that are copied
         plot = k3d.plot(
@@ -93,7 +94,7 @@ def viewer(
         for mark in marks:
             for drawn in _mark(k3d, mark, shown, size):
                 plot += drawn
-        return str(plot.get_snapshot(COMPRESSION, additional_js_code=_listens(shown, gravity, first)))
+        return str(plot.get_snapshot(COMPRESSION, additional_js_code=_listens(shown, taken, gravity, first)))
 
 
 def gradient() -> str:
@@ -116,18 +117,18 @@ def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
     """A link over the frames; after the last one as drawn, with the highest stresses."""
     count = len(surface.placements)
     order = [*range(1, count + 1), 0]
-    vertices = _series([np.round(surface.points[k] / fine) * fine for k in order])
+    vertices = _series([(np.round(surface.points[k] / fine) * fine).astype(np.float32) for k in order])
     look: dict[str, Any] = {"color": GREY}
     if surface.stressed and highest > 0:
         shade = highest / SHADES
-        stress = [np.round(np.nan_to_num(surface.stress[k]) / shade) * shade for k in order]
-        look = {"attribute": _series(stress), "color_range": [0.0, highest]}
+        stress = (np.round(np.nan_to_num(surface.stress[k]) / shade) * shade for k in order)
+        look = {"attribute": _series([x.astype(np.float32) for x in stress]), "color_range": [0.0, highest]}
         look["color_map"] = [x for part, rgb in _scale() for x in (part, *rgb)]
     triangles = surface.triangles.astype(np.uint32)
     mesh = k3d.mesh(
         vertices, triangles, flat_shading=False, side="double", roughness=0.9, name=surface.name, **look
     )
-    mesh.model_matrix = _series([*map(_matrix, surface.placements), np.eye(4)])
+    mesh.model_matrix = _series([*map(_matrix, surface.placements), np.eye(4, dtype=np.float32)])
     return mesh
 
 
@@ -146,41 +147,31 @@ def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
         places.append(mark.at)
     colour, radius = (HOT, 0.014) if mark.hot else (DARK, 0.011)
     look = {"color": colour, "name": mark.name}
-    positions = _series([place[None] for place in places])
+    positions = _series([place[None].astype(np.float32) for place in places])
     ball = k3d.points(positions, point_size=radius * size, shader="3d", **look)
     word = {"size": 0.8, "reference_point": "lt", "is_html": True}
-    return [ball, k3d.text(escape(mark.name), position=_lists(places), **word, **look)]
+    at = _series([place.tolist() for place in places])
+    return [ball, k3d.text(escape(mark.name), position=at, **word, **look)]
 
 
-def _series(frames: Sequence[np.ndarray]) -> Any:
+def _series(frames: Sequence[Any]) -> Any:
     """A value for each frame, or one where there is a single one."""
-    if len(frames) == 1:
-        return frames[0].astype(np.float32)
-    return {str(float(k)): x.astype(np.float32) for k, x in enumerate(frames)}
-
-
-def _lists(places: Sequence[np.ndarray]) -> Any:
-    if len(places) == 1:
-        return places[0].tolist()
-    return {str(float(k)): x.tolist() for k, x in enumerate(places)}
+    return frames[0] if len(frames) == 1 else {str(float(k)): x for k, x in enumerate(frames)}
 
 
 def _matrix(placed: Placement) -> Float[np.ndarray, "4 4"]:
-    out = np.eye(4)
+    out = np.eye(4, dtype=np.float32)
     out[:3, :3], out[:3, 3] = placed.R, placed.p
     return out
 
 
-def _listens(shown: Animated, gravity: Float[np.ndarray, "3"], first: int) -> str:
+def _listens(
+    shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int
+) -> str:
     """The script with the first view: all links in all frames, gravity downwards if it is known."""
-    towards, up = sight(extent(shown.surfaces))
-    if shown.seen_from is not None:
-        towards = shown.seen_from
-    if np.linalg.norm(np.cross(gravity, towards)) > 0.5 * np.linalg.norm(gravity) > 0:
-        up = -gravity
-    across = np.cross(up, towards)
-    across /= np.linalg.norm(across)
-    axes = np.array([across, np.cross(towards, across), towards])
+    towards, up = sight(taken)
+    towards = towards if shown.seen_from is None else shown.seen_from
+    axes = np.array([*picture_axes(towards, up, gravity), towards])
     low, high = bounds(shown.surfaces, axes)
     wide, tall, deep = (high - low) / 2
     told: Mapping[str, Any] = {

@@ -29,14 +29,19 @@ def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[
     """Link → facts about it, as `Results.links` has them."""
     inertias, out = inertias_of_model(scene, linkage, model), dict[str, Mapping[str, Any]]()
     for name, parts in segments(model).items():
-        out[name] = {
-            "model": element_words(parts),
-            "elements": sum(len(part.cells) for part in parts),
-            "unknowns": sum(part.unknowns for part in parts),
-        }
+        out[name] = element_facts(parts)
     out |= {carried.link.name: {"model": "rigid, with the drive"} for carried in model.carried}
     out |= {slider.name: {"model": "rigid slider"} for slider in model.sliders}
     return {name: {**facts, **_masses(inertias, linkage.bodies.index(name))} for name, facts in out.items()}
+
+
+def element_facts(parts: Sequence[Link]) -> Mapping[str, Any]:
+    """What a link, or its segments, is made of: `model`, `elements`, `unknowns`."""
+    return {
+        "model": element_words(parts),
+        "elements": sum(len(part.cells) for part in parts),
+        "unknowns": sum(part.unknowns for part in parts),
+    }
 
 
 def element_words(parts: Sequence[Link]) -> str:

@@ -95,7 +95,8 @@ class ResultsWriter:
         self.channels = tuple(channels)
         self.rows = 0
         self._scene = {"json": scene_json} | ({} if scene_toml is None else {"toml": scene_toml})
-        self._notes = dict(notes)
+        self._notes = {name: fact for name, fact in notes.items() if not isinstance(fact, Mapping)}
+        self._links = {name: facts for name, facts in notes.items() if isinstance(facts, Mapping)}
         self._part = own_part(self.path)
         self._published = False
         self._file: Any = None
@@ -221,11 +222,9 @@ class ResultsWriter:
         for key, text in self._scene.items():
             write_text(scene, key, text)
         notes = self._file.create_group("notes")
-        for name, fact in self._notes.items():
-            if isinstance(fact, Mapping):
-                write_facts(notes.create_group(name), fact)
-            else:
-                write_facts(notes, {name: fact})
+        write_facts(notes, self._notes)
+        for name, facts in self._links.items():
+            write_facts(notes.create_group(name), facts)
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if len(channel.columns) > 1 else ()
             rows = new_rows(self._file, channel.name, width)
@@ -253,8 +252,7 @@ class ResultsWriter:
             self._file.pop(name, None)
         for rows in found.values():
             rows.resize(self._before, axis=0)
-        plain = {name: fact for name, fact in self._notes.items() if not isinstance(fact, Mapping)}
-        write_facts(self._file["notes"], plain)
+        write_facts(self._file["notes"], self._notes)
         write_facts(self._file, {"status": "running", "reason": ""})
         seal(self._file)
         self.rows = self._before

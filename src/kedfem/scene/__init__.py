@@ -8,7 +8,7 @@ from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import corotational, corotational_links, link_frames
 from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, factor_table, factors, is_constant, load_factor, path_parameter
-from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing
+from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing, require_elastic
 from kedfem.scene.loads import (
     Body,
     BodyLoad,
@@ -117,6 +117,7 @@ __all__ = [
     "rayleigh",
     "read_keys",
     "read_scene",
+    "require_elastic",
     "scene_from",
     "spatial_beams",
     "time_grid",

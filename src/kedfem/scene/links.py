@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
 
+from kedfem.errors import SceneError
 from kedfem.scene.apart import Apart, JointPoint, apart
 from kedfem.scene.base import FileName, Record, refuse
 from kedfem.scene.bushings import Bushing
@@ -253,3 +254,16 @@ class Joint(Record):
     @model_validator(mode="after")
     def _hinge_along_z(self) -> Self:
         return self.fill(axis=(0.0, 0.0, 1.0)) if self.kind == "revolute" and self.axis is None else self
+
+
+def require_elastic(links: Mapping[str, LinkScene], name: str) -> None:
+    """An elastic link of a scene, named by --link.
+
+    Raises
+    ------
+    SceneError
+    """
+    if name not in links:
+        raise SceneError(f"--link: {one_of(list(links), name)}")
+    if links[name].fidelity == "rigid":
+        raise SceneError("--link: must be an elastic link, got a rigid one")

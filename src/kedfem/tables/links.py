@@ -6,7 +6,7 @@ from rich.text import Text
 from kedfem.dynamics.model import Model, segments, ways
 from kedfem.links.record import Link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
-from kedfem.results.modelled import element_words
+from kedfem.results.modelled import element_facts
 
 
 def link_table(model: Model) -> Table:
@@ -15,10 +15,8 @@ def link_table(model: Model) -> Table:
     for column in ("link", "kind", "elements", "unknowns", "mass", "quality"):
         table.add_column(column, justify="left" if column in ("link", "kind") else "right", overflow="fold")
     for name, parts in segments(model).items():
-        elements, unknowns = (
-            str(sum(each)) for each in ([len(x.cells) for x in parts], [x.unknowns for x in parts])
-        )
-        table.add_row(name, element_words(parts), elements, unknowns, _mass(*parts), _quality(*parts))
+        facts = map(str, element_facts(parts).values())
+        table.add_row(name, *facts, _mass(*parts), _quality(*parts))
     for carried in model.carried:
         table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
     for slider in model.sliders:
