@@ -1,4 +1,4 @@
-"""Co-rotational frames where it is difficult: docs/theory.md (Hard cases) lists what these cases find."""
+"""Co-rotational frames where it is difficult: docs/theory/errors.md (Hard cases) lists what these cases find."""
 
 from pathlib import Path
 from typing import Any

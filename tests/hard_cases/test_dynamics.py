@@ -1,4 +1,4 @@
-"""Elastic motion where it is difficult: docs/theory.md (Accuracy) lists what these cases find."""
+"""Elastic motion where it is difficult: docs/theory/errors.md (Hard cases) lists what these cases find."""
 
 from contextlib import suppress
 from typing import Any

@@ -37,7 +37,7 @@ def _moving(scene: Scene) -> str | None:
 
 
 def stability_warning(scene: Scene) -> tuple[str, ...]:
-    """A warning where vibration that the step cannot resolve may grow (docs/theory.md)."""
+    """A warning where vibration that the step cannot resolve may grow (docs/theory/errors.md)."""
     fewest, steps = fewest_steps(scene), time_grid(scene).steps
     if steps >= fewest:
         return ()

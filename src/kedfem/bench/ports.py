@@ -150,7 +150,7 @@ def _after(size: Size) -> str:
         "## How stiff",
         "",
         "What of a bore's displacement is no rigid motion costs energy, κ = `STIFF` · E / radius",
-        "([theory.md](theory.md#rigid-couplings)). By `STIFF`: how far the pulled bore is out of round, as "
+        "([theory.md](theory/joints.md#rigid-couplings)). By `STIFF`: how far the pulled bore is out of round, as "
         "a part of what an",
         f"averaged one is; how far its deflection is above that with {TRIED[-1]:.0e}; and how many times worse than with",
         f"distributing couplings the matrix of a step of {STEP:g} s is conditioned.",

@@ -1,6 +1,6 @@
 """Levels in time: the same motion in steps of h, h/2 (and h/4) side by side, combined state by state at common times.
 
-The error of a step of generalised-α has an expansion in powers of h (docs/theory.md): c₂ h² + c₃ h³ + c₄ h⁴ …, where
+The error of a step of generalised-α has an expansion in powers of h (docs/theory/time-integration.md): c₂ h² + c₃ h³ + c₄ h⁴ …, where
 numerical damping alone makes c₃, which goes with ((1 − ρ∞)/(1 + ρ∞))³ and is 2e-5 at the default ρ∞ = 0.95. So
 
     two levels    (4 x_{h/2} − x_h)/3                                    order 4, with little numerical damping

@@ -150,7 +150,7 @@ def _usual_segments(
     Cuts of stubby slices would soften the link, which bends little anyway.
 
     Their error falls with the square of their number: 6 leave 1 to 2 % of the peak stress of links that bend by 2 % of
-    their length (docs/theory.md).
+    their length (docs/theory/links.md).
     """
     e = along(link, ends)
     length, across = np.ptp(link.X @ e), link.X - np.outer(link.X @ e, e)
