@@ -215,7 +215,7 @@ def test_segments_of_a_beam_in_nominal_frames_are_the_whole_beam(kind: str) -> N
     ],
 )
 def test_cuts_of_meshed_links_make_them_hardly_softer(kind: str, wanted: dict[int, float]) -> None:
-    """Affine-fitted cuts let the two sides warp apart: softer, as docs/theory/corotational.md says; 12 layers of elements."""
+    """Affine-fitted cuts let both sides warp apart: softer, as docs/theory/corotational.md says; 12 layers."""
     link = segments(kind, 1)[0]
     across = np.array([0.0, 1, 0])
     whole = tip_deflection(link, across)[1]
