@@ -13,9 +13,9 @@ Equation (20) turns K with the rigid-body motion, which leaves two things out:
 * **Large turns.** Where N vanishes, as under a force across a cantilever, the error is of second order, c ψ².
 
 All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
-factor of e is measured, on the four-bar of [KED] (docs/theory/errors.md): 3. One is the change of stiffness itself; the rest is
-the joint forces, which change as the deflected links pass them on, and the time that a changed stiffness shifts. An arm
-alone on its foot does not have that, and the estimate is then up to four times too large. c is that of the elastica
+factor of e is measured, on the four-bar of [KED] (docs/theory/errors.md): 3. One is the change of stiffness itself; the
+rest is the joint forces, which change as the deflected links pass them on, and the time that a changed stiffness shifts.
+An arm on its foot does not have that, and the estimate is then up to four times too large. c is that of the elastica
 under a load across its tip.
 
 N comes from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean

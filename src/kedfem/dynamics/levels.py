@@ -1,7 +1,8 @@
 """Levels in time: the same motion in steps of h, h/2 (and h/4) side by side, combined state by state at common times.
 
-The error of a step of generalised-α has an expansion in powers of h (docs/theory/time-integration.md): c₂ h² + c₃ h³ + c₄ h⁴ …, where
-numerical damping alone makes c₃, which goes with ((1 − ρ∞)/(1 + ρ∞))³ and is 2e-5 at the default ρ∞ = 0.95. So
+The error of a step of generalised-α has an expansion in powers of h, c₂ h² + c₃ h³ + c₄ h⁴ …
+(docs/theory/time-integration.md), where numerical damping alone makes c₃,
+which goes with ((1 − ρ∞)/(1 + ρ∞))³ and is 2e-5 at the default ρ∞ = 0.95. So
 
     two levels    (4 x_{h/2} − x_h)/3                                    order 4, with little numerical damping
     three levels  (r E_{h/2} − E_h)/(r − 1), E_h = (4 x_{h/2} − x_h)/3   r = 16: order 6; r = 8: order 4, without h³

@@ -37,7 +37,7 @@ from kedfem.results.resistance import Last, last_of, products, resistance
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
 LITTLE = 1e-3  # of the kinetic energy: where less is exchanged, shares of it would be of next to nothing
-UNBALANCED = 0.02  # runs that resolve what moves leave 1e-6 to 3e-3, too long steps 0.1 (docs/theory/evaluation.md)
+UNBALANCED = 0.02  # resolved motion leaves 1e-6 to 3e-3, too long steps 0.1 (docs/theory/evaluation.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)], and of springs in joints"),
