@@ -1,1 +1,1 @@
-"""Benchmarks that are no part of the program: figures of docs/, regenerated."""
+"""Benchmarks: every figure in docs/performance.md comes from here, by `python -m benchmarks.WHAT`."""

@@ -62,7 +62,7 @@ def map_of(ready: Prepared) -> PeriodMap:
     def motion_at(t: Any) -> Any:
         return rigid_motion(ready.linkage, ready.path, t, path_parameter(scene, t))
 
-    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(ready.model))
+    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(ready.model))  # type: ignore[union-attr]
 
 
 def timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float]:

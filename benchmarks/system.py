@@ -116,7 +116,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
     steps, solves = [], []
     for _ in range(TURNS + 1):
         began = process_time()
-        solver.advance(state, forcings(model, motion), motion)
+        solver.advance(state, forcings(model, motion), motion)  # type: ignore[arg-type]
         steps.append(process_time() - began)
         began = process_time()
         for _ in range(count):

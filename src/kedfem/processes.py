@@ -5,6 +5,7 @@ Nothing else in kedfem may need Linux; what a system does not know is left out h
 
 import _thread
 import os
+import platform
 import signal
 import sys
 import threading
@@ -206,3 +207,17 @@ def private(path: Path) -> bool:
         return True
     status = path.stat()
     return status.st_uid == os.getuid() and not status.st_mode & 0o022
+
+
+def machine() -> str:
+    """The machine and the threads allowed, in words."""
+    from kedfem import __version__
+
+    name = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = cpuinfo.read_text().splitlines()
+        name = next((line.split(":", 1)[1].strip() for line in lines if "model name" in line), name)
+    threads = os.environ.get("OMP_NUM_THREADS", "not set")
+    software = f"Python {platform.python_version()}, kedfem {__version__}"
+    return f"{name}, {os.cpu_count()} cores, OMP_NUM_THREADS {threads}, {software}"

@@ -1,14 +1,15 @@
 """The benchmark of the elements: its parts against beam theory, and how it reads a cost from errors."""
 
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.elements import cost
+from benchmarks.pages import DOCS, MEASURED, table, write_page
+from benchmarks.parts import BAR, FORMS, STEEL, answer
+from benchmarks.ports import bench_ports
 from numpy.testing import assert_allclose
-
-from kedfem.bench import BENCHMARKS
-from kedfem.bench.elements import cost
-from kedfem.bench.parts import BAR, FORMS, STEEL, answer
 
 
 @pytest.mark.parametrize(("element", "size"), [("hex27", (8, 1, 1)), ("hex20", (8, 1, 1))])
@@ -42,6 +43,22 @@ def test_cost_counts_no_error_that_rises_again_and_no_target_that_is_missed() ->
     assert cost(work, [1e-3, 1e-3, 1e-1], 1e-2) is None
 
 
+def words(page: str) -> list[str]:
+    """What stands outside its tables, without the machine."""
+    return [line.partition(MEASURED)[0] for line in page.splitlines() if not line.startswith("|")]
+
+
+def test_tables_take_the_places_of_former_ones(tmp_path: Path) -> None:
+    new = [table(("a", "b"), [(str(k), "2")]) for k in range(3)]
+    write_page(tmp_path, "performance/growth", new[:1])
+    text, former = ((folder / "growth.md").read_text("utf-8") for folder in (tmp_path, DOCS / "performance"))
+    assert words(text) == words(former)
+    assert "\n\n| a | b |\n|---|---|\n| 0 | 2 |\n\n" in text
+    assert "| factor | " in text  # the second table, for which there is none
+    with pytest.raises(ValueError, match="3 tables, got 2"):
+        write_page(tmp_path, "performance/growth", new)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "pictures"),
@@ -53,17 +70,20 @@ def test_cost_counts_no_error_that_rises_again_and_no_target_that_is_missed() ->
     ],
 )
 def test_a_benchmark_writes_its_page(name: str, pictures: list[str], tmp_path: Path) -> None:
-    text = BENCHMARKS[name](tmp_path, True, lambda stage, done, total: None)
-    assert (tmp_path / f"{name}.md").read_text(encoding="utf-8") == text
-    assert f"`kedfem bench {name}`" in text
+    benchmark = getattr(import_module(f"benchmarks.{name}"), f"bench_{name}")
+    benchmark(tmp_path, True)
+    text, former = ((folder / f"{name}.md").read_text("utf-8") for folder in (tmp_path, DOCS / "performance"))
+    assert f"`python -m benchmarks.{name}`" in text
+    assert text != former
+    assert words(text) == words(former)
     for picture in pictures:
         assert f"({picture})" in text
         assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_study_of_ports_shows_stiffer_and_less_stressed_plates(tmp_path: Path) -> None:
-    text = BENCHMARKS["ports"](tmp_path, True, lambda *_: None)
-    assert (tmp_path / "ports.md").read_text("utf-8") == text
+    bench_ports(tmp_path, True)
+    text = (tmp_path / "ports.md").read_text("utf-8")
     (row,) = [line for line in text.splitlines() if line.startswith("| 2×1 |")]
     changes = [float(cell.split(": ")[1].split()[0]) for cell in row.split("|")[3:-1]]
     pull, bend, frequency, *stress = changes

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.linalg
+from benchmarks.scenes import mechanisms
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed, moving
-from kedfem.bench.scenes import mechanisms
 from kedfem.dynamics.inertias import (
     Inertias,
     acting,

@@ -8,11 +8,11 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from benchmarks.scenes import mechanisms
 from numpy.testing import assert_allclose
 from PIL import Image
 
 from kedfem.accuracy.prepared import moving
-from kedfem.bench.scenes import mechanisms
 from kedfem.cli import USER_ERROR
 from kedfem.dynamics.inertias import inertias_of_links
 from kedfem.kinematics import coarse, kinematics, rigid_links, worst_angle

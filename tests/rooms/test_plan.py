@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.accuracy import kept
+from benchmarks.mechanisms import MECHANISMS
 from typer.testing import CliRunner
 
 from kedfem.accuracy.histories import histories, relative_errors, worst
@@ -15,8 +17,6 @@ from kedfem.accuracy.plan import MESH, MODEL, REDUCTION, STEP, Plan, plan_for, p
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.trials import Trials
 from kedfem.analysis import analyse
-from kedfem.bench.accuracy import kept
-from kedfem.bench.mechanisms import MECHANISMS
 from kedfem.cli import app
 from kedfem.scene import scene_from, time_grid
 from tests import scenes

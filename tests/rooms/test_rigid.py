@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.scenes import mechanisms
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.bench.scenes import mechanisms
 from kedfem.scene import scene_from
 from tests.runs import ran
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.scenes import mechanisms
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.bench.scenes import mechanisms
 from kedfem.dynamics.transient import steps_of, transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from

@@ -200,7 +200,7 @@ def accuracy(
     """Run a scene in many variants: how fast, how near to the finest."""
     from kedfem.accuracy.study import studied
     from kedfem.accuracy.study_files import write_study, write_study_plot
-    from kedfem.bench.machine import machine
+    from kedfem.processes import machine
     from kedfem.results import ready_folder
     from kedfem.scene import read_scene
     from kedfem.tables import study_tables
@@ -326,29 +326,6 @@ def compile_() -> None:
     with progress() as watch:
         precompile(watch)
     out.print("compiled")
-
-
-@app.command()
-def bench(
-    what: Annotated[
-        str,
-        typer.Argument(
-            metavar="WHAT",
-            help="One of: accuracy, beams, corotational, elements, growth, kinematics, levels, plane, ports, reduction, "
-            "solvers, start, steps, suite.",
-        ),
-    ],
-    folder: Annotated[Path, typer.Option(help="Where table and plot go.")] = Path("docs/performance"),
-    quick: Annotated[bool, typer.Option("--quick", help="Small sizes only, to try it.")] = False,
-) -> None:
-    """Measure kedfem on this machine: ratios within one run."""
-    from kedfem.bench import BENCHMARKS
-
-    if what not in BENCHMARKS:
-        raise SceneError(f"WHAT: must be one of {', '.join(BENCHMARKS)}, got '{what}'")
-    with progress() as watch:
-        text = BENCHMARKS[what](folder, quick, watch)
-    out.print(text, markup=False, soft_wrap=True)
 
 
 app.command()(sweep)

@@ -14,7 +14,7 @@ from kedfem.dynamics.transient import Steps
 from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 
-# of a link of N unknowns, from `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD)
+# of a link of N unknowns, from `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD)
 FACTOR_FLOPS, SOLVE_BYTES = 1.0e4, 45.0  # times N^1.5
 SWEEPS = 4.0  # times the work of a step with rigid-body frames, where frames follow
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes

@@ -4,7 +4,7 @@ import os
 
 from kedfem.errors import MeshError
 
-#: Of a link of N unknowns, `kedfem bench growth` and slender bars (27-node hexahedra, CHOLMOD): bytes of the factor
+#: Of a link of N unknowns, `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD): bytes of the factor
 #: over N^1.5, of what is kept over N, and of what is there while one link is assembled.
 FACTOR_BYTES, LINK_BYTES, ASSEMBLY_BYTES = 22.0, 5e3, 1.5e4
 PLANE_FILL = 0.1  # of the factor that a plane mesh has, from 18,000 to 240,000 unknowns

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from kedfem.bench.machine import seconds
+from benchmarks.pages import seconds
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix

@@ -7,8 +7,8 @@ from time import perf_counter
 
 import numpy as np
 
-from kedfem.bench.machine import Watch, markdown, write_page
-from kedfem.bench.scenes import plate_four_bar
+from benchmarks.pages import script, table, write_page
+from benchmarks.scenes import plate_four_bar
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.transient import steps_of, transient
@@ -32,12 +32,11 @@ class _Measured:
     channels: list[np.ndarray]
 
 
-def bench_plane(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_plane(folder: Path, quick: bool) -> None:
     """Both fidelities at several sizes; a table goes to the folder."""
     rows: list[Sequence[str]] = []
     cases = CASES[:1] if quick else CASES
-    for number, (across, thickness) in enumerate(cases):
-        watch("plane", number, len(cases))
+    for across, thickness in cases:
         flat, solid = (_measured(plate_four_bar(kind, across, thickness)) for kind in ("plane", "solid"))
         apart = [_difference(*pair) for pair in zip(flat.channels, solid.channels, strict=True)]
         rows.append((
@@ -47,14 +46,7 @@ def bench_plane(folder: Path, quick: bool, watch: Watch) -> str:
         ))  # fmt: skip
     header = ("elements across, thickness", "unknowns", "mesh, assemble [ms]", "factor [ms]", "step [ms]",
               "stress", "displacement", "torque")  # fmt: skip
-    note = (
-        "Four-bar of plate links at 150 rpm over a turn of 360 steps: plane links / solids of 27-node hexahedra, one "
-        "layer on the same quadrilaterals, and the ratio. The last columns are the largest differences of the rocker's "
-        "stress, the coupler's displacement and the drive's torque, of the solids' peak."
-    )
-    text = markdown("Plane links against solids", "kedfem bench plane", header, rows, note)
-    write_page(folder, "plane", text)
-    return text
+    write_page(folder, "performance/plane", [table(header, rows)])
 
 
 def _measured(scene: Scene) -> _Measured:
@@ -83,3 +75,7 @@ def _difference(flat: np.ndarray, solid: np.ndarray) -> float:
 def _compared(flat: float, solid: float) -> str:
     """Two times in milliseconds and their ratio."""
     return f"{1e3 * flat:.3g} / {1e3 * solid:.3g} = 1 : {solid / flat:.0f}"
+
+
+if __name__ == "__main__":
+    script(bench_plane)

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.bench.machine import Watch, markdown, table, write_page
-from kedfem.bench.parts import PARTS, BenchPart, Size, ends, frequencies, loaded, part_link
+from benchmarks.pages import script, table, write_page
+from benchmarks.parts import PARTS, BenchPart, Size, ends, frequencies, loaded, part_link
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix
@@ -39,12 +39,11 @@ class _Found:
     out_of_round: float
 
 
-def bench_ports(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_ports(folder: Path, quick: bool) -> None:
     """Both kinds of port on all meshes, then stiff ones of other stiffness; two tables go to the folder."""
     rows = []
     sizes = SIZES[:1] if quick else SIZES
-    for number, size in enumerate(sizes):
-        watch("ports", number, len(sizes))
+    for size in sizes:
         link = part_link(PLATE, "hex20", size)
         averaged, stiff = _found(link), _found(_stiffened(link, STIFF))
         pairs = [
@@ -59,11 +58,7 @@ def bench_ports(folder: Path, quick: bool, watch: Watch) -> str:
         "mesh", "unknowns", *(f"{load}: deflection [µm]" for load in LOADS), "first frequency [Hz]",
         *(f"{load}: peak stress [MPa]" for load in LOADS),
     )  # fmt: skip
-    text = markdown(
-        "Averaged and rigid couplings", "kedfem bench ports --folder docs", header, rows, _after(sizes[-1])
-    )
-    write_page(folder, "ports", text)
-    return text
+    write_page(folder, "ports", [table(header, rows), _by_stiffness(sizes[-1])])
 
 
 def _stiffened(link: Link, times: float) -> Link:
@@ -120,8 +115,8 @@ def _condition(link: Link) -> float:
     return largest * least
 
 
-def _after(size: Size) -> str:
-    """The words, and the table of stiffnesses."""
+def _by_stiffness(size: Size) -> list[str]:
+    """Rigid couplings of several stiffnesses."""
     link = part_link(PLATE, "hex20", size)
     averaged, base = _found(link), _condition(link)
     tried = {times: _stiffened(link, times) for times in TRIED}
@@ -132,40 +127,12 @@ def _after(size: Size) -> str:
          f"{each.deflection['pull'] / limit - 1:.1e}", f"{_condition(tried[times]) / base:.2g}")
         for times, each in found.items()
     ]  # fmt: skip
-    words = [
-        "A joint holds a bore by its *port*. An `averaged` one (the default) takes the bore's mean displacement and",
-        "turn and spreads the joint's force over it evenly, so that the bore may become an ellipse: a pin with play,",
-        'or a soft bush. A rigid one (`coupling = "rigid"`, or `coupling = { rod = "rigid" }` for one link) '
-        'keeps the bore\'s',
-        "shape, as a pressed-in pin does. Real pins lie between the two: they push on one side only.",
-        "",
-        "The plate is of steel, 100 mm between bores of 15 mm, 30 mm wide, 5 mm thick, of hex20; a mesh is named by its",
-        f"elements across and through. {FORCE:g} N on one bore, along the plate or across it, are balanced by the mean",
-        "reactions of the other; the deflection is that of the loaded bore, along the force, as seen from the other. The",
-        "frequency is that of the free plate, the peak stress the highest equivalent one of nodes within",
-        f"{NEAR:g} radii of the loaded bore. Each cell: averaged, stiff, and the change. A rigid coupling makes a link",
-        "shorter by a part of its bore; in this short plate that is much, and the longer a link is, the less. Stress",
-        "beside a bore always depends on its port.",
-        "",
-        "## How stiff",
-        "",
-        "What of a bore's displacement is no rigid motion costs energy, κ = `STIFF` · E / radius",
-        "([theory.md](theory/joints.md#rigid-couplings)). By `STIFF`: how far the pulled bore is out of round, as "
-        "a part of what an",
-        f"averaged one is; how far its deflection is above that with {TRIED[-1]:.0e}; and how many times worse than with",
-        f"distributing couplings the matrix of a step of {STEP:g} s is conditioned.",
-        "",
-        *table(("STIFF", "out of round", "deflection", "condition"), rows),
-        "",
-        "The condition number is that of the few nodes that the others are tied to; the rounding of results grows with",
-        "STIFF alone. It shows first where a mechanism is soft and nothing loads it, as plates that lie side by side are",
-        "out of their plane. In the source's four-bar of plates two orientations of one scene differ by 3e-10 of the",
-        "largest displacement with distributing couplings, 8e-7 with STIFF = 1e3 and 5e-6 with 1e4 at 24 "
-        "steps a turn, by",
-        "6e-11, 1e-8 and 2e-7 at 240.",
-    ]  # fmt: skip
-    return "\n".join(words)
+    return table(("STIFF", "out of round", "deflection", "condition"), rows)
 
 
 def _change(averaged: float, stiff: float) -> str:
     return f"{averaged:.4g}, {stiff:.4g}: {100 * (stiff / averaged - 1):+.1f} %"
+
+
+if __name__ == "__main__":
+    script(bench_ports)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import loop
+from benchmarks.bases import interface_bases
+from benchmarks.pages import script, table, write_loglog, write_page
+from benchmarks.varied import varied_scenes
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.bench import loop
-from kedfem.bench.bases import interface_bases
-from kedfem.bench.machine import Watch, markdown, table, write_loglog, write_page
-from kedfem.bench.varied import varied_scenes
 from kedfem.dynamics.model import Model, reduced_model
 from kedfem.dynamics.reduction import static_parts
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
@@ -26,20 +26,14 @@ WAYS = ("kedfem", "fixed interface", "free interface")
 ERRORS = ("stress at the probe", "whole stress field", "joint forces")
 
 
-def bench_reduction(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_reduction(folder: Path, quick: bool) -> None:
     """Four measurements; tables and plots go to the folder."""
-    watch("reduction: modes", 0, 4)
     ways = _ways(folder, COUNTS[2:4] if quick else COUNTS)
-    watch("reduction: estimate", 1, 4)
     scenes = dict(list(varied_scenes().items())[15 : 16 if quick else None]) if quick else varied_scenes()
     estimates = _estimates(scenes, TOLERANCES[:1] if quick else TOLERANCES)
-    watch("reduction: loop", 2, 4)
     steps = _loop(folder, LOOP_COUNTS[:2] if quick else LOOP_COUNTS)
-    watch("reduction: preparation", 3, 4)
-    after = "\n\n".join([_ways_note(), estimates, steps, *([] if quick else [_preparation()])])
-    text = markdown("Reduced links", "kedfem bench reduction", *ways, after)
-    write_page(folder, "reduction", text)
-    return text
+    tables = [ways, *estimates, *steps, *([] if quick else [_preparation()])]
+    write_page(folder, "performance/reduction", tables)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +64,8 @@ def _errors(run: _Run, truth: _Run) -> tuple[float, float, float]:
     return channels["probes/stress/stress"], field / peak, forces
 
 
-def _ways(folder: Path, counts: Sequence[int]) -> tuple[Sequence[str], Sequence[Sequence[str]]]:
-    """Header and rows: errors of three ways to choose modes, against their number."""
+def _ways(folder: Path, counts: Sequence[int]) -> list[str]:
+    """Errors of three ways to choose modes, against their number."""
     full, _ = loop.four_bar_with(counts[0])
     moments = [30 * k for k in range(1, MOMENTS + 1)]
     truth = _run(full, moments)
@@ -91,22 +85,12 @@ def _ways(folder: Path, counts: Sequence[int]) -> tuple[Sequence[str], Sequence[
         (str(count), *(f"{100 * errors[way][row][k]:.2g} %" for k in range(3) for way in WAYS))
         for row, count in enumerate(counts)
     ]
-    return header, rows
+    return table(header, rows)
 
 
-def _ways_note() -> str:
-    return (
-        "The four-bar of examples/four_bar_solids over a turn, against the same links unreduced. kedfem: static "
-        "deflections of the linkage at 16 instants and the modes of the frozen linkage that they excite. Fixed "
-        "interface: constraint modes and eight normal modes with the ports held. Free interface: answers to port forces "
-        "and eight free normal modes. Both with answers to the twelve inertia loads, each of unit strain energy: such a "
-        "set does not say which of its modes matter to this motion. All are taken apart into scalar components and "
-        "sorted by the same energy. Field: all stress components at all nodes at 24 moments, of the highest von Mises "
-        "stress.\n\n![reduction](reduction.png)\n\n![reduction_field](reduction_field.png)"
-    )
-
-
-def _estimates(scenes: dict[str, dict[str, object]], tolerances: Sequence[float]) -> str:
+def _estimates(
+    scenes: dict[str, dict[str, object]], tolerances: Sequence[float]
+) -> tuple[list[str], list[str]]:
     """The estimated error against the true one, scene by scene."""
     rows, ratios = [], []
     for name, raw in scenes.items():
@@ -133,15 +117,13 @@ def _estimates(scenes: dict[str, dict[str, object]], tolerances: Sequence[float]
     low, high = min(ratios), max(ratios)
     lowest = rows[ratios.index(low) // len(tolerances)][0]
     within = np.mean([1 / 3 <= ratio <= 3 for ratio in ratios])
-    said = (
-        f"Estimate over true error of the worst channel: {low:.2f} to {high:.2f}; within a factor of 3: "
-        f"{100 * within:.0f} % of {len(ratios)}, below a third: {sum(ratio < 1 / 3 for ratio in ratios)}; lowest of "
-        f"*{lowest}*."
-    )
-    return "\n".join(["## The estimate of the error", "", *table(header, rows), "", said])
+    summary = (f"{low:.2f}", f"{high:.2f}", f"{100 * within:.0f} % of {len(ratios)}",
+               str(sum(ratio < 1 / 3 for ratio in ratios)), lowest)  # fmt: skip
+    over = ("estimate / true, least", "most", "within a factor of 3", "below a third", "least of")
+    return table(header, rows), table(over, [summary])
 
 
-def _loop(folder: Path, counts: Sequence[int]) -> str:
+def _loop(folder: Path, counts: Sequence[int]) -> tuple[list[str], list[str]]:
     """A step of the loop against the number of functions."""
     full, _ = loop.four_bar_with(counts[0])
     rows, fast, limits, made = [], [], [], []
@@ -158,20 +140,17 @@ def _loop(folder: Path, counts: Sequence[int]) -> str:
     write_loglog(folder, "reduction_loop", curves, ("modes per link", "seconds per step"))
     header = ("modes per link", "a step [µs]", "matrices from memory [µs]",
               "flops at BLAS speed [µs]", "step / limit", "steps a second, recorded")  # fmt: skip
-    said = (
-        "Three links. The limit is the greater of reading G, Y, S, W once from main memory and their flops at the speed "
-        "of a large matrix product; small matrices stay in the cache and may beat the first. "
-        f"Speeds: {speed[0] / 1e9:.1f} GB/s, {speed[1] / 1e9:.1f} Gflop/s. Recorded: three "
-        "probes and all joint forces at every step, loads included, rigid motion apart.\n\n"
-        "![reduction_loop](reduction_loop.png)"
+    machine = table(
+        ("memory [GB/s]", "products [Gflop/s]"), [(f"{speed[0] / 1e9:.1f}", f"{speed[1] / 1e9:.1f}")]
     )
-    return "\n".join(["## A step", "", *table(header, rows), "", said])
+    return table(header, rows), machine
 
 
-def _preparation() -> str:
+def _preparation() -> list[str]:
     unknowns, factor, spent = loop.preparation()
-    return (
-        "## Preparation\n\n"
-        f"An arm of {unknowns:,} unknowns (27-node hexahedra): factored in {factor:.2f} s, reduced to 0.1 %, estimate "
-        f"included, in {spent:.2f} s: {spent / factor:.1f} times as long."
-    )
+    header = ("unknowns", "factor [s]", "reduce, estimate included [s]", "ratio")
+    return table(header, [(f"{unknowns:,}", f"{factor:.2f}", f"{spent:.2f}", f"{spent / factor:.1f}")])
+
+
+if __name__ == "__main__":
+    script(bench_reduction)

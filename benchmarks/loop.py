@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.followed import advanced, first_state
+from benchmarks.pages import seconds
+from benchmarks.scenes import mechanisms
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.bench.followed import advanced, first_state
-from kedfem.bench.machine import seconds
-from kedfem.bench.scenes import mechanisms
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.transient import steps_of
@@ -88,7 +88,7 @@ def machine_speed() -> tuple[float, float]:
 
 
 def preparation() -> tuple[int, float, float]:
-    """An arm of 27-node hexahedra as `kedfem bench growth` makes them: unknowns, seconds to factor it, to reduce it."""
+    """An arm of 27-node hexahedra as `benchmarks.growth` has them: unknowns, seconds to factor it, to reduce it."""
     from kedfem.dynamics.reduction import static_parts
 
     full = meshed(_thick_arm())

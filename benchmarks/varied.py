@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from kedfem.bench.scenes import four_bar_of
+from benchmarks.scenes import four_bar_of
 
 DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
 BAR = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}

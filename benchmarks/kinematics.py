@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.bench.machine import Watch, markdown, write_page
+from benchmarks.pages import script, table, write_page
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.newton import closed, derivatives, target
 from kedfem.motion.path import Path as MotionPath
@@ -20,12 +20,11 @@ POINTS, LITERAL_POINTS, REPEATS = 20_000, 300, 9
 Z, X = [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]
 
 
-def bench_kinematics(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_kinematics(folder: Path, quick: bool) -> None:
     """Microseconds a time point of three linkages, and the greatest difference of accelerations; table to the folder."""
     rows = []
     scenes = {"four-bar": four_bar, "RSSR": rssr, "six links, two loops": six_bar}
-    for number, (name, scene) in enumerate(scenes.items()):
-        watch("kinematics", number, len(scenes))
+    for name, scene in scenes.items():
         got = _measured(scene(), POINTS // 10 if quick else POINTS)
         rows.append((
             name, str(got.unknowns), str(got.rows), f"{got.batch:.1f}", f"{got.literal:.0f}",
@@ -33,14 +32,7 @@ def bench_kinematics(folder: Path, quick: bool, watch: Watch) -> str:
         ))  # fmt: skip
     header = ("linkage", "unknowns", "rows", "together [µs/point]", "one by one [µs/point]", "ratio", "path [ms]",
               "accelerations differ by")  # fmt: skip
-    note = (
-        f"Poses, speeds and accelerations of all links at {POINTS:,} points of a turn, in plain numpy; processor time, "
-        "the least of nine runs. One by one is Newton to rounding from each point to the next, in least squares over all "
-        "rows, then the differentiated constraints. The path, the same for any number of points, is followed once before."
-    )
-    text = markdown("Rigid motion", "kedfem bench kinematics", header, rows, note)
-    write_page(folder, "kinematics", text)
-    return text
+    write_page(folder, "performance/kinematics", [table(header, rows)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,3 +150,7 @@ def rssr() -> Scene:
         "C": ("universal", "coupler", "rocker", Q, {"axes": axes}),
         "D": ("revolute", "rocker", "ground", pivot, {"axis": X}),
     })  # fmt: skip
+
+
+if __name__ == "__main__":
+    script(bench_kinematics)

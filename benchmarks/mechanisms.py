@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from kedfem.bench.scenes import four_bar_of
+from benchmarks.scenes import four_bar_of
 from kedfem.scene import Scene, scene_from
 
 

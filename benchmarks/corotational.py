@@ -7,20 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.bench.followed import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
-from kedfem.bench.machine import Watch, markdown, table, write_page
+from benchmarks.followed import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
+from benchmarks.pages import script, table, write_page
 from kedfem.dynamics.system.corotational import CorotationalSteps
 
 STEPS = 3000  # usual number
 FINEST: dict[str, Any] = {"fidelity": "beam", "element": "beam5", "mesh": {"elements": 16}}
 REFERENCE = {"damped": (12000, 24000), "undamped": (48000, 96000)}  # steps, extrapolated
 QUICK = (3000, 6000)
-CHECKED = (
-    "Against geometrically exact beams of an independent code (tests/verification/data) the references differ by 2e-6 of "
-    "the peak with damping, 2e-3 without, which is that one's own error. Solids and beams: their first frequencies agree "
-    "to 3e-4 (16 × 1 × 1) and 6e-5 (32 × 2 × 1); what is left builds up in the vibration of 50 and 170 Hz, in linear "
-    "frames more than in following ones, so it is that of the two models and not of segments, once there are 8."
-)
 BEAMS = (("beam3", 4), ("beam3", 8), ("beam3", 16), ("beam5", 1), ("beam5", 2), ("beam5", 3), ("beam5", 4))
 COUNTS = (1800, 3000, 4200, 6000, 12000)
 SLICES = (((16, 1, 1), 4), ((16, 1, 1), 8), ((16, 1, 1), 16), ((16, 2, 1), 8), ((32, 2, 1), 16))
@@ -36,8 +30,6 @@ class _Study:
     """Runs that are asked for once."""
 
     repeats: int
-    watch: Watch
-    total: int
     done: dict[str, Ran] = field(default_factory=dict)
 
     def ran(self, link: Mapping[str, Any], steps: int, damped: str, equation: str, repeats: int = 0) -> Ran:
@@ -45,15 +37,14 @@ class _Study:
         key = repr((link, steps, damped, equation))
         repeats = (repeats or self.repeats) * (damped == "damped")
         if key not in self.done:
-            self.watch("co-rotational", min(len(self.done), self.total - 1), self.total)
             scene = four_bar(link, steps, damped, **EQUATIONS[equation])
             self.done[key] = run(scene, repeats)
         return self.done[key]
 
 
-def bench_corotational(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_corotational(folder: Path, quick: bool) -> None:
     """Convergence, errors against time, solids and reduced solids; tables and a plot go to the folder."""
-    study = _Study(1 if quick else 7, watch, 8 if quick else 60)
+    study = _Study(1 if quick else 7)
     kinds = ["damped"] if quick else ["damped", "undamped"]
     references = {kind: reference(study, kind, quick) for kind in kinds}
     rows = [
@@ -64,21 +55,13 @@ def bench_corotational(folder: Path, quick: bool, watch: Watch) -> str:
     header = ("mesh of a link", "equation", *(f"worst error, {kind}" for kind in kinds),
               *(f"rms, {kind}" for kind in kinds), "sweeps", "factorisations", "3,000 steps [ms]",
               "of linear")  # fmt: skip
-    after = [
-        "![following](corotational.png)",
-        "",
-        *_space(study, kinds, quick),
-        "",
-        *_time(study, references, quick),
-    ]
+    exact = references["damped"]
+    tables = [table(header, rows), _space(study, kinds, quick), _time(study, references, quick)]
     if not quick:
-        solids = _solids(study, references["damped"]), _reduced(study, references["damped"]), _costs(watch)
-        after += [line for each in solids for line in ("", *each)]
-    after += ["", _note(references, study)]
-    text = markdown("Co-rotational frames", "kedfem bench corotational", header, rows, "\n".join(after))
-    write_page(folder, "corotational", text)
-    _plot(folder / "corotational.png", study, references["damped"])
-    return text
+        tables += [_solids(study, exact), _reduced(study, exact), _costs()]
+    peaks = [(kind, f"{np.abs(y).max() / 1e6:.0f}") for kind, y in references.items()]
+    write_page(folder, "performance/corotational", [*tables, table(("case", "peak [MPa]"), peaks)])
+    _plot(folder / "corotational.png", study, exact)
 
 
 def reference(study: _Study, kind: str, quick: bool = False) -> Curve:
@@ -130,7 +113,7 @@ def _space(study: _Study, kinds: Sequence[str], quick: bool) -> list[str]:
         *(f"error in space, {kind}" for kind in kinds),
         "3,000 steps [ms]",
     )
-    return ["## Convergence in elements and segments", "", *table(header, rows)]
+    return table(header, rows)
 
 
 def _time(study: _Study, references: Mapping[str, Curve], quick: bool) -> list[str]:
@@ -150,7 +133,7 @@ def _time(study: _Study, references: Mapping[str, Curve], quick: bool) -> list[s
         "linear [ms]",
         "ratio",
     )
-    return ["## Convergence in the step", "", "3 beam5 a link.", "", *table(header, rows)]
+    return table(header, rows)
 
 
 def _solids(study: _Study, exact: Curve) -> list[str]:
@@ -169,7 +152,7 @@ def _solids(study: _Study, exact: Curve) -> list[str]:
         ))  # fmt: skip
     header = ("hex20 of a link", "segments", "unknowns", "from beams, both linear", "from beams, both following",
               "worst error", "sweeps", "3,000 steps [ms]", "of linear")  # fmt: skip
-    return ["## Solids", "", *table(header, rows)]
+    return table(header, rows)
 
 
 def _reduced(study: _Study, exact: Curve) -> list[str]:
@@ -189,14 +172,13 @@ def _reduced(study: _Study, exact: Curve) -> list[str]:
         ))  # fmt: skip
     header = ("segments", "modes for", "unknowns", "from following beams", "worst error", "sweeps",
               "3,000 steps [ms]")  # fmt: skip
-    return ["## Reduced solids", "", "24 × 2 × 1 hex20 a link.", "", *table(header, rows)]
+    return table(header, rows)
 
 
-def _costs(watch: Watch) -> list[str]:
+def _costs() -> list[str]:
     """A step of solids, following against linear on the same mesh."""
     rows: list[Sequence[str]] = []
-    for number, (elements, segments) in enumerate(COSTS):
-        watch("co-rotational", number, len(COSTS))
+    for elements, segments in COSTS:
         link = {"fidelity": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
         linear, _ = cost(four_bar(link, STEPS))
         for count in segments:
@@ -209,25 +191,11 @@ def _costs(watch: Watch) -> list[str]:
             ))  # fmt: skip
     header = ("hex20 of a link", "segments", "unknowns", "linear step [ms]", "following step [ms]", "ratio", "sweeps",
               "factorisations")  # fmt: skip
-    return ["## What a step costs", "", *table(header, rows)]
+    return table(header, rows)
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
-
-
-def _note(references: Mapping[str, Curve], study: _Study) -> str:
-    peaks = ", ".join(f"{np.abs(y).max() / 1e6:.0f} MPa {kind}" for kind, y in references.items())
-    chosen = {kind: REFERENCE[kind] if len(references) > 1 else QUICK for kind in references}
-    steps = ", ".join(f"{few:,} and {many:,} steps ({kind})" for kind, (few, many) in chosen.items())
-    return (
-        "Four-bar of the source (Nath and Ghosh 1980) from rest at 600 rpm, three turns: stress on the outer side of the "
-        f"rocker's middle; damped: 2 % at 20 and 200 Hz. Errors are of the peak, {peaks}, against a reference of "
-        f"{FINEST['mesh']['elements']} beam5 a link with co-rotational frames, extrapolated from {steps}; in space: "
-        "against the same mesh with the same step. Times: processor time of one thread in the stepping alone, the "
-        f"least of {study.repeats} repeats (solids: of one), rigid motion and loads known. One factorisation a segment. "
-        + CHECKED
-    )
 
 
 def _plot(path: Path, study: _Study, exact: Curve) -> None:
@@ -268,3 +236,7 @@ def _series(study: _Study, exact: Curve) -> dict[str, list[tuple[float, float]]]
         if key.startswith("reduced"):
             add("following, reduced solids", ran)
     return found
+
+
+if __name__ == "__main__":
+    script(bench_corotational)

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from kedfem.bench.machine import Watch, markdown, seconds, write_page
-from kedfem.bench.scenes import bar_four_bar
+from benchmarks.pages import script, seconds, table, write_page
+from benchmarks.scenes import bar_four_bar
 from kedfem.dynamics.cholesky import Cholesky
 from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.substructure import effective_matrix
@@ -18,22 +18,18 @@ from kedfem.links.build import bare_links
 SIZES = ((18, 3, 2), (36, 6, 4), (48, 9, 7))
 
 
-def bench_solvers(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_solvers(folder: Path, quick: bool) -> None:
     """Factor and solve times of the solvers that are installed."""
     rows = []
     sizes = SIZES[:1] if quick else SIZES
-    for number, size in enumerate(sizes):
-        watch("solvers", number, len(sizes))
+    for size in sizes:
         link = bare_links(bar_four_bar(size))["coupler"]
         A = effective_matrix(link, generalised_alpha(1e-4, 1.0).a0, 1.0)
         b = np.random.default_rng(1).standard_normal(A.shape[0])
         for name, factored in _solvers().items():
             rows.append((f"{A.shape[0]:,}", name, *_measured(factored, A, b)))
     header = ("unknowns", "solver", "factor [s]", "one solve [ms]", "residual")
-    text = markdown("Sparse direct solvers from wheels", "kedfem bench solvers", header, rows,
-                    "pypardiso is measured where it is installed; kedfem does not need it.")  # fmt: skip
-    write_page(folder, "solvers", text)
-    return text
+    write_page(folder, "performance/solvers", [table(header, rows)])
 
 
 Factored = Callable[[sp.csr_array], Callable[[np.ndarray], np.ndarray]]
@@ -80,3 +76,7 @@ def _pardiso(A: sp.csr_array) -> Callable[[np.ndarray], np.ndarray]:
         return np.asarray(solver._call_pardiso(upper, b)).ravel()
 
     return solve
+
+
+if __name__ == "__main__":
+    script(bench_solvers)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kedfem.bench.machine import Watch, markdown, write_page
-from kedfem.bench.parts import FORMS, PARTS, Answer, BenchPart, Size, answer
+from benchmarks.pages import script, table, write_page
+from benchmarks.parts import FORMS, PARTS, Answer, BenchPart, Size, answer
 
 TARGETS = {"1 %": 1e-2, "0.1 %": 1e-3}
 QUANTITIES = ("deflection", "frequencies", "stress")
@@ -16,12 +16,11 @@ MARKS = dict(zip(FORMS, "osd^", strict=True))
 Found = dict[str, list[tuple[Size, Answer, dict[str, float]]]]
 
 
-def bench_elements(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_elements(folder: Path, quick: bool) -> None:
     """Errors and times of all meshes of all parts, what each error costs, and what follows; table and plot."""
     found: dict[str, Found] = {}
     exact: dict[str, Answer] = {}  # by shape: that of the straight bar serves its distorted meshes too
-    for number, part in enumerate(PARTS):
-        watch("elements", number, len(PARTS))
+    for part in PARTS:
         if str(part.shape) not in exact:
             finest = part.sizes["hex27"][-1] if quick else part.reference
             exact[str(part.shape)] = answer(part, "hex27", finest, 1)
@@ -35,12 +34,8 @@ def bench_elements(folder: Path, quick: bool, watch: Watch) -> str:
         "solve [ms]",
         *(f"{q} [%]" for q in QUANTITIES),
     )
-    text = markdown(
-        "Elements: error against work", "kedfem bench elements", header, _rows(found), _after(found)
-    )
-    write_page(folder, "elements", text)
+    write_page(folder, "performance/elements", [table(header, _rows(found)), *_after(found)])
     _write_plot(folder, found)
-    return text
 
 
 def _measured(part: BenchPart, exact: Answer, quick: bool) -> Found:
@@ -111,31 +106,18 @@ def _costs(
     return out
 
 
-def _after(found: dict[str, Found]) -> str:
-    """The second table and the words that follow from it."""
+def _after(found: dict[str, Found]) -> tuple[list[str], list[str]]:
+    """What each error costs, and the elements beside each other."""
     costs = _costs(found)
     works = {name: _costs(found, of) for name, of in WORKS.items()}
-    lines = [
-        "A mesh is named by its elements along, across and through a bar, or across and through a plate. The load",
-        "is a force spread over one end or bore, balanced by the other's mean reactions; the frequencies are the",
-        "first three of the free part, the stress is the equivalent one at mid-span, behind the bore or in the fillet.",
-        "Errors are relative to a finer mesh of hex27. Factor and solve are those of a step's constant matrix. In the",
-        "distorted mesh corners lie up to a quarter of an element's side away from their place: in such elements",
-        "hex20 holds linear fields only, hex27 quadratic ones too. Tetrahedra are six in each hexahedron, on the nodes",
-        "of hex27.",
-        "", "![elements](elements.png)", "",
-        "## What an error costs", "",
-        "Unknowns / milliseconds to factor / milliseconds of a solve from which the error stays below the target,",
-        "between meshes interpolated; — where no mesh here reaches it. The cheapest is that of a solve.", "",
-        f"| part | error | of | {' | '.join(FORMS)} | cheapest |", "|---|---|---|" + "---:|" * len(FORMS) + "---|",
-    ]  # fmt: skip
+    rows = []
     for (part, target, q), ms in costs.items():
-        shown = [
+        shown = (
             " / ".join(_short(w[part, target, q][e]) for w in works.values()) if e in ms else "—"
             for e in FORMS
-        ]
-        lines.append(f"| {part} | {target} | {q} | {' | '.join(shown)} | {_cheapest(ms)} |")
-    return "\n".join([*lines, "", "## Which element", "", *_words(costs)])
+        )
+        rows.append((part, target, q, *shown, _cheapest(ms)))
+    return table(("part", "error", "of", *FORMS, "cheapest"), rows), _compared(costs)
 
 
 def _short(number: float) -> str:
@@ -148,37 +130,15 @@ def _cheapest(ms: dict[str, float]) -> str:
     return ", ".join(e for e in ms if ms[e] <= 1.1 * min(ms.values())) or "—"
 
 
-def _words(costs: dict[tuple[str, str, str], dict[str, float]]) -> list[str]:
-    """A sentence for each part and target, then the default that follows."""
-    lines = []
-    for part in dict.fromkeys(key[0] for key in costs):
-        said = [f"for {t} {_both(costs, part, t)}" for t in TARGETS]
-        lines.append(f"* **{part[0].upper() + part[1:]}**: {'; '.join(said)}.")
-    tets = [(ms["tet10"], ms["hex20"]) for ms in costs.values() if {"tet10", "hex20"} <= set(ms)]
-    dearer = float(np.exp(np.mean([np.log(a / b) for a, b in tets]))) if tets else float("nan")
-    pairs = [(ms["hex20"], ms["hex27"]) for ms in costs.values() if {"hex20", "hex27"} <= set(ms)]
-    ratio = float(np.exp(np.mean([np.log(a / b) for a, b in pairs])))
-    missed = {e: sum(e not in ms and bool(ms) for ms in costs.values()) for e in FORMS}
-    default = "hex20" if ratio < 1 and missed["hex20"] <= missed["hex27"] else "hex27"
-    misses = ", ".join(f"{e} {count}" for e, count in missed.items())
-    return [
-        *lines, "",
-        f"Where both reach a target, a solve with hex20 takes {ratio:.2f} of the time of one with hex27 (geometric",
-        f"mean of {len(pairs)} rows). Targets missed that another element reaches: {misses} of {len(costs)}.",
-        f"A solve with tet10 takes {dearer:.2g} times that of one with hex20 ({len(tets)} rows): hexahedra where a part",
-        "can be swept, tetrahedra where not.",
-        f"By these figures the default should be **{default}**.",
-    ]  # fmt: skip
-
-
-def _both(costs: dict[tuple[str, str, str], dict[str, float]], part: str, target: str) -> str:
-    """The cheapest element of each quantity in words."""
-    cheapest = {
-        q: _cheapest(costs[part, target, q]).replace(", ", " or ").replace("—", "none") for q in QUANTITIES
-    }
-    if len(set(cheapest.values())) == 1:
-        return cheapest[QUANTITIES[0]]
-    return ", ".join(f"{element} ({q})" for q, element in cheapest.items())
+def _compared(costs: dict[tuple[str, str, str], dict[str, float]]) -> list[str]:
+    """Of each element: a solve beside one of hex20, where both reach a target; targets missed that another reaches."""
+    rows = []
+    for element in FORMS:
+        ratios = [ms[element] / ms["hex20"] for ms in costs.values() if {element, "hex20"} <= set(ms)]
+        mean = f"{float(np.exp(np.mean(np.log(ratios)))):.2f}" if ratios else "—"
+        missed = sum(element not in ms and bool(ms) for ms in costs.values())
+        rows.append((element, mean, str(len(ratios)), f"{missed} of {len(costs)}"))
+    return table(("element", "solve / solve of hex20", "rows", "targets missed"), rows)
 
 
 def _write_plot(folder: Path, found: dict[str, Found]) -> None:
@@ -206,3 +166,7 @@ def _write_plot(folder: Path, found: dict[str, Found]) -> None:
     grid[0, 0].legend()
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / "elements.png", dpi=110)
+
+
+if __name__ == "__main__":
+    script(bench_elements)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.pages import script, table, write_loglog, write_page
+from benchmarks.scenes import bar_four_bar
 from kedfem.accuracy.prepared import meshed
-from kedfem.bench.machine import Watch, markdown, write_loglog, write_page
-from kedfem.bench.scenes import bar_four_bar
 from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.steps import SystemSteps
@@ -32,12 +32,11 @@ class _Measured:
     states: list[list[LinkMoment]]
 
 
-def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_steps(folder: Path, quick: bool) -> None:
     """Mean time of a step of both solvers at several sizes; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
     rows, unknowns, condensed_times, literal_times = [], [], [], []
-    for number, size in enumerate(sizes):
-        watch("steps", number, len(sizes))
+    for size in sizes:
         fast = _stepped(size, "condensed", CONDENSED_STEPS)
         slow = _stepped(size, "monolithic", LITERAL_STEPS)
         unknowns.append(fast.unknowns)
@@ -49,15 +48,12 @@ def bench_steps(folder: Path, quick: bool, watch: Watch) -> str:
         ))  # fmt: skip
     header = ("unknowns", "literal [ms/step]", "condensed [ms/step]", "ratio", "of it triangular solves",
               "factorisations in the run", "difference of u after 5 steps")  # fmt: skip
-    note = "Four-bar of three bars of 27-node hexahedra, both solvers in one run.\n\n![steps](steps.png)"
-    text = markdown("Condensed step against monolithic step", "kedfem bench steps", header, rows, note)
-    write_page(folder, "steps", text)
+    write_page(folder, "performance/steps", [table(header, rows)])
     curves = {
         "literal (assemble, sparse LU)": (unknowns, literal_times),
         "condensed": (unknowns, condensed_times),
     }
     write_loglog(folder, "steps", curves, ("unknowns", "seconds per step"))
-    return text
 
 
 def _stepped(size: tuple[int, int, int], solver: str, steps: int) -> "_Measured":
@@ -99,3 +95,7 @@ def _difference(fast: list[list[LinkMoment]], slow: list[list[LinkMoment]]) -> f
     a, b = fast[len(slow) - 1], slow[-1]
     peak = max(float(np.abs(s.u).max()) for s in b)
     return max(float(np.abs(x.u - y.u).max()) for x, y in zip(a, b, strict=True)) / peak
+
+
+if __name__ == "__main__":
+    script(bench_steps)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.scenes import four_bar_of
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.bench.scenes import four_bar_of
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.system.corotational import CorotationalSteps

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from benchmarks.mechanisms import MECHANISMS
+from benchmarks.pages import script, table, write_page
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.plan import Plan, planned
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.variants import families, of_family, refined, with_analysis, with_links, with_steps
-from kedfem.bench.machine import Watch, markdown, write_page
-from kedfem.bench.mechanisms import MECHANISMS
 from kedfem.scene import Scene, time_grid
 
 ACCURACIES = (0.05, 0.01, 0.002)
@@ -31,23 +31,15 @@ class Kept:
         return sum(error <= self.plan.asked for error in self.errors.values()) / len(self.errors)
 
 
-def bench_accuracy(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_accuracy(folder: Path, quick: bool) -> None:
     """Five mechanisms, three accuracies each; a table goes to the folder."""
     cases = list(MECHANISMS.items())[-1:] if quick else list(MECHANISMS.items())
     rows: list[Sequence[str]] = []
-    for number, (name, scene_for) in enumerate(cases):
-        watch("accuracy", number, len(cases))
+    for name, scene_for in cases:
         rows += [_row(name, each) for each in kept(scene_for, ACCURACIES[:2] if quick else ACCURACIES)]
     header = ("mechanism", "asked for", "expected", "worst channel", "channels within", "chosen, steps",
               "plan [s]", "prepare [s]", "steps [s]")  # fmt: skip
-    note = (
-        f"Errors are the largest difference over time of a channel (probe, joint force, drive torque), of its peak. The "
-        f"reference: solids with elements {FINER:g} times as fine as in the plan for the tightest accuracy, reduced to "
-        f"{TOLERANCE:g}, steps {SHORTER} times as short."
-    )
-    text = markdown("Accuracy asked for and reached", "kedfem bench accuracy", header, rows, note)
-    write_page(folder, "accuracy", text)
-    return text
+    write_page(folder, "performance/accuracy", [table(header, rows)])
 
 
 def kept(scene_for: Callable[[float], Scene], accuracies: Sequence[float]) -> list[Kept]:
@@ -86,3 +78,7 @@ def _row(name: str, found: Kept) -> Sequence[str]:
         f"{100 * found.within:.0f} %", f"{kinds}; {time_grid(found.plan.scene).steps}",
         *(f"{seconds:.2f}" for seconds in found.seconds),
     )  # fmt: skip
+
+
+if __name__ == "__main__":
+    script(bench_accuracy)

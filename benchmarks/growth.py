@@ -8,21 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.bench.machine import Watch, markdown, seconds, write_loglog, write_page
+from benchmarks.pages import ROOT, script, seconds, table, write_loglog, write_page
 from kedfem.errors import SolveError
 from kedfem.processes import most_memory
 
 SIZES = ((40, 8, 2), (64, 14, 2), (110, 24, 2), (200, 44, 2))  # a plate, 1 m x 0.22 m x 20 mm
 
 
-def bench_growth(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_growth(folder: Path, quick: bool) -> None:
     """Time and memory against unknowns; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
     found = []
-    for number, size in enumerate(sizes):
-        watch("growth", number, len(sizes))
-        command = [sys.executable, "-m", "kedfem.bench.growth", *map(str, size)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    for size in sizes:
+        code = f"import json; from benchmarks.growth import one_size; print(json.dumps(one_size({size})))"
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
         if done.returncode != 0:
             what = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}: out of memory?"]
             raise SolveError(
@@ -35,15 +35,12 @@ def bench_growth(folder: Path, quick: bool, watch: Watch) -> str:
         for f in found
     ]  # fmt: skip
     header = ("unknowns", "assemble [s]", "factor [s]", "solve [ms]", "assemble / factor", "peak memory [GB]")
-    slopes = {key: _slope(found, key) for key in ("factor", "solve", "memory")}
-    growth = ", ".join(f"{key} ∝ N^{slope:.2f}" for key, slope in slopes.items())
-    note = f"Growth between the last two sizes: {growth}.\n\n![growth](growth.png)"
-    text = markdown("One solid plate, 27-node hexahedra, growing", "kedfem bench growth", header, rows, note)
-    write_page(folder, "growth", text)
+    slopes = [(key, f"{_slope(found, key):.2f}") for key in ("factor", "solve", "memory")]
+    grown = table(("between the last two sizes", "power of the unknowns"), slopes)
+    write_page(folder, "performance/growth", [table(header, rows), grown])
     N = [f["unknowns"] for f in found]
     curves = {name: (N, [f[name] for f in found]) for name in ("assemble", "factor", "solve")}
     write_loglog(folder, "growth", curves, ("unknowns in one link", "seconds"))
-    return text
 
 
 def _slope(found: list[dict[str, float]], key: str) -> float:
@@ -78,5 +75,4 @@ def one_size(size: tuple[int, int, int]) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    nx, ny, nz = (int(a) for a in sys.argv[1:4])
-    json.dump(one_size((nx, ny, nz)), sys.stdout)
+    script(bench_growth)

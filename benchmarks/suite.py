@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from benchmarks.pages import script, table, write_page
+from benchmarks.scenes import mechanisms, with_reduced_links
 from kedfem.accuracy.histories import worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import Reduction, reduced
 from kedfem.analysis import Clock
-from kedfem.bench.machine import Watch, markdown, write_page
-from kedfem.bench.scenes import mechanisms, with_reduced_links
 from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
@@ -33,31 +33,17 @@ class _Measured:
         return sum(self.seconds.values())
 
 
-def bench_suite(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_suite(folder: Path, quick: bool) -> None:
     """Seconds of every stage of every mechanism; table and plot go to the folder."""
     cases = list(mechanisms().items())[: 1 if quick else None]
     found: list[tuple[str, _Measured]] = []
-    for number, (name, raw) in enumerate(cases):
+    for name, raw in cases:
         for kind, keys in (("full", raw), ("reduced", with_reduced_links(raw))):
-            watch("suite", 2 * number + (kind == "reduced"), 2 * len(cases))
             found.append((f"{name}, {kind}", _measured(scene_from(keys), 1 if quick else REPEATS)))
     header = ("scene", "unknowns", "motion [s]", "mesh, matrices [s]", "modes [s]", "factor [s]", "steps [s]",
               "a step [µs]", "whole [s]", "estimated error")  # fmt: skip
-    note = (
-        "One turn of 720 steps with recording, quasi-static start; no files, nothing kept from earlier runs. Medians of "
-        "3 runs. Solids of the usual mesh; modes: static factors, training, trial runs and the error's estimate, "
-        "asked for: 0.1 %.\n\n![suite](suite.png)"
-    )
-    text = markdown(
-        "Mechanisms from scene to last step",
-        "kedfem bench suite",
-        header,
-        [_row(*each) for each in found],
-        note,
-    )
-    write_page(folder, "suite", text)
+    write_page(folder, "performance/suite", [table(header, [_row(*each) for each in found])])
     _plot(folder / "suite.png", found)
-    return text
 
 
 def _measured(scene: Scene, repeats: int) -> _Measured:
@@ -113,3 +99,7 @@ def _plot(path: Path, found: Sequence[tuple[str, _Measured]]) -> None:
     axes.grid(visible=True, axis="x", alpha=0.3)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
     figure.savefig(path, dpi=130)
+
+
+if __name__ == "__main__":
+    script(bench_suite)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.pages import script, table, write_page
+from benchmarks.scenes import DAMPED, EYE, four_bar_of
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.bench.machine import Watch, machine, table, write_page
-from kedfem.bench.scenes import DAMPED, EYE, four_bar_of
 from kedfem.dynamics.levels import level_steps, leveled
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
@@ -28,9 +28,8 @@ HEADER = ("levels, steps a turn", "stress", "estimated", "torque", "estimated", 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One start, damping, kind of frames and of links; steps a turn of the truth, in three levels."""
+    """One start, damping, kind of frames and of links, headed in the page; steps a turn of the truth, in three levels."""
 
-    title: str
     link: Mapping[str, Any]
     damped: bool = True
     truth: int = 2000
@@ -39,11 +38,11 @@ class Case:
 
 STILL, REST = {"initial": "quasi-static"}, {"initial": "rest"}
 CASES = (
-    Case("Equation (20), quasi-static start", BEAMS, analysis=STILL),
-    Case("Co-rotational, quasi-static start", BEAMS, analysis=STILL | {"frames": "co-rotational"}),
-    Case("Plates of solids, reduced, quasi-static start", PLATES, analysis=STILL),
-    Case("Co-rotational, from rest: a jump", BEAMS, analysis=REST | {"frames": "co-rotational"}),
-    Case("Equation (20), from rest, undamped", BEAMS, False, 4000, REST),
+    Case(BEAMS, analysis=STILL),
+    Case(BEAMS, analysis=STILL | {"frames": "co-rotational"}),
+    Case(PLATES, analysis=STILL),
+    Case(BEAMS, analysis=REST | {"frames": "co-rotational"}),
+    Case(BEAMS, False, 4000, REST),
 )
 
 
@@ -56,40 +55,13 @@ class _Marched:
     seconds: float
 
 
-def bench_levels(folder: Path, quick: bool, watch: Watch) -> str:
+def bench_levels(folder: Path, quick: bool) -> None:
     """Tables of all cases, and of members of generalised-α."""
-    lines = [
-        "# Levels in time",
-        "",
-        f"Regenerate with `kedfem bench levels`. Measured on: {machine()}.",
-        "",
-        *BEFORE,
-    ]
     cases = CASES[:2] if quick else CASES
-    for number, case in enumerate(cases):
-        watch("levels", number, len(cases))
-        lines += ["", f"## {case.title}", "", *table(HEADER, _rows(case, quick))]
-    watch("numerical damping", 0, 0)
-    lines += ["", "## Numerical damping", "", *DAMPING, "", *_numerical_damping(quick), ""]
-    text = "\n".join(lines)
-    write_page(folder, "levels", text)
-    return text
-
-
-BEFORE = (
-    "The source's four-bar (Nath and Ghosh 1980), 600 rpm, two turns, one 3-node beam a link (plates of 20-node",
-    "hexahedra reduced to eight functions where it says so), 2 % damping at 20 and 200 Hz, ρ∞ = 0.95. Largest error in",
-    "time of the rocker's stress and of the drive's torque, of their peaks, against three levels from 2,000 steps a",
-    "turn (4,000 undamped); beside it what the run itself estimates: a single level from its local errors, several from",
-    "their differences. Seconds: processor time of the steps with their rows. The last column extrapolates the error of",
-    "a single level's finest march, of order 2, to that of the levels.",
-)
-
-
-DAMPING = (
-    "The rocker's stress again, equation (20), with other members of generalised-α. Numerical damping makes h³: below",
-    "ρ∞ = 0.5 three levels remove it, and h⁴ stays, above they remove h⁴, and what is left of h³ is small.",
-)
+    tables = [table(HEADER, _rows(case, quick)) for case in cases]
+    if not quick:
+        tables.append(_numerical_damping())
+    write_page(folder, "performance/levels", tables)
 
 
 def _ready(case: Case, steps: int, levels: int) -> Prepared:
@@ -155,10 +127,10 @@ def _error(found: Float[np.ndarray, "T c"], truth: Float[np.ndarray, "U c"], str
     return float(np.linalg.norm(found - truth, axis=1).max() / np.linalg.norm(truth, axis=1).max())
 
 
-def _numerical_damping(quick: bool) -> list[str]:
+def _numerical_damping() -> list[str]:
     """Errors of two and three levels, and the orders that half the step shows, of members of generalised-α."""
     case, out = CASES[0], []
-    for rho in (0.95, 0.3) if quick else (1.0, 0.95, 0.8, 0.6, 0.5, 0.3, 0.0):
+    for rho in (1.0, 0.95, 0.8, 0.6, 0.5, 0.3, 0.0):
         of = replace(case, analysis=STILL | {"rho_inf": rho})
         truth = _marched(_ready(of, 2000, 3)).values[SHOWN["stress"]]
         cells = [f"{rho:g}"]
@@ -171,3 +143,7 @@ def _numerical_damping(quick: bool) -> list[str]:
         out.append(tuple(cells))
     header = ("ρ∞", "500 + 1,000", "1,000 + 2,000", "order", "500 + … + 2,000", "1,000 + … + 4,000", "order")
     return table(header, out)
+
+
+if __name__ == "__main__":
+    script(bench_levels)
