@@ -33,3 +33,7 @@ class SolveError(KedfemError):
 
 class OutputError(KedfemError):
     """Results cannot be written or read."""
+
+
+class PictureError(OutputError):
+    """A picture cannot be drawn; the results are what they are without it."""

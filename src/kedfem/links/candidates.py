@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.optimize import least_squares
 
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.round_surfaces import CLOSED
@@ -199,6 +198,8 @@ def _fit(
 
     def off(p: np.ndarray) -> np.ndarray:
         return np.asarray(_distances(y / size, p[:2] @ plane, turned(p)) - p[2])
+
+    from scipy.optimize import least_squares
 
     p = least_squares(off, np.array([*c, r, 0.0, 0.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14).x
     a = turned(p)

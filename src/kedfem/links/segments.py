@@ -12,7 +12,6 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.spatial import cKDTree
 
 from kedfem.errors import MeshError
 from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
@@ -150,6 +149,8 @@ def _slice(
     link: Link, material: Material, elements: Int[np.ndarray, " e"]
 ) -> tuple[Link, Int[np.ndarray, " n"]]:
     """A link of some elements of another, and which of its functions they are."""
+    from scipy.spatial import cKDTree
+
     used, cells = np.unique(link.cells[elements], return_inverse=True)
     cells = cells.reshape(len(elements), -1)
     if link.kind == "plane":
@@ -179,6 +180,8 @@ def _slice_faces(
 
 def _cut(a: Link, b: Link, number: int) -> Cut | None:
     """The ports of the facets that two slices share, None if they share none: its middle, and points off it within it."""
+    from scipy.spatial import cKDTree
+
     middles = [_facet_middles(part) for part in (a, b)]
     distance, nearest = cKDTree(middles[1]).query(middles[0])
     here = np.flatnonzero(distance <= SAME * max(a.size, b.size))

@@ -2,7 +2,6 @@
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import cKDTree
 
 from kedfem.links.record import Link
 from kedfem.links.surface import boundary, neighbours, surface
@@ -57,6 +56,8 @@ def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
     out = np.zeros(full.n, bool)
     if not len(at):
         return out
+    from scipy.spatial import cKDTree
+
     near = cKDTree(at).query(full.X)[0]
     touching = (near[full.cells] < 1e-6 * full.size).any(axis=1)
     out[full.cells[touching].ravel()] = True

@@ -11,7 +11,6 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 from jaxtyping import Float, Int
-from skfem.io.meshio import HEX_MAPPING
 
 from kedfem.links.record import Link, LinkFace, Mass, mass_constants, read_only
 from kedfem.mesh import SolidMesh
@@ -31,8 +30,13 @@ class MeshHexS2(skfem.MeshHex1):  # type: ignore[misc]
 
 
 MESHES = {8: skfem.MeshHex1, 10: skfem.MeshTet2, 20: MeshHexS2, 27: skfem.MeshHex2}
-#: Of each node in scikit-fem's order its place in VTK's; those of tetrahedra are the same.
-ORDERS = {nodes: HEX_MAPPING[:nodes] for nodes in (8, 20, 27)} | {10: list(range(10))}
+
+
+def vtk_order(nodes: int) -> list[int]:
+    """Of each node of an element in scikit-fem's order its place in VTK's; those of tetrahedra are the same."""
+    from skfem.io.meshio import HEX_MAPPING  # which loads meshio, a fifth of a second
+
+    return list(range(10)) if nodes == 10 else list(HEX_MAPPING[:nodes])
 
 
 def solid_basis(mesh: SolidMesh) -> skfem.Basis:
@@ -43,7 +47,7 @@ def solid_basis(mesh: SolidMesh) -> skfem.Basis:
     mesh : 8-, 20- or 27-node hexahedra, or 10-node tetrahedra [m]
     """
     nodes = mesh.cells.shape[1]
-    order = np.argsort(ORDERS[nodes])
+    order = np.argsort(vtk_order(nodes))
     fem_mesh = MESHES[nodes](np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.cells.T[order]))
     return skfem.Basis(fem_mesh, fem_mesh.elem(), intorder=QUADRATURE_ORDER[nodes])
 
@@ -51,7 +55,7 @@ def solid_basis(mesh: SolidMesh) -> skfem.Basis:
 def vtk_cells(basis: skfem.Basis) -> Int[np.ndarray, "e m"]:
     """Elements as rows of function numbers in VTK's node order."""
     dofs = basis.element_dofs
-    return np.ascontiguousarray(dofs[ORDERS[len(dofs)]].T)
+    return np.ascontiguousarray(dofs[vtk_order(len(dofs))].T)
 
 
 @dataclass(frozen=True, slots=True)

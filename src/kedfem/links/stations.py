@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.interpolate import CubicSpline
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
@@ -42,6 +41,8 @@ class Stations:
         ----------
         rate : their derivative by s of that order
         """
+        from scipy.interpolate import CubicSpline
+
         return np.asarray(CubicSpline(self.s, np.eye(len(self.s)))(s, rate))
 
 

@@ -7,7 +7,6 @@ from types import ModuleType
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import KDTree
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
@@ -187,6 +186,8 @@ def _with_core(
     x, r = flat.points.T
     nodes = (abs(r - meridian.radius) < NEAR) & (x > on.min() - NEAR) & (x < on.max() + NEAR)
     core = core_mesh(meridian.whole, region, meridian.radius, np.sort(x[nodes]), around)
+    from scipy.spatial import KDTree
+
     distance, nearest = KDTree(mesh.points).query(core.points)
     shared = distance < NEAR
     number = np.empty(len(core.points), dtype=np.int64)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.errors import OutputError
+from kedfem.errors import OutputError, PictureError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
@@ -72,9 +72,13 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
         write_csv(results, folder / TABLE)
     if scene.output.parquet:
         write_parquet(results, folder / PARQUET)
-    if scene.output.plots:
-        write_plots(results, folder / PLOTS)
+
+    def plots() -> None:
+        if scene.output.plots:
+            write_plots(results, folder / PLOTS)
+
     if not (scene.output.picture and peak):
+        plots()
         return ()
     title = f"{scene.title or 'kedfem'}: highest stress {stress_at(peak)}, t = {peak.time:.4g} s"
     if clock(scene) != "time":
@@ -82,7 +86,7 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
     animation = scene.output.animation
     scale = animation.deformation_scale if animation else 1.0
     try:
-        write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity)
-    except OutputError as err:
+        write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity, plots)
+    except PictureError as err:
         return (str(err),)
     return ()

@@ -1,7 +1,5 @@
 """Pictures of meshes: elements coloured by their quality, beside them how many there are of each."""
 
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,15 +8,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.errors import OutputError
 from kedfem.links.part_candidates import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.hexahedra import QUAD9, shape_functions
 from kedfem.mesh.simplices import TRI6
 from kedfem.mesh.tetrahedra import FORMS
-from kedfem.output.picture import ADVICE, TIMEOUT, drawing_fault
-from kedfem.results import replacing
+from kedfem.output.picture import draw_apart
 
 FINENESS = 4
 """Straight pieces that a side of an element is drawn in."""
@@ -88,17 +84,10 @@ def write_mesh_picture(
         arrays |= {f"{key}{i}": getattr(each, key) for key in ("points", "patches", "values", "lines")}
     if found:
         arrays |= _numbers(meshes[0][1], found)
-    with replacing(Path(png)) as part, tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         given = Path(folder) / "meshes.npz"
         np.savez(given, allow_pickle=False, **arrays)
-        drawing = Path(__file__).with_name("mesh_rendering.py")
-        command = [sys.executable, "-P", str(drawing), str(given), str(part), str(len(meshes))]
-        try:
-            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
-        except subprocess.TimeoutExpired as error:
-            raise OutputError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
-        if done.returncode != 0 or not part.is_file():
-            raise OutputError(drawing_fault("the mesh: must be one", done))
+        draw_apart("mesh_rendering.py", (given, Path(png)), (len(meshes),), "the mesh: must be one")
 
 
 def _numbers(mesh: SolidMesh, found: Sequence[Offer]) -> dict[str, np.ndarray]:

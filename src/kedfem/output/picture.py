@@ -1,10 +1,11 @@
-"""One rendered picture of a frame of the animation."""
+"""One rendered picture of a frame of the animation, and how VTK draws."""
 
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from kedfem.errors import OutputError
+from kedfem.errors import OutputError, PictureError
 from kedfem.results import replacing
 
 TIMEOUT = 300
@@ -19,11 +20,9 @@ def write_picture(
     title: str,
     deformation_scale: float = 1.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    meanwhile: Callable[[], object] | None = None,
 ) -> None:
     """Draw the links of a VTU file, deformed as they are there, coloured by von Mises stress.
-
-    VTK draws in a process of its own: without any way to open a window it ends by a segmentation fault, and
-    graphics drivers talk on the terminal.
 
     Parameters
     ----------
@@ -33,44 +32,80 @@ def write_picture(
         The picture.
     title
         Written above; long ones are wrapped.
-    exaggeration
-        Of the deformation in the frame, written below.
+    deformation_scale
+        Exaggeration of the deformation in the frame, written below.
     gravity : (3,) [m/s²]
         Points down in the picture, unless it is looked along.
+    meanwhile
+        What is done here while VTK draws.
 
     Raises
     ------
+    PictureError
+        VTK cannot draw the frame, or cannot open a window here.
     OutputError
-        The frame cannot be read, VTK cannot open a window here, or the PNG cannot be written.
+        There is no such frame, or the PNG cannot be written.
     """
     vtu = Path(vtu)
     if not vtu.is_file():
         raise OutputError(f"{vtu}: must be a frame of the animation, got no such file")
-    with replacing(Path(png)) as part:
-        drawing = Path(__file__).with_name("rendering.py")
-        command = [
-            sys.executable,
-            "-P",
-            str(drawing),
-            str(vtu),
-            str(part),
-            title,
-            str(deformation_scale),
-            *map(str, gravity),
-        ]
-        try:
-            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False)
-        except subprocess.TimeoutExpired as error:
-            raise OutputError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
-        if done.returncode != 0 or not part.is_file():
-            raise OutputError(drawing_fault(f"{vtu}: must be a frame", done))
+    words = (title, deformation_scale, *gravity)
+    draw_apart("rendering.py", (vtu, Path(png)), words, f"{vtu}: must be a frame", meanwhile)
 
 
-def drawing_fault(wanted: str, done: "subprocess.CompletedProcess[bytes]") -> str:
+def draw_apart(
+    script: str,
+    files: tuple[Path, Path],
+    words: Sequence[object],
+    wanted: str,
+    meanwhile: Callable[[], object] | None = None,
+) -> None:
+    """Have VTK draw in a process of its own.
+
+    Without any way to open a window VTK ends by a segmentation fault, and graphics drivers talk on the terminal.
+
+    Parameters
+    ----------
+    script
+        A file beside this one.
+    files
+        What is drawn, and the PNG.
+    words
+        The script's further arguments.
+    wanted
+        What a message says of the subject of the picture.
+    meanwhile
+        What is done here at the same time.
+
+    Raises
+    ------
+    PictureError
+        VTK cannot draw here, or cannot draw this.
+    OutputError
+        The PNG cannot be written.
+    """
+    drawn, png = files
+    with replacing(png) as part:
+        given = (Path(__file__).with_name(script), drawn, part, *words)
+        command = [sys.executable, "-P", *map(str, given)]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as drawing:
+            try:
+                if meanwhile is not None:
+                    meanwhile()
+                _, said = drawing.communicate(timeout=TIMEOUT)
+            except subprocess.TimeoutExpired as error:
+                raise PictureError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
+            finally:
+                drawing.kill()
+        if drawing.returncode != 0 or not part.is_file():
+            raise PictureError(_fault(wanted, drawing.returncode, said.decode(errors="replace")))
+
+
+def _fault(wanted: str, code: int, said: str) -> str:
     """Why there is no picture: VTK cannot draw here, or cannot draw this."""
-    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    lines = said.strip().splitlines()
     if "Traceback (most recent call last):" not in lines:
-        how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
         return f"{ADVICE}, got no window ({how})"
     if lines[-1].startswith("ImportError"):
         return f"{ADVICE}, got {lines[-1]}"

@@ -224,6 +224,10 @@ def _figure(size: tuple[float, float]) -> Any:
 
 def _save(figure: Any, file: Path | io.BytesIO, title: str, kind: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=12)
+    figure.get_layout_engine().execute(figure)
+    figure.set_layout_engine(
+        "none"
+    )  # the layout stays: saving would find it anew, by drawing all of it once more
     said = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import make_interp_spline
 
 from kedfem.results.records import Channel, Results
 
@@ -96,6 +95,8 @@ def _smooth(
         return np.asarray(y[near])
     if len(x) <= CUBIC or not np.isfinite(y).all():
         return np.stack([np.interp(at, x, each) for each in y.T], axis=1)
+    from scipy.interpolate import make_interp_spline
+
     return np.asarray(make_interp_spline(x, y, k=CUBIC)(at))
 
 

@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
 from kedfem.dynamics.loads import applied
@@ -244,6 +243,8 @@ class Literal:
 
         Of others by differences: the mechanism and z move on, and back, as their rates tell.
         """
+        from scipy.spatial.transform import Rotation
+
         out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
         if len(self.hard) == len(out):
             return np.asarray(out)

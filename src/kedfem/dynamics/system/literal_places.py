@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.system.record import (
@@ -62,6 +60,8 @@ def turned_load(
     """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations from QR factors."""
     drawn, weights = shown_by(link, load.forces)
     if link.kind == "beam":
+        from scipy.spatial.transform import Rotation
+
         turn = Rotation.from_rotvec([0, 0, float(weights[0] @ u[:, 2])]).as_matrix() @ R
         return np.asarray(
             load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]])
@@ -99,6 +99,8 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
         return Pose(x, R, by_x, by_Q)
     onto = end.onto
     if end.line is not None:  # the pin's place in the frame of the line
+        from scipy.interpolate import CubicSpline
+
         away = p[end.line.pin] + pin @ end.line.at - p[end.body]
         s = float((away @ R - end.line.at) @ end.line.axis)
         onto = np.einsum("p,pdk->dk", CubicSpline(end.line.stations.s, np.eye(len(onto)))(s), onto)[None]

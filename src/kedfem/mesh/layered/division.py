@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.spatial.distance import cdist
 
 from kedfem.mesh.cad.solids import Sizing
 from kedfem.mesh.layered.mapping import Mapping, mappings
@@ -88,6 +87,8 @@ def _sizes(plan: Plan, size: float, turn: float) -> list[Float[np.ndarray, " m"]
         fair = np.full(len(gap), min(size, curve.length / 2))
         wanted.append(np.minimum.reduce([exact, radii * turn, by_gap, fair]))
     points, flat = np.concatenate([curve.samples for curve in plan.curves]), np.concatenate(wanted)
+    from scipy.spatial.distance import cdist
+
     graded = (flat + _GROWTH * cdist(points, points)).min(axis=1)
     return np.split(graded, np.cumsum([len(one) for one in wanted])[:-1])
 

@@ -5,7 +5,6 @@ from types import ModuleType
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.spatial import KDTree
 
 from kedfem.mesh.choice import SETTINGS, Setting
 from kedfem.mesh.layered.fills import Rim
@@ -87,6 +86,8 @@ def _on_rim(
     if np.linalg.det(diagonals).sum() < 0:
         cells = cells[:, ::-1]
     where = _given_places(rim, step)
+    from scipy.spatial import KDTree
+
     distance, nearest = KDTree(points).query(where)
     if distance.max() > 1e-6 or len(np.unique(nearest)) < len(nearest):
         return None
