@@ -22,8 +22,8 @@ from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh
-from kedfem.mesh.hexahedra import linear, quadratic, serendipity
-from kedfem.mesh.tetrahedra import tetrahedral
+from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
+from kedfem.mesh.elements.tetrahedra import tetrahedral
 from kedfem.scene import Arc, Bar, Extrusion, LinkScene, Material, Meshing, PlateLink
 
 STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)

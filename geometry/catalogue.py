@@ -32,8 +32,8 @@ from geometry.step_files import write_step
 from kedfem.errors import MeshError
 from kedfem.links.solid import solid_basis
 from kedfem.mesh import SolidMesh, mesh_quality
-from kedfem.mesh.bounds import determinant_bounds
 from kedfem.mesh.cad.model import CadKeys
+from kedfem.mesh.elements.bounds import determinant_bounds
 from kedfem.mesh.methods import made_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from

@@ -20,9 +20,9 @@ from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.layered.layers import layer_directions
 from kedfem.mesh.layered.sections import plan_axes
-from kedfem.mesh.path import path
-from kedfem.mesh.revolution import revolution
 from kedfem.mesh.session import gmsh_copy
+from kedfem.mesh.swept.path import path
+from kedfem.mesh.swept.revolution import revolution
 from kedfem.scene import Cad
 
 LONGEST = 60  # [s] for a part

@@ -8,8 +8,16 @@ import numpy as np
 
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.hexahedra import HEX8, HEX27, Face, linear, quadratic, serendipity, without_spare_nodes
-from kedfem.mesh.tetrahedra import tetrahedral
+from kedfem.mesh.elements.hexahedra import (
+    HEX8,
+    HEX27,
+    Face,
+    linear,
+    quadratic,
+    serendipity,
+    without_spare_nodes,
+)
+from kedfem.mesh.elements.tetrahedra import tetrahedral
 
 FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}
 

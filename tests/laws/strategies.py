@@ -15,8 +15,8 @@ from kedfem.links.record import Link
 from kedfem.links.section import Section, rectangle
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
-from kedfem.mesh.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
-from kedfem.mesh.tetrahedra import tetrahedral
+from kedfem.mesh.elements.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
+from kedfem.mesh.elements.tetrahedra import tetrahedral
 from kedfem.scene import Material
 
 

@@ -16,7 +16,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
 from kedfem.mesh import QuadMesh
-from kedfem.mesh.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
+from kedfem.mesh.elements.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
 from kedfem.scene import Material
 from tests.laws.strategies import (
     LAW,

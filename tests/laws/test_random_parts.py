@@ -9,7 +9,7 @@ from geometry.make import empty_model
 
 from kedfem.links.solid import solid_link
 from kedfem.mesh import mesh_quality, part_mesh
-from kedfem.mesh.bounds import valid_everywhere
+from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.scene import Material, link_from
 from tests.random_parts import random_part
 

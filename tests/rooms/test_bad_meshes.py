@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from kedfem.errors import MeshError
-from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, quads, session
-from kedfem.mesh.hexahedra import HEX8
-from kedfem.mesh.raw import RawMesh
+from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, session
+from kedfem.mesh.elements.hexahedra import HEX8
+from kedfem.mesh.files.raw import RawMesh
+from kedfem.mesh.planar import quads
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
 
@@ -118,7 +119,7 @@ class TestMeshFile:
     def test_two_coordinates(self, tmp_path, monkeypatch):
         (tmp_path / "arm.vtu").touch()
         flat = RawMesh(CUBE[:, :2], {"hexahedron": CORNERS})
-        monkeypatch.setattr("kedfem.mesh.file._read", lambda *_: flat)
+        monkeypatch.setattr("kedfem.mesh.files.read._read", lambda *_: flat)
         message = refused({"kind": "mesh", "file": "arm.vtu"}, tmp_path)
         assert "must have nodes of three coordinates, got shape (8, 2) in" in message
 

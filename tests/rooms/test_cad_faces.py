@@ -14,9 +14,9 @@ from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import Solid
-from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.hexahedra import Face, SolidMesh
-from kedfem.mesh.raw import from_meshio
+from kedfem.mesh.elements.hexahedra import Face, SolidMesh
+from kedfem.mesh.files.raw import from_meshio
+from kedfem.mesh.files.read import mesh_from_file
 from kedfem.scene.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, written
 
@@ -144,7 +144,7 @@ class TestGroups:
         path.touch()
         raw = from_meshio(meshio.Mesh(points, cells, cell_sets=sets))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("kedfem.mesh.file._read", lambda *_: raw)
+            patch.setattr("kedfem.mesh.files.read._read", lambda *_: raw)
             above, both = mesh_from_file("mesh", path, 2.0).faces
         assert (above.name, above.kind, both.name, both.kind) == ("above", "plane", "both", "other")
         assert_allclose([above.centre, above.direction], [[1, 1, 2], [0, 0, 1]], atol=1e-12)

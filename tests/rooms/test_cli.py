@@ -19,7 +19,7 @@ import kedfem
 from kedfem import cli
 from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
-from kedfem.mesh.file import mesh_from_file
+from kedfem.mesh.files.read import mesh_from_file
 from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Results, read_results
 from kedfem.scene import read_scene, scene_from, time_grid

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from kedfem.mesh import SolidMesh, mesh_quality
-from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
-from kedfem.mesh.hexahedra import HEX27, shape_functions, shape_gradients
+from kedfem.mesh.elements.hexahedra import HEX27, shape_functions, shape_gradients
 from kedfem.mesh.layered.cusps import Cusp, cusps
 from kedfem.mesh.layered.fills import Rim
 from kedfem.mesh.layered.layers import layer_directions, layered_mesh
@@ -24,6 +23,7 @@ from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.polygons import crosses_itself, polygon_quads
 from kedfem.mesh.layered.sections import plan_of_slabs
 from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.swept.blocks import block_mesh
 
 MM = 1e-3
 Shapes = list[tuple[int, int]]

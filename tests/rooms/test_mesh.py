@@ -15,7 +15,7 @@ from scipy.integrate import quad
 
 from kedfem.links.solid import solid_basis
 from kedfem.mesh import Quality, SolidMesh, checked_mesh, link_mesh, mesh_quality
-from kedfem.mesh.hexahedra import (
+from kedfem.mesh.elements.hexahedra import (
     HEX8,
     HEX20,
     HEX27,
@@ -26,10 +26,10 @@ from kedfem.mesh.hexahedra import (
     shape_functions,
     shape_gradients,
 )
-from kedfem.mesh.outline import outline_area, profile_outline, smallest_width
-from kedfem.mesh.plane import PlaneQuads, pillowed, quadratic_quads
-from kedfem.mesh.quality import scaled_jacobian
-from kedfem.mesh.relaxation import distortion, relaxed
+from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.planar.areas import PlaneQuads, pillowed, quadratic_quads
+from kedfem.mesh.planar.outline import outline_area, profile_outline, smallest_width
+from kedfem.mesh.planar.relaxation import distortion, relaxed
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import Extrusion, LinkScene, part_geometry
 from tests.laws.strategies import examples
@@ -139,7 +139,7 @@ class TestBar:
 
 def meshed_upright() -> SolidMesh:
     """A bar along z; scenes refuse it, for `width` has no direction there, but frames must not fail."""
-    from kedfem.mesh.hexahedra import extruded, frame_along, placed, rectangle_quads
+    from kedfem.mesh.elements.hexahedra import extruded, frame_along, placed, rectangle_quads
 
     line = np.array([0.0, 0.0, 1.0])
     return placed(extruded(*rectangle_quads(1.0, 0.2, 2, 1), 0.1, 1), np.zeros(3), frame_along(line))

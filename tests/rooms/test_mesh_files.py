@@ -12,15 +12,16 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError
-from kedfem.mesh import file, mesh_quality
-from kedfem.mesh.bounds import valid_everywhere
+from kedfem.mesh import mesh_quality
 from kedfem.mesh.cad.sides import boundary_sides
-from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.hexahedra import HEX20, HEX27
-from kedfem.mesh.mixed import EDGES_OF
-from kedfem.mesh.raw import RawMesh, read_mesh
+from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.hexahedra import HEX20, HEX27
+from kedfem.mesh.elements.tetrahedra import FORMS
+from kedfem.mesh.files import read
+from kedfem.mesh.files.mixed import EDGES_OF
+from kedfem.mesh.files.raw import RawMesh, read_mesh
+from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
-from kedfem.mesh.tetrahedra import FORMS
 
 from .test_mesh import volume
 
@@ -227,7 +228,7 @@ def test_gmshs_own_abaqus_files_are_read(tmp_path: Path) -> None:
 def test_a_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
     path, calls = box(tmp_path / "box.msh"), []
-    monkeypatch.setattr(file, "apart", lambda *given: calls.append(given) or read_mesh(path))
+    monkeypatch.setattr(read, "apart", lambda *given: calls.append(given) or read_mesh(path))
     one, two = (mesh_from_file("mesh", path, scale) for scale in (1.0, 2.0))
     assert len(calls) == 1
     assert_allclose(two.points, 2 * one.points, rtol=0)
@@ -254,8 +255,8 @@ def test_readers_that_hang_or_break_down_end_in_a_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reader: object, words: str
 ) -> None:
     (tmp_path / "arm.vtu").write_bytes(words.encode())
-    monkeypatch.setattr(file, "READING", 1)
-    monkeypatch.setattr(file, "read_mesh", reader)
+    monkeypatch.setattr(read, "READING", 1)
+    monkeypatch.setattr(read, "read_mesh", reader)
     wanted = rf"^mesh: .*arm.vtu: must be a mesh file that can be read, .*{words}.*; it may be damaged"
     with pytest.raises(MeshError, match=wanted):
         mesh_from_file("mesh", tmp_path / "arm.vtu", 1.0)

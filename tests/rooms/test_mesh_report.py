@@ -8,7 +8,7 @@ from rich.console import Console
 
 from kedfem.links.part_candidates import offers
 from kedfem.mesh import SolidMesh
-from kedfem.mesh.hexahedra import HEX8, Face
+from kedfem.mesh.elements.hexahedra import HEX8, Face
 from kedfem.tables import mesh_tables
 
 

@@ -14,8 +14,8 @@ from kedfem.errors import MeshError, SceneError
 from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_link
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, methods, part_mesh
-from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.solids import Solid
+from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.scene import LinkScene, Material, link_from, scene_from
 

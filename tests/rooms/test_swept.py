@@ -14,16 +14,16 @@ from numpy.testing import assert_allclose
 from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_basis, solid_link
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
-from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.core import disc
+from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.filling import filled_mesh
-from kedfem.mesh.path_sweep import carried_mesh
-from kedfem.mesh.quality import scaled_jacobian
-from kedfem.mesh.revolved import revolved_mesh
 from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.swept.core import disc
+from kedfem.mesh.swept.path_sweep import carried_mesh
+from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.scene import Material, link_from
 from kedfem.scene.shapes import Cad
 from tests.verification.linear import frequencies

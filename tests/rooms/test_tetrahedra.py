@@ -17,16 +17,16 @@ from kedfem.errors import MeshError
 from kedfem.links.build import bare_link
 from kedfem.links.solid import solid_basis
 from kedfem.mesh import SolidMesh, filling, link_mesh, mesh_quality, part_mesh
-from kedfem.mesh.blends import swept_without_blends
-from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.cad.solids import OtherWayError, Sizing
-from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.hexahedra import extruded, quadratic, rectangle_quads
+from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads
+from kedfem.mesh.elements.simplices import TET10
+from kedfem.mesh.elements.tetrahedra import FORMS, straightened, tetrahedral
+from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
-from kedfem.mesh.simplices import TET10
-from kedfem.mesh.tetrahedra import FORMS, straightened, tetrahedral
+from kedfem.mesh.swept.blends import swept_without_blends
 from kedfem.scene import Cad, link_from, scene_from
 from tests.laws.strategies import ring
 

@@ -8,8 +8,8 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh
-from kedfem.mesh.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
-from kedfem.mesh.tetrahedra import tetrahedral
+from kedfem.mesh.elements.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
+from kedfem.mesh.elements.tetrahedra import tetrahedral
 from kedfem.scene import Material
 
 Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]

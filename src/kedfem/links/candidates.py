@@ -31,7 +31,7 @@ class Candidate:
     """A surface that a joint could sit on.
 
     name : of a face that has one, else empty
-    centre, direction, radius : as of `mesh.hexahedra.Face`; nan where they have no meaning
+    centre, direction, radius : as of `mesh.elements.hexahedra.Face`; nan where they have no meaning
     length : along the axis of a cylinder, else 0 [m]
     facets : boundary facets of the link on it
     """

@@ -12,7 +12,7 @@ from kedfem.links.candidates import Candidate, surfaces
 from kedfem.links.missing import MOST, length, shown
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surface import PLANE_TOLERANCE
-from kedfem.mesh.hexahedra import Face
+from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import ChosenFace, Scene
 
 SAME_DIAMETER = (

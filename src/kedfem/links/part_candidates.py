@@ -13,7 +13,7 @@ from kedfem.links.round_surfaces import CLOSED
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells
 from kedfem.links.surface import flat_face, surface
 from kedfem.mesh import SolidMesh
-from kedfem.mesh.hexahedra import CELL_TYPES, Face
+from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face
 
 KINDS = ("bore", "journal", "ball seat", "ball", "part of a bore", "part of a journal", "plane")
 BLENDS = ("fillet", "rounded")  # words of faces that no joint sits on

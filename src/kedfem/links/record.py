@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.links.section import Section
-from kedfem.mesh.hexahedra import Face
+from kedfem.mesh.elements.hexahedra import Face
 
 Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
 Mass = tuple[Matrix, ...]

@@ -23,7 +23,7 @@ from kedfem.links.spatial_recovery import (
     section_stress,
     section_value,
 )
-from kedfem.mesh.simplices import barycentric
+from kedfem.mesh.elements.simplices import barycentric
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size

@@ -23,7 +23,7 @@ from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.solid import solid_link
 from kedfem.links.spatial_beam import rigidities, spatial_beam_link
 from kedfem.mesh import QuadMesh, SolidMesh
-from kedfem.mesh.hexahedra import Face
+from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import Material
 
 SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from kedfem.links.record import Link, LinkFace, Mass, mass_constants, read_only
 from kedfem.mesh import SolidMesh
-from kedfem.mesh.hexahedra import CELL_TYPES
+from kedfem.mesh.elements.hexahedra import CELL_TYPES
 from kedfem.scene import Material
 
 #: 2³, 3³ and 14 Gauss points: the volume of a distorted element is exact, as is ∫ ∂_i N_a of a curved tetrahedron.

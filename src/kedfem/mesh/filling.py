@@ -8,18 +8,18 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.mesh.blocks import gmsh_hexahedra
-from kedfem.mesh.bounds import valid_everywhere
 from kedfem.mesh.cad.faces import joined_faces
 from kedfem.mesh.cad.model import leave_only
 from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
-from kedfem.mesh.hexahedra import SolidMesh, node_numbers
-from kedfem.mesh.quality import scaled_jacobian
+from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.hexahedra import SolidMesh, node_numbers
+from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.elements.simplices import EDGES, TET10
+from kedfem.mesh.elements.tetrahedra import edge_middles
 from kedfem.mesh.session import gmsh_options, numbered_nodes
-from kedfem.mesh.simplices import EDGES, TET10
-from kedfem.mesh.tetrahedra import edge_middles
+from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _TET10 = 11  # gmsh's number of the 10-node tetrahedron

@@ -7,17 +7,17 @@ import numpy as np
 
 from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.cad.model import CadKeys
-from kedfem.mesh.file import mesh_from_file
-from kedfem.mesh.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, rectangle_quads
+from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, rectangle_quads
+from kedfem.mesh.elements.quality import checked_mesh
+from kedfem.mesh.elements.tetrahedra import FORMS
+from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.memory_forecast import NODES_EACH, check_room
 from kedfem.mesh.methods import NOTHING, KeptWhole, cad_mesh, file_axes
-from kedfem.mesh.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
-from kedfem.mesh.plane import Quads
-from kedfem.mesh.plate import PlateSizes, plate_quads
-from kedfem.mesh.quads import quad_mesh
-from kedfem.mesh.quality import checked_mesh
-from kedfem.mesh.tetrahedra import FORMS
+from kedfem.mesh.planar.areas import Quads
+from kedfem.mesh.planar.flat import Plate, QuadMesh, middle_mesh, swept_mesh
+from kedfem.mesh.planar.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
+from kedfem.mesh.planar.plate import PlateSizes, plate_quads
+from kedfem.mesh.planar.quads import quad_mesh
 from kedfem.scene import (
     Arc,
     Bar,

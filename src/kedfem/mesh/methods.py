@@ -11,19 +11,19 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
-from kedfem.mesh.blends import points_in_file, swept_without_blends
-from kedfem.mesh.blocks import block_mesh
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadratic
+from kedfem.mesh.elements.quality import mesh_quality
+from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
-from kedfem.mesh.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.layered.layers import layered_mesh
-from kedfem.mesh.path_sweep import carried_mesh
-from kedfem.mesh.quality import mesh_quality
-from kedfem.mesh.revolved import revolved_mesh
-from kedfem.mesh.tetrahedra import FORMS
+from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
+from kedfem.mesh.swept.blocks import block_mesh
+from kedfem.mesh.swept.path_sweep import carried_mesh
+from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 

@@ -11,9 +11,9 @@ from jaxtyping import Float, Int
 from kedfem.links.part_candidates import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
-from kedfem.mesh.hexahedra import QUAD9, shape_functions
-from kedfem.mesh.simplices import TRI6
-from kedfem.mesh.tetrahedra import FORMS
+from kedfem.mesh.elements.hexahedra import QUAD9, shape_functions
+from kedfem.mesh.elements.simplices import TRI6
+from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.output.picture import draw_apart
 
 FINENESS = 4

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.cad.words import face_form
-from kedfem.mesh.hexahedra import Face, SolidMesh
+from kedfem.mesh.elements.hexahedra import Face, SolidMesh
 
 _FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
 _ALIKE = 1e-5  # of the radius: cylinders and spheres that are one

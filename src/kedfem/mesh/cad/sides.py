@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
-from kedfem.mesh.simplices import TET_SIDES, TRI6
+from kedfem.mesh.elements.hexahedra import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
+from kedfem.mesh.elements.simplices import TET_SIDES, TRI6
 
 
 def _side_nodes() -> Int[np.ndarray, "6 9"]:

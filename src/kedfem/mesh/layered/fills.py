@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.layered.mapping import Mapping
-from kedfem.mesh.plane import PlaneQuads
+from kedfem.mesh.planar.areas import PlaneQuads
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ from jaxtyping import Float, Int
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.hexahedra import SolidMesh
+from kedfem.mesh.elements.hexahedra import SolidMesh
+from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
@@ -16,7 +17,6 @@ from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
 from kedfem.mesh.layered.sweep import swept
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.quality import mesh_quality
 
 _GOOD = 0.3  # scaled Jacobian from which no smaller size and no other direction is tried
 _SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for

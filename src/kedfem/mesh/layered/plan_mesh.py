@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.solids import OtherWayError
-from kedfem.mesh.choice import GOOD, SETTINGS, best_quads
 from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided
 from kedfem.mesh.layered.fills import Rim, mapped
@@ -14,7 +13,8 @@ from kedfem.mesh.layered.mapping import Mapping
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.polygons import polygon_quads
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.plane import PlaneQuads, quadratic_quads
+from kedfem.mesh.planar.areas import PlaneQuads, quadratic_quads
+from kedfem.mesh.planar.choice import GOOD, SETTINGS, best_quads
 
 _BETTER = 0.05  # by which gmsh's quadrilaterals must be better than mapped ones
 

@@ -6,9 +6,9 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.choice import SETTINGS, Setting
 from kedfem.mesh.layered.fills import Rim
-from kedfem.mesh.plane import PlaneQuads, directed_sides
+from kedfem.mesh.planar.areas import PlaneQuads, directed_sides
+from kedfem.mesh.planar.choice import SETTINGS, Setting
 from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
 _LINE, _POINT = 1, 15  # gmsh's numbers of elements

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh
 

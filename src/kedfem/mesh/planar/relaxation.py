@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import QUAD9, shape_gradients
-from kedfem.mesh.plane import PlaneQuads, Quads, quadratic_quads
+from kedfem.mesh.elements.hexahedra import QUAD9, shape_gradients
+from kedfem.mesh.planar.areas import PlaneQuads, Quads, quadratic_quads
 
 _GRADIENTS = shape_gradients(QUAD9, QUAD9.astype(float))
 _POWER = 4  # the higher, the more the worst element counts

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.mesh.hexahedra import QUAD9, rectangle_quads
-from kedfem.mesh.plane import Quads
+from kedfem.mesh.elements.hexahedra import QUAD9, rectangle_quads
+from kedfem.mesh.planar.areas import Quads
 
 _STEEPEST = np.pi / 8  # most that an element turns along an arc
 _STEEPEST_WAY_IN = np.pi / 6  # and along the bore where that faces the waist

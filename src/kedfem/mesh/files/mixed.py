@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.mesh.hexahedra import HEX20, HEX27, node_numbers, shape_functions
-from kedfem.mesh.simplices import EDGES
+from kedfem.mesh.elements.hexahedra import HEX20, HEX27, node_numbers, shape_functions
+from kedfem.mesh.elements.simplices import EDGES
 
 #: Sides of each kind by the number of its corners, in VTK's order.
 _SIDES: dict[int, tuple[tuple[int, ...], ...]] = {

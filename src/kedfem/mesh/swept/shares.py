@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import SolidMesh
+from kedfem.mesh.elements.hexahedra import SolidMesh
+from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.layered.layers import not_too_bad
-from kedfem.mesh.quality import mesh_quality
 
 _GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
 _SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import HEX27, SolidMesh, node_numbers, without_spare_nodes
-from kedfem.mesh.quality import mesh_quality
+from kedfem.mesh.elements.hexahedra import HEX27, SolidMesh, node_numbers, without_spare_nodes
+from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.simplices import TET10, TRI6, simplex_functions, simplex_gradients
+from kedfem.mesh.elements.simplices import TET10, TRI6, simplex_functions, simplex_gradients
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 _SIDES = ((0, -1), (1, 0), (0, 1), (-1, 0))

@@ -7,9 +7,9 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.mesh.cad.looks import OFF, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Solid
 from kedfem.mesh.layered.sections import plan_axes
-from kedfem.mesh.looks import OFF, Looks, common_axes, looks
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
 _ENDS = 12  # plane faces that are tried as the first end

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.mesh.choice import SETTINGS, Setting, best_quads
-from kedfem.mesh.outline import Outline, edge_circles, outline_area, scaled_outline
-from kedfem.mesh.plane import PlaneQuads, Quads, directed_sides
+from kedfem.mesh.planar.areas import PlaneQuads, Quads, directed_sides
+from kedfem.mesh.planar.choice import SETTINGS, Setting, best_quads
+from kedfem.mesh.planar.outline import Outline, edge_circles, outline_area, scaled_outline
 from kedfem.mesh.session import gmsh_model, quadrilaterals
 
 _LARGE = 1000  # quadrilaterals from which time matters: the first good mesh is taken, and relaxed less

@@ -10,16 +10,16 @@ from jaxtyping import Bool, Float
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
-from kedfem.mesh.core import NEAR, core_mesh, core_radius
-from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
-from kedfem.mesh.revolution import Revolution, revolution
 from kedfem.mesh.session import gmsh_copy
-from kedfem.mesh.shares import sized
+from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
+from kedfem.mesh.swept.revolution import Revolution, revolution
+from kedfem.mesh.swept.shares import sized
 
 _ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
 _FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.mesh.bounds import valid_everywhere
-from kedfem.mesh.flat import QuadMesh
-from kedfem.mesh.hexahedra import HEX8, HEX20, HEX27, NODES, Face, SolidMesh, shape_gradients
+from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.hexahedra import HEX8, HEX20, HEX27, NODES, Face, SolidMesh, shape_gradients
+from kedfem.mesh.elements.simplices import TET10
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.simplices import TET10
+from kedfem.mesh.planar.flat import QuadMesh
 
 Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
 LEAST = 0.1  # scaled Jacobian of hexahedra and quadrilaterals where nothing is asked for

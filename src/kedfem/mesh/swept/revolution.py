@@ -6,9 +6,9 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.mesh.cad.looks import Axis, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import OtherWayError, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.looks import Axis, Looks, common_axes, looks
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
-from kedfem.mesh.hexahedra import Face
-from kedfem.mesh.mixed import triangles
-from kedfem.mesh.raw import RawMesh
+from kedfem.mesh.elements.hexahedra import Face
+from kedfem.mesh.files.mixed import triangles
+from kedfem.mesh.files.raw import RawMesh
 
 _ACCURACY = (
     2e-3  # of nodes, in sizes of the group: numbers in a file may be few, a circle of chords is not round

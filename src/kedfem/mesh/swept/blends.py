@@ -11,7 +11,7 @@ from kedfem.mesh.cad.faces import beyond, with_faces
 from kedfem.mesh.cad.model import leave_only
 from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import SolidMesh
+from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.layered.layers import layered_mesh, slanted_faces
 from kedfem.mesh.session import gmsh_copy
 

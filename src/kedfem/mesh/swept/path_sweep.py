@@ -8,14 +8,14 @@ from types import ModuleType
 import numpy as np
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
-from kedfem.mesh.path import Frame, Leg, path
 from kedfem.mesh.session import gmsh_copy
-from kedfem.mesh.shares import sized
+from kedfem.mesh.swept.path import Frame, Leg, path
+from kedfem.mesh.swept.shares import sized
 
 _TURN = np.radians(18)  # of an arc per element where no size is asked for, as about an axis
 _LONG = 2.5  # an element's length along the path by its size in the section, where no size is asked for

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.sides import SIDE_NODES, owned_sides
-from kedfem.mesh.hexahedra import (
+from kedfem.mesh.elements.hexahedra import (
     HEX8,
     HEX27,
     SolidMesh,
@@ -17,7 +17,7 @@ from kedfem.mesh.hexahedra import (
     serendipity,
     without_spare_nodes,
 )
-from kedfem.mesh.simplices import EDGES, TET10
+from kedfem.mesh.elements.simplices import EDGES, TET10
 
 #: Of two corners of a hexahedron the node of hex27 between them.
 _BETWEEN = np.array([node_numbers(HEX27, (HEX8 + corner) // 2) for corner in HEX8])

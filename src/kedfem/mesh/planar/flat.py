@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.hexahedra import SolidMesh, extruded, placed
-from kedfem.mesh.plane import Quads
+from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, placed
+from kedfem.mesh.planar.areas import Quads
 
 
 @dataclass(frozen=True, slots=True)

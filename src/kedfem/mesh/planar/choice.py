@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kedfem.mesh.plane import PlaneQuads, Quads, pillowed
-from kedfem.mesh.quality import scaled_jacobian
-from kedfem.mesh.relaxation import relaxed
+from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.planar.areas import PlaneQuads, Quads, pillowed
+from kedfem.mesh.planar.relaxation import relaxed
 
 GOOD = 0.5  # scaled Jacobian that is good enough: of such meshes the one with the fewest elements is taken
 FAIR = 0.3  # scaled Jacobian below which subdivision, at four times the elements, is tried too

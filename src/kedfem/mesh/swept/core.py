@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.choice import best_quads
-from kedfem.mesh.hexahedra import SolidMesh, stacked
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked
 from kedfem.mesh.layered.fills import Rim, mapped
 from kedfem.mesh.layered.mapping import Mapping
 from kedfem.mesh.layered.partition import Curve, Plan, Region
-from kedfem.mesh.plane import quadratic_quads
+from kedfem.mesh.planar.areas import quadratic_quads
+from kedfem.mesh.planar.choice import best_quads
 
 NEAR = 1e-7  # of the solid's size: that near to the axis is on it, that near to each other is one
 _SHARE = 0.6  # of the least radius of anything off the axis: the core's own

@@ -9,11 +9,11 @@ from jaxtyping import Int
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
-from kedfem.mesh.groups import named_faces
-from kedfem.mesh.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
+from kedfem.mesh.files.groups import named_faces
+from kedfem.mesh.files.mixed import one_kind
+from kedfem.mesh.files.raw import CORNERS, ENDINGS, RawMesh, read_mesh
 from kedfem.mesh.isolated import MESH_FILE, READING, apart
-from kedfem.mesh.mixed import one_kind
-from kedfem.mesh.raw import CORNERS, ENDINGS, RawMesh, read_mesh
 from kedfem.store import contents, itself, kept
 
 #: Nodes of the solid cells that are taken.

@@ -1,0 +1,1 @@
+"""Plane meshes: outlines and areas of quadrilaterals, plate links in blocks."""
