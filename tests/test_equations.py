@@ -164,8 +164,3 @@ def test_equations_of_the_notation_are_of_the_source() -> None:
     equations = [row[5] for row in table("notation.md", "# Notation") if row[5]]
     assert equations
     assert set().union(*(numbers(where) for where in equations)) <= SOURCE
-
-
-def test_the_index_names_every_page() -> None:
-    linked = set(re.findall(r"\]\(([^)]+\.md)\)", (DOCS / "README.md").read_text("utf-8")))
-    assert {page.name for page in DOCS.glob("*.md")} - {"README.md"} <= linked

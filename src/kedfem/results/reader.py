@@ -32,7 +32,7 @@ def read_results(path: Path) -> Results:
     Parameters
     ----------
     path
-        A file written by :class:`~kedfem.results.ResultsWriter`.
+        A file that a run wrote.
 
     Returns
     -------

@@ -1,0 +1,156 @@
+"""The pages of docs/: each is found from the start page; what lessons and how-to pages have typed does what they show."""
+
+import contextlib
+import io
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from kedfem.cli import app
+from kedfem.scene import scene_from
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BLOCK = re.compile(r"^```(toml|text|console|python)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]\d+)?")
+NEAR = 0.02  # of a number that a page shows: other processors round other trials
+
+
+def linked(page: Path) -> set[Path]:
+    """Pages of the lists `{toctree}` of a page."""
+    text = page.read_text("utf-8") if page.suffix == ".md" else ""
+    out: set[Path] = set()
+    for options in re.findall(r"^```\{toctree\}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
+        for line in options.splitlines():
+            if line and not line.startswith(":"):
+                out |= {
+                    file.resolve()
+                    for ending in (".md", ".ipynb")
+                    for file in page.parent.glob(f"{line}{ending}")
+                }
+    return out
+
+
+def test_every_page_is_in_a_list_of_contents() -> None:
+    """A new page is a line in a `{toctree}`: how-to/index.md, reference/index.md, theory.md, about.md."""
+    found, todo = set(), {DOCS / "index.md"}
+    while todo:
+        page = todo.pop()
+        found.add(page)
+        todo |= linked(page) - found
+    generated = {
+        DOCS / "reference" / "messages.md",
+        DOCS / "reference" / "command-line.md",
+        *DOCS.glob("gallery/*"),
+    }
+    pages = {*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")} - {DOCS / "README.md"} - generated
+    assert sorted(page.relative_to(DOCS).as_posix() for page in pages - found) == []
+
+
+def words(line: str) -> list[str]:
+    """A line of output without the frames of tables."""
+    return re.sub(r"[│┃]", " ", line).split()
+
+
+def same(shown: str, said: str) -> bool:
+    """Two words that are equal, or numbers with what stands around them that are near."""
+    numbers = [[float(m[0]) for m in NUMBER.finditer(word)] for word in (shown, said)]
+    bare = [NUMBER.sub("#", word) for word in (shown, said)]
+    return bare[0] == bare[1] and numbers[0] == pytest.approx(numbers[1], rel=NEAR)
+
+
+def shows(output: str, line: str) -> bool:
+    """Whether some line of an output begins as a line of a page."""
+    wanted = words(line)
+    return any(
+        len(got) >= len(wanted) and all(map(same, wanted, got)) for got in map(words, output.splitlines())
+    )
+
+
+def followed(page: str) -> int:
+    """Lines of output that a page shows, after doing what it says: its files written, its commands and scripts run."""
+    output, seen = "", 0
+    for kind, text in BLOCK.findall((DOCS / page).read_text("utf-8")):
+        name = re.match(r"# ([\w.]+)\n", text)
+        if kind in {"toml", "text"} and name:
+            Path(name[1]).write_text(text.removeprefix(name[0]) if kind == "text" else text, encoding="utf-8")
+        elif kind == "console":
+            for command in text.splitlines():
+                done = CliRunner().invoke(
+                    app, command.removeprefix("kedfem ").split(), env={"COLUMNS": "110"}
+                )
+                assert done.exit_code == 0, done.output
+                output = done.output
+        elif kind == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as said:
+                exec(compile(text, page, "exec"), {"__name__": "page"})
+            output = said.getvalue()
+        elif kind == "text":
+            missing = [line for line in text.splitlines() if not shows(output, line)]
+            assert missing == [], output
+            seen += len(text.splitlines())
+    return seen
+
+
+def test_shown_lines_are_looked_for_in_the_output() -> None:
+    output = "│ crank │ 6.867 MPa │ (0, 0) m │\n"
+    assert shows(output, "│ crank │ 6.87 MPa │")
+    assert not shows(output, "│ crank │ 7.2 MPa │")
+    assert not shows(output, "│ rocker │ 6.867 MPa │")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("page", "lines"),
+    [("tutorial/first-linkage.md", 12), ("tutorial/own-part.md", 7)],
+    ids=str,
+)
+def test_a_lesson_does_what_it_says(
+    page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copyfile(ROOT / "geometry" / "connecting_rod.step", "rod.step")
+    assert followed(page) == lines
+
+
+@pytest.mark.parametrize(
+    ("page", "lines"),
+    [("how-to/drive-from-file.md", 0), ("how-to/parameter-study.md", 3)],
+    ids=str,
+)
+def test_a_how_to_does_what_it_says(
+    page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert followed(page) == lines
+    for file in tmp_path.glob("*.toml"):
+        scene_from(tomllib.loads(file.read_text("utf-8")), tmp_path)
+
+
+@pytest.mark.long
+def test_the_notebook_runs_and_shows_its_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # notebooks have one of their own
+    book = nbformat.read(DOCS / "how-to" / "notebook.ipynb", 4)
+    assert all(not cell.get("outputs") for cell in book.cells), "commit it without outputs"
+    NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    shown = [output for cell in book.cells for output in cell.get("outputs", [])]
+    kinds = [kind for output in shown for kind in output.get("data", {})]
+    assert "image/png" in kinds
+    assert any(
+        re.match(r"done after \d+\.\d s", output.get("data", {}).get("text/html", "")) for output in shown
+    )
+    (table,) = (
+        output.data["text/plain"]
+        for output in shown
+        if "stress in the rod" in output.get("data", {}).get("text/plain", "")
+    )
+    stresses = [float(row.split()[1]) for row in table.splitlines()[2:]]
+    assert len(stresses) == 5
+    assert sorted(stresses) == stresses  # longer rods bend more under their own inertia
