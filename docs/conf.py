@@ -2,6 +2,7 @@
 
 import re
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -23,6 +24,7 @@ exclude_patterns = ["README.md", "site"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence", "deflist"]
 suppress_warnings = ["myst.header"]  # a page's figures may begin below a table
+smartquotes = False  # a prime is a derivative
 nb_execution_mode = "cache"
 nb_execution_timeout = 120
 nb_execution_raise_on_error = True
@@ -71,6 +73,21 @@ def _fields(_app: Sphinx, what: str, _name: str, _obj: object, _options: object,
     lines[:] = out
 
 
+def _parameters(
+    _app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]
+) -> None:
+    """Lines `name : meaning` below a heading such as Parameters: what follows the colon is no type."""
+    if what == "class":
+        return
+    out: list[str] = []
+    headed = False
+    for line, after in pairwise([*lines, ""]):
+        headed = headed or set(after) == {"-"}
+        found = re.match(r"([\w*, ]+) : (.*)", line) if headed else None
+        out += [found[1], f"    {found[2]}"] if found else [line]
+    lines[:] = out
+
+
 def _offline(app: Sphinx, failed: Exception | None) -> None:
     """A page that would fetch something from a host is a warning, and so an error."""
     if failed or app.builder.format != "html":
@@ -88,4 +105,5 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", _links)
     app.connect("include-read", lambda app, path, parent, content: _links(app, path, content))
     app.connect("build-finished", _offline)
-    app.connect("autodoc-process-docstring", _fields)
+    app.connect("autodoc-process-docstring", _fields, priority=100)
+    app.connect("autodoc-process-docstring", _parameters, priority=100)  # before napoleon

@@ -26,11 +26,12 @@ def linked(page: Path) -> set[Path]:
     out: set[Path] = set()
     for options in re.findall(r"^```\{toctree\}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
         for line in options.splitlines():
-            if line and not line.startswith(":"):
+            name = re.sub(r".*<(.*)>", r"\1", line)  # a title may stand before it
+            if name and not name.startswith(":"):
                 out |= {
                     file.resolve()
                     for ending in (".md", ".ipynb")
-                    for file in page.parent.glob(f"{line}{ending}")
+                    for file in page.parent.glob(f"{name}{ending}")
                 }
     return out
 

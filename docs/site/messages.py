@@ -21,16 +21,19 @@ it has. Exit statuses are on the [command line's page](command-line.md).
 
 A warning never stops a run. It is printed, kept in `results.h5` and shown in the report.
 
-| it begins with or names | what it is about | what to do |
+| it says | what it is about | what to do |
 |---|---|---|
-| `sizes` | a length, mass, modulus or speed that looks like another unit (millimetres given as metres) | write the unit: `"25 mm"` |
+| `... m long, longer than any machine's`, `is it in mm?`, `are all lengths in one unit?` | a number that looks like one of another unit | write the unit: `"25 mm"` |
 | `the step resolves the first frequency ... by ... steps in a period` | vibration of the mechanism is faster than the time step | nothing where the motion is meant without vibration; else a shorter `analysis.step`, or leave it open ([accuracy](../accuracy.md)) |
-| `harmonic ... of the drive` | the drive meets a natural frequency | `kedfem frequencies`, another speed, damping ([frequencies](../frequencies.md)) |
-| `estimated error` | mesh, step, modes or frames leave more than 5 %, or more than twice what was asked for | what the warning names; [how far to trust results](../tutorial/trust.md) |
-| `rigid-body frames` | links bend so far that stiffness has to follow them | `frames = "co-rotational"` in `[analysis]` |
-| `energy` or `momentum` | the balance of a run leaves more than 2 % | a shorter step |
-| `statically indeterminate` | a joint force that rigid-body statics leaves open: it depends on stiffness alone | looser joints, as `kedfem check` proposes |
-| stress near a corner, a point force, a rigid coupling | it grows with every refinement | [peak stress](../how-to/peak-stress.md) |
+| `the drive's harmonic ... meets the first frequency` | resonance somewhere on the revolution | `kedfem frequencies`, another speed, damping ([frequencies](../frequencies.md)) |
+| `estimated error: ...; most of it from the ...` | mesh, step, modes, frames or rounding leave more than 5 %, or more than twice what was asked for | what the warning names; [how far to trust results](../tutorial/trust.md) |
+| `the elastic rotation of links is up to ... deg` | links bend so far that stiffness has to follow them | `frames = "co-rotational"` in `[analysis]` |
+| `the residual of the balance is ...` | energy or momentum is lost or made by the steps | shorter steps |
+| `the step is too long for rho_inf` | numerical damping is too small for the angle of a step: vibration would grow | as many steps as it says, or a smaller `rho_inf` |
+| `joints/NAME/force: not reported` | a force that rigid-body statics leaves open | looser joints, as `kedfem check` proposes |
+| `the highest stress, ..., is at a sharp re-entrant corner` | stress there grows with every refinement | [peak stress](../how-to/peak-stress.md) |
+| `comes near a singular position` | a mechanism that moves freely passes a position with two ways to go on | damping, or a shorter step to compare with |
+| `... contradicts ...`, `a part of its effort is missing` | two routes to one force differ | do not use the run; it is worth a report as a defect |
 
 ## Faults of a scene
 
@@ -73,5 +76,9 @@ def messages() -> str:
     """The text of the page."""
     parts = [INTRODUCTION]
     for table, rows in groupby(faults(), key=lambda row: row[0]):
-        parts.append(f"### {table}\n\n```text\n" + "\n".join(line for _, line in rows) + "\n```\n\n")
+        parts.append(
+            f"### {table}\n\n```{code - block} none\n:class: wrapped\n\n"
+            + "\n".join(line for _, line in rows)
+            + "\n```\n\n"
+        )
     return "".join(parts)
