@@ -37,6 +37,7 @@ from kedfem.scene import (
     stops,
 )
 from kedfem.scene.hints import field_hint, keys, kind_of, models, options
+from kedfem.scene.reference_examples import EXAMPLES
 from kedfem.scene.units import Quantity
 
 INTRODUCTION = """\
@@ -180,7 +181,8 @@ def scene_reference() -> str:
         )
     ]
     for heading, note, records in SECTIONS:
-        parts.append(f"## {heading}\n" + (f"\n{note}\n" if note else ""))
+        example = f"\n```toml{EXAMPLES[heading]}```\n" if heading in EXAMPLES else ""
+        parts.append(f"## {heading}\n" + (f"\n{note}\n" if note else "") + example)
         parts += [record_table(record, alone=len(records) == 1) for record in records]
     return "\n".join(parts)
 

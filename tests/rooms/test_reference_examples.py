@@ -1,0 +1,54 @@
+"""Every example of the scene reference is valid, within a whole scene, and every table has one."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from kedfem.scene import scene_from
+from kedfem.scene.reference import SECTIONS
+from kedfem.scene.reference_examples import EXAMPLES
+from tests.rooms.test_bad_scenes import BEAMS, FREE, GOOD
+
+UNDRIVEN = ("motor", "spring", "initial_motions")
+SLIDE = "S"
+PART = "The file of a part"
+
+
+def base(text: str) -> str:
+    """The scene of a test that has the names of an example."""
+    if any(word in text for word in UNDRIVEN):
+        return FREE
+    return BEAMS if f'joint = "{SLIDE}"' in text else GOOD
+
+
+def merged(scene: dict[str, object], change: Mapping[str, object]) -> dict[str, object]:
+    """A scene with the tables of an example; a table of another kind replaces the whole one."""
+    for key, value in change.items():
+        old = scene.get(key)
+        same = (
+            isinstance(old, dict)
+            and isinstance(value, dict)
+            and old.get("kind") == value.get("kind", old.get("kind"))
+        )
+        scene[key] = merged(old, value) if same else value  # type: ignore[arg-type]
+    return scene
+
+
+def test_every_table_of_the_reference_has_an_example() -> None:
+    assert list(EXAMPLES) == [heading for heading, _, _ in SECTIONS]
+
+
+@pytest.mark.parametrize("heading", EXAMPLES)
+def test_an_example_of_the_reference_is_valid_in_a_whole_scene(heading: str, tmp_path: Path) -> None:
+    text = EXAMPLES[heading]
+    (tmp_path / "materials.toml").write_text("[materials.mine]\ndensity = 2800\n")
+    if heading == PART:
+        (tmp_path / "part.toml").write_text(text)
+        text = '[links.rocker.shape]\nkind = "part"\nfile = "part.toml"\nbetween = ["C", "D"]\n'
+    scene_from(merged(tomllib.loads(base(text)), tomllib.loads(text)), tmp_path)
+    keys = re.sub(r"\[([\w.]+)\.NAME(.*)\]", r"[\1.", heading)
+    if heading.startswith("["):
+        assert keys.rstrip("]") in text, "the example shows the table"
