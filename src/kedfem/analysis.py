@@ -1,6 +1,6 @@
 """The whole job: a scene in; time series, animation, plots and a picture out."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path as FilePath
@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of, meaningless
 from kedfem.accuracy.estimates import Strained, budget
-from kedfem.accuracy.histories import Histories
+from kedfem.accuracy.histories import Histories, steady_state
 from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
@@ -21,9 +21,11 @@ from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.cost import factor_words
 from kedfem.dynamics.levels import level_steps
+from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.loads import coarse_steps
-from kedfem.dynamics.transient import eased_warning
-from kedfem.links.recovery import stress_recovery
+from kedfem.dynamics.transient import Steps, eased_warning, period_map
+from kedfem.dynamics.vibration import Vibration, vibration
+from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.output.derived import (
     MESH,
@@ -32,6 +34,7 @@ from kedfem.output.derived import (
     peak_warning,
     refuse_foreign,
     write_derived,
+    write_vibration,
 )
 from kedfem.output.stress_files import Extremes, write_envelope, write_top
 from kedfem.output.vtu import write_cells, write_frame
@@ -95,6 +98,7 @@ def analyse(
     resumes: bool = False,
     every: float = EVERY,
     stresses_since: float = -inf,
+    ends: Sequence[Scene] = (),
 ) -> Run:
     """Run a scene and write its results.
 
@@ -105,6 +109,7 @@ def analyse(
     resumes : whether to go on from the last state that an earlier run of the same scene stored
     every : seconds between stored states
     stresses_since : time [s] before which stresses do not count as highest
+    ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
 
     Raises
     ------
@@ -118,7 +123,7 @@ def analyse(
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
-        run = _analysed(scene, folder, watch, keeper, stresses_since)
+        run = _analysed(scene, folder, watch, keeper, stresses_since, ends)
         remove_state(folder)
         return _reported(run, watch) if scene.output.report else run
 
@@ -130,14 +135,16 @@ def _reported(run: Run, watch: Watch) -> Run:
     return replace(run, warnings=(*run.warnings, *(f"report: {text}" for text in missing)))
 
 
-def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float) -> Run:
+def _analysed(
+    scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float, ends: Sequence[Scene] = ()
+) -> Run:
     """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
-    ready, reduction = prepared(scene, clock.stage)
+    ready, reduction = prepared(scene, clock.stage, ends)
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly)]
     solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
@@ -163,11 +170,13 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
     errors = step.errors if step.levels > 1 else None
-    found = clock.timed("estimates", lambda: budget(ready, seen, reduction, _in_memory(results), errors))
+    found = clock.timed(
+        "estimates", lambda: budget(ready, seen, reduction, _in_memory(results, solvers), errors)
+    )
     notices += budget_warning(found, asked)
     step = replace(step, errors=found.step or step.errors)
-    steady = steady_of(scene, solvers)
-    notices += steady_warning(steady)
+    steady, grows = _growing(ready, solvers)
+    notices += [*_drawn(ready, recoveries, grows, folder), *steady_warning(steady)]
     notes = attributes(found) | step.notes | (balance_notes(balance) if balance else {})
     notes |= steady.notes if steady else {}
     add_notes(folder / "results.h5", notes)
@@ -176,8 +185,7 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     if why := unstable(steady) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
-    peak = highest(results.peaks)
-    notices += peak_warning(peak)
+    notices += peak_warning(peak := highest(results.peaks))
     _highest_stresses(scene, folder, results.drive, envelope, doubts)
     if envelope.worst is not None:
         write_frame(folder / WORST, envelope.worst.t, fields(scene, ready.model, recoveries, envelope.worst))
@@ -187,6 +195,22 @@ def _analysed(scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, sinc
     results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
                balance, found, plain, step, steady)  # fmt: skip
+
+
+def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
+    """What is known of a steady motion, and of one that is unstable the vibration that grows."""
+    steady, solver = steady_of(ready.scene, solvers), solvers[-1]
+    if steady is None or not steady.unstable or isinstance(solver, LiteralSteps) or solver.steady is None:
+        return steady, None
+    over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
+    found = vibration(over, solver, solver.steady)
+    return replace(steady, vibration=found.words), found
+
+
+def _drawn(
+    ready: Prepared, recoveries: list[StressRecovery], grows: Vibration | None, folder: FilePath
+) -> tuple[str, ...]:
+    return write_vibration(ready.scene, ready.model, recoveries, grows, folder) if grows else ()
 
 
 def _about_steps(ready: Prepared, clock: "Clock") -> list[str]:
@@ -216,10 +240,10 @@ def _mesh_field(strained: Strained, file: FilePath) -> None:
         write_cells(file, cells, "mesh_error", [values for _, values in parts])
 
 
-def _in_memory(results: Results) -> Histories:
+def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
     """The channels of a run as its errors are judged."""
     channels = {name: each for name, each in results.channels.items() if kind_of(each[0]) is not None}
-    return Histories(results.time, channels)
+    return Histories(results.time, channels, begun=steady_state(solvers))
 
 
 @dataclass

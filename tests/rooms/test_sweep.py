@@ -15,10 +15,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from kedfem.accuracy import reduction
 from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
 from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
+from kedfem.sweep.points import GROWTH, Chosen, Job, finished
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
@@ -296,3 +298,55 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     tables = [(tmp_path / folder / "sweep.csv").read_text() for folder in ("killed", "whole")]
     assert tables[0] == tables[1]
     assert tables[0].count("complete") == 10
+
+
+def reduced_four_bar() -> dict[str, Any]:
+    """Of plane links that are reduced, with a load that does not grow with the speed."""
+    link = bar(fidelity="plane", reduced=True, mesh={"elements": [8, 1]})
+    return {
+        **scenes.four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")),
+        "damping": {"beta": 1e-5},
+        "loads": {"push": {"kind": "force", "link": "coupler", "at": "B", "vector": [0, -500]}},
+        "analysis": {
+            "kind": "steady", "steps_per_revolution": 120, "rho_inf": 0.9, "reduction_tolerance": 1e-2,
+        },
+        "output": {"plots": False, "picture": False, "animation": False},
+    }  # fmt: skip
+
+
+def test_points_at_other_speeds_and_dampings_share_their_modes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same peaks as with modes of their own, within the tolerance; found once."""
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+    raw, made = reduced_four_bar(), list[int]()
+
+    def counted(*given: Any) -> Any:
+        made.append(1)
+        return found(*given)
+
+    found = reduction.reduced
+    monkeypatch.setattr(reduction, "reduced", counted)
+    axes = axes_of(["drive.speed=100rpm,200rpm,400rpm", "damping.beta=1e-5,4e-5"], raw)
+    base = Base(raw, tmp_path, "four")
+    done = sweep(base, axes, QUICK, tmp_path / "out", executor=Inline())
+    assert len(made) == 1
+    assert [row.status for row in done.rows] == ["complete"] * 6
+    for k in (0, 3, 4):
+        alone = finished(Job(base_of(base), done_at(axes, k), Chosen(), 1.0))
+        for name in ("stress/coupler/peak", "joints/C/force/magnitude"):
+            assert_allclose(done.rows[k].extremes[name][1][0], alone.extremes[name][1][0], rtol=1e-2)
+        assert_allclose(done.rows[k].extremes[GROWTH][1][0], alone.extremes[GROWTH][1][0], rtol=2e-2)
+    assert len(made) == 4
+
+
+def base_of(base: Base) -> Base:
+    """As a sweep with plain defaults takes it."""
+    return Base(
+        {**base.raw, "analysis": {**base.raw["analysis"], "accuracy": "quick"}}, base.folder, base.stem
+    )
+
+
+def done_at(axes: Any, k: int) -> dict[Any, Any]:
+    """Values of a point."""
+    return {axis.where: axis.values[k] for axis in axes}

@@ -198,9 +198,11 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     grid = time_grid(ready.scene)
     if grid.steps // 2 >= max(fewest_steps(ready.scene), 4):
         return single_errors(
-            base, histories(replace(ready, scene=_beside(ready.scene, 2.0, grid.steps // 2)))
+            base, histories(replace(ready, scene=_beside(ready.scene, 2.0, grid.steps // 2)), near=base.begun)
         )[0]
-    return single_errors(histories(replace(ready, scene=_beside(ready.scene, 0.5, 2 * grid.steps))), base)[1]
+    return single_errors(
+        histories(replace(ready, scene=_beside(ready.scene, 0.5, 2 * grid.steps)), near=base.begun), base
+    )[1]
 
 
 def _beside(scene: Scene, factor: float, steps: int) -> Scene:
@@ -231,13 +233,13 @@ def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> d
         model = elastic_model(scene, small.linkage, along=small.path)
         other = histories(replace(small, scene=scene, model=model))
         return {name: REST * error for name, error in relative_errors(base, other).items()}
-    other = histories(replace(small, model=softened(model, eta)))
+    other = histories(replace(small, model=softened(model, eta)), near=base.begun)
     return relative_errors(base, other)
 
 
 def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
     """Of a scene with both beams and meshed links: each by itself, added up."""
-    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta))))
+    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
     kept = {link.name: link for link in small.model.links if link.meshed and link.fit is None}
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft

@@ -1,6 +1,6 @@
 """Runs kept in memory, and how far they are apart."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,18 @@ from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.periodic import Periodic, Search
+from kedfem.dynamics.transient import Steps
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 
 FAINT = (
     3e-3  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
 )
+ROUGHLY = 1e-6  # of its size: what a steady motion that is compared may leave in a period
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 
 
@@ -28,18 +33,21 @@ class Histories:
     channels : name → (channel, values (T, c))
     kept : states at the steps that were asked for
     size : of the linkage [m]
+    begun : the state with which a steady motion begins; None of another, or if it is not at hand
     """
 
     time: Float[np.ndarray, " T"]
     channels: Mapping[str, tuple[Channel, Float[np.ndarray, "T c"]]]
     kept: tuple[Snapshot, ...] = ()
     size: float = 0.0
+    begun: State | None = None
 
 
 def histories(
     ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None,
     look: Callable[[Block], None] = lambda block: None,
     follow: Callable[[Block, dict[str, Float[np.ndarray, "T c"]]], None] = lambda block, values: None,
+    near: State | None = None,
 ) -> Histories:  # fmt: skip
     """Run a prepared scene and keep its channels.
 
@@ -49,12 +57,16 @@ def histories(
     watch : called now and then; what it raises ends the run
     look : sees every block
     follow : sees every block with its rows
+    near : a state near to that with which a steady motion begins
     """
     recorded = [
         x for x in recording(ready.scene, ready.model, linked=ready.linkage) if asked_for(x.channel.name)
     ]
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
+    for solver in solvers:
+        if not isinstance(solver, LiteralSteps):
+            solver.search = Search(near, ROUGHLY)
     for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers):
         times.append(block.motion.t)
         taken.append(rows(recorded, block))
@@ -66,7 +78,13 @@ def histories(
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))
         for each in recorded
     }
-    return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model))
+    return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model), steady_state(solvers))
+
+
+def steady_state(solvers: Sequence[Steps]) -> State | None:
+    """The state with which a steady motion begins, that of the finest steps; None of another motion."""
+    found = getattr(solvers[-1], "steady", None)
+    return found.state if isinstance(found, Periodic) else None
 
 
 def extent(model: Model) -> float:

@@ -5,12 +5,16 @@ the full linkage; these are added to the modes, and the run is repeated. What ch
 runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
 tolerance, the richer modes are kept and the same is done again.
 
+Scenes that differ in the speed of their drive and in damping alone can share one reduction (`shared_modes`): modes are
+found at the fastest, and those added that the estimate asks for at the slowest; the larger estimate of both counts.
+
 Of links with co-rotational frames each segment is reduced, with modes that rigid-body frames give; the runs that estimate
 the error have co-rotational frames. Of the residual in their frames only what moments do in turning these is left out.
 """
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +22,7 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.shared_modes import as_alike, damped_as, last_of
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.bases import bases
 from kedfem.dynamics.dense import SMALL
@@ -32,7 +37,14 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, drive_angle, path_parameter, time_grid, turn_steps, without_vibration
+from kedfem.scene import (
+    Scene,
+    drive_angle,
+    path_parameter,
+    time_grid,
+    turn_steps,
+    without_vibration,
+)
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
@@ -64,8 +76,14 @@ class Reduction:
     tolerance: float
 
 
-def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, Reduction | None]:
+def prepared(
+    scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
+) -> tuple[Prepared, Reduction | None]:
     """Everything of a scene that does not need a time step; links that ask for it are reduced.
+
+    Parameters
+    ----------
+    ends : scenes that share their modes with this one, as `alike` says; none: it has its own
 
     Raises
     ------
@@ -75,11 +93,19 @@ def prepared(scene: Scene, stage: Stage = lambda name: None) -> tuple[Prepared, 
     if not chosen:
         return meshed(scene, stage), None
     counts = {name: count for name, count in chosen.items() if count is not None}
-    found = kept(
-        "reduction", key(scene),
-        lambda: reduced(meshed(scene, stage), chosen, scene.analysis.reduction_tolerance, counts, stage),
-        _packed, lambda stored: _unpacked(stored, scene),
-    )  # fmt: skip
+
+    def found_for(one: Scene, *others: Scene) -> Reduction:
+        tolerance = one.analysis.reduction_tolerance
+        return kept(
+            "reduction", " ".join(map(key, (one, *others))),
+            lambda: reduced(meshed(one, stage), chosen, tolerance, counts, stage, others),
+            _packed, lambda stored: _unpacked(stored, one),
+        )  # fmt: skip
+
+    if not ends:
+        return (found := found_for(scene)).ready, found
+    found = last_of(" ".join(map(key, ends)), lambda: found_for(*ends))
+    found = replace(found, ready=as_alike(scene, found.ready.model))
     return found.ready, found
 
 
@@ -101,7 +127,7 @@ def _unpacked(stored: Stored, scene: Scene) -> Reduction:
 
 def reduced(
     full: Prepared, chosen: Collection[str], tolerance: float, counts: dict[str, int] | None = None,
-    stage: Stage = lambda name: None,
+    stage: Stage = lambda name: None, others: Sequence[Scene] = (),
 ) -> Reduction:  # fmt: skip
     """Reduce some links of a prepared scene, as far as a tolerance allows.
 
@@ -112,6 +138,7 @@ def reduced(
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
     counts : number of modes of links that have it given
+    others : scenes that are `alike`, and for which the modes must serve too
 
     Raises
     ------
@@ -141,11 +168,24 @@ def reduced(
         ]
 
     stage("error of the reduction")
-    scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
-    beginning = replace(full, scene=shortened(scene))
-    Q, estimate = _settled(beginning, parts, first, tolerance, chosen, given)
+    Q, estimate = _settled(_beginning(full), parts, first, tolerance, chosen, given)
+    for other in others:
+        here = replace(full, scene=other, model=damped_as(other, full.model))
+        Q, more = _settled(_beginning(here), parts, partial(_same, Q), tolerance, chosen, given)
+        estimate = {name: max(estimate.get(name, 0.0), more.get(name, 0.0)) for name in {**estimate, **more}}
     taken = [f if link.name in chosen else None for f, link in zip(Q, full.model.links, strict=True)]
     return Reduction(replace(full, model=reduced_model(full.model, taken)), estimate, tolerance)
+
+
+def _beginning(full: Prepared) -> Prepared:
+    """A prepared scene whose run shows what the modes leave out: it vibrates, and is not long."""
+    scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
+    return replace(full, scene=shortened(scene))
+
+
+def _same(Q: Functions, share: float) -> Functions:
+    """Modes that serve already, whatever share of a tolerance is asked for."""
+    return Q
 
 
 def reducible(model: Model) -> set[str]:

@@ -30,6 +30,7 @@ class Steady:
         if the levels do not agree: then it is the method's own
     certain : whether that was found to the tolerance
     levels : growth of each level
+    vibration : that one, of an unstable motion: how fast it is, and which link moves most, in words
     """
 
     period: float
@@ -39,6 +40,7 @@ class Steady:
     growth: float | None
     certain: bool
     levels: tuple[float, ...] = ()
+    vibration: str = ""
 
     @property
     def unstable(self) -> bool:
@@ -60,7 +62,9 @@ class Steady:
     @property
     def notes(self) -> dict[str, str | float]:
         """As a results file keeps them."""
-        known = {} if self.growth is None else {"steady growth in a period": self.growth}
+        known: dict[str, str | float] = {}
+        known |= {} if self.growth is None else {"steady growth in a period": self.growth}
+        known |= {"steady vibration that grows": self.vibration} if self.vibration else {}
         return {
             "steady period [s]": self.period, "steady revolutions": self.revolutions,
             "steady marches": float(self.marches), "steady residual": self.residual, **known,
@@ -90,7 +94,7 @@ def unstable(steady: Steady | None) -> str:
         return ""
     return (
         f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
-        f"of {steady.period:.4g} s, until something else limits it"
+        f"of {steady.period:.4g} s{steady.vibration and f', {steady.vibration}'}, until something else limits it"
         + (
             ""
             if len(steady.levels) > 1

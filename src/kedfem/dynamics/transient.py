@@ -223,10 +223,22 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     if isinstance(solver, LiteralSteps) or not isinstance(start, State):
         raise ValueError("a steady state must be that of a system, got the monolithic solver's")
 
-    motion_at = _motion(scene, linkage, along)
-    over = PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
-    solver.steady = periodic(over, scene.analysis.stability, solver.watch)
+    over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
+    solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed)
     return solver.steady.state
+
+
+def period_map(
+    scene: Scene,
+    linkage: Linkage,
+    along: Path,
+    model: Model,
+    solver: SystemSteps | CorotationalSteps,
+    start: State,
+) -> PeriodMap:
+    """The map of a solver's steps over the period of a steady motion."""
+    motion_at = _motion(scene, linkage, along)
+    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
 
 
 def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:

@@ -3,7 +3,9 @@
 τ is the drive's turn or travel; with several drives it is the time.
 """
 
+import pickle
 from dataclasses import dataclass, replace
+from hashlib import sha256
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -41,6 +43,7 @@ RETURNED = 1e-9  # of the size [-, rad]: as closely gears must return
 FINE = 3e-14  # of the size: error of a prediction from which rates can be taken
 NEAR = 1e-8  # of large linkages: one more sweep of Newton costs less than a finer grid
 REFINEMENTS, MOST_POINTS = 4, 20_000
+MOST_KEPT = 4  # paths of a process
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +87,8 @@ class Path:
 def path(link: Linkage, low: float, high: float) -> Path:
     """Follow the linkage from its reference position over low ≤ 0 ≤ high of τ; undriven it rests there.
 
+    The last ones are kept: a drive's speed does not change the path over whole periods.
+
     Raises
     ------
     MotionError
@@ -95,7 +100,36 @@ def path(link: Linkage, low: float, high: float) -> Path:
             np.zeros(1), *link.start, (none, none), (none, none), np.zeros((1, A)), np.inf,
             np.zeros(link.rows.count), (1.0, 0.0), np.arange(link.rows.count), np.zeros((0, 6, 12)),
         )  # fmt: skip
-    step, period = link.drives.step(low, high), link.drives.period()
+    period = link.drives.period()
+    low, high = _on_periods(low, period), _on_periods(high, period)
+    name = _named(link, low, high)
+    found = _KEPT.pop(name, None) or _followed(link, low, high, period)
+    _KEPT[name] = found
+    if len(_KEPT) > MOST_KEPT:
+        del _KEPT[next(iter(_KEPT))]
+    return found
+
+
+_KEPT: dict[bytes, Path] = {}
+"""The last paths of this process, by linkage and range."""
+
+
+def _named(link: Linkage, low: float, high: float) -> bytes:
+    """A digest of all that a path depends on: of a single drive τ is its turn, whatever its law."""
+    drives = replace(link.drives, laws=()) if len(link.drives) == 1 else link.drives
+    return sha256(pickle.dumps((replace(link, drives=drives), low, high))).digest()
+
+
+def _on_periods(tau: float, period: float) -> float:
+    """A place that is whole periods off, but for rounding, at these."""
+    if not np.isfinite(period):
+        return tau
+    whole = period * round(tau / period)
+    return whole if abs(tau - whole) <= ROUNDING * abs(whole) else tau
+
+
+def _followed(link: Linkage, low: float, high: float, period: float) -> Path:
+    step = link.drives.step(low, high)
     start = _Stand(link, 0.0, *_started(link))
     ahead, behind = [start], [start]
     if high > period or low < -period:

@@ -1,15 +1,19 @@
 """The files of a run beside its rows and frames: stress envelope, table, plots and the picture of the highest stress."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.vibration import Vibration
 from kedfem.errors import OutputError, PictureError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
+from kedfem.output.shapes import GROWING, write_growing
 from kedfem.output.stress_files import ENVELOPE, POINTS, TOP
 from kedfem.output.vtu import LinkField, remove_animation
 from kedfem.output.words import clock, moment, stress_at
@@ -20,8 +24,8 @@ from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
 WORST, PARQUET, ONE_FILE = "worst.vtu", "results.parquet", "animation.vtkhdf"
-REPORT = "report.html"
-WHOLE = (TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP, REPORT)
+REPORT, GROWN = "report.html", f"{GROWING}.png"
+WHOLE = (GROWN, TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP, REPORT)
 """Files of a run that the next one replaces."""
 
 
@@ -64,6 +68,26 @@ def remove_derived(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
     remove_animation(folder, STEM)
+    remove_animation(folder, GROWING)
+
+
+def write_vibration(
+    scene: Scene, model: Model, recoveries: Sequence[StressRecovery], found: Vibration, folder: Path
+) -> tuple[str, ...]:
+    """A vibration that grows, as animation and picture, if the scene wants any; one that cannot be drawn is a warning."""
+    if scene.output.animation is None and not scene.output.picture:
+        return ()
+
+    def sized(snapshot: Snapshot, factor: float, exaggeration: float) -> list[LinkField]:
+        states = [replace(x, u=factor * x.u, g=factor * x.g) for x in snapshot.states]
+        return link_fields(model, recoveries, replace(snapshot, states=states), exaggeration)
+
+    frames = [(float(each.motion.t[each.k]), partial(sized, each)) for each in found.snapshots]
+    try:
+        write_growing(folder, f"The vibration that grows, {found.words}", frames, scene.gravity)
+    except PictureError as err:
+        return (str(err),)
+    return ()
 
 
 def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Path) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ FRAMES = 24  # over a cycle
 AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses are
 DRAWN = 0.08  # of the size of what is drawn: largest displacement in pictures and animations
 MOSTLY = 0.9  # of the squares of all displacements: a shape along one axis
-STEM = "shape"
+STEM, GROWING = "shape", "growing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,36 @@ def write_shapes(
             writer.add(j / FRAMES / shape.frequency, shape.fields(factor * swing, exaggeration))
         title = f"{shape.title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
         write_picture(folder / f"{name}_0000.vtu", folder / f"{name}.png", title, exaggeration, gravity)
+
+
+def write_growing(
+    folder: Path, title: str, frames: Sequence[tuple[float, Callable[[float, float], Sequence[LinkField]]]],
+    gravity: tuple[float, float, float] = (0, 0, 0),
+) -> None:  # fmt: skip
+    """A vibration about a moving mechanism: ``growing.pvd``, and ``growing.png`` of the frame where it is largest.
+
+    Parameters
+    ----------
+    frames : time [s], and the fields of all links as a `Shape` has them, of one and the same amplitude
+
+    Raises
+    ------
+    OutputError
+        A file cannot be written, or VTK cannot draw here.
+    """
+    largest = [
+        max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in fields(1.0, 0.0))
+        for _, fields in frames
+    ]
+    k = int(np.argmax(largest))
+    still = frames[k][1](1.0, 0.0)
+    size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in still]), axis=0)))
+    exaggeration = float(f"{DRAWN * size / AMPLITUDE:.2g}")
+    writer = AnimationWriter(folder, GROWING)
+    for t, fields in frames:
+        writer.add(t, fields(AMPLITUDE / (largest[k] or 1.0), exaggeration))
+    whole = f"{title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
+    write_picture(folder / f"{GROWING}_{k:04d}.vtu", folder / f"{GROWING}.png", whole, exaggeration, gravity)
 
 
 def _along(fields: Sequence[LinkField]) -> str:

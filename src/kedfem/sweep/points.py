@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
@@ -18,6 +18,7 @@ from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled
 from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
+from kedfem.scene.faults import place
 from kedfem.scene.hints import Where
 from kedfem.sweep.axes import Value
 from kedfem.sweep.extremes import Extreme, change, extremes
@@ -60,6 +61,7 @@ class Job:
     values : key → value
     last : turns whose extremes count
     folder : where the run's files stay; None if they do not
+    ends : values of the points with which its reduced links are shared; none: it has its own
     """
 
     base: Base
@@ -67,6 +69,7 @@ class Job:
     chosen: Chosen
     last: float
     folder: FilePath | None = None
+    ends: tuple[Mapping[Where, Value], ...] = ()
 
     def scene(self) -> Scene:
         """The scene of this point.
@@ -88,7 +91,9 @@ class Job:
             With all faults of the scene.
         """
         said = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
-        return sha256(json.dumps([said, self.last], sort_keys=True, default=str).encode()).hexdigest()
+        shared = [sorted((place(where), value) for where, value in each.items()) for each in self.ends]
+        parts = [said, self.last, *([shared] if shared else [])]
+        return sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +182,7 @@ def _ran(job: Job) -> Row:
             update |= dict.fromkeys(("csv", "parquet", "plots", "picture", "report"), False)
             update["animation"] = None
         output = scene.output.model_copy(update=update)
-        run = analyse(scene.model_copy(update={"output": output}), stresses_since=since)
+        run = analyse(scene.model_copy(update={"output": output}), stresses_since=since, ends=_ends(job))
         results = run.results
     found = extremes(results, since)
     for name, peak in run.peaks.items():
@@ -189,6 +194,21 @@ def _ran(job: Job) -> Row:
         return Row(results.status, results.reason, run.steady.residual, extremes=found)
     settled = change(results, turn * time_grid(scene).step) if turn else math.nan
     return Row(results.status, results.reason, settled, extremes=found)
+
+
+_ENDS: dict[str, tuple[Scene, ...]] = {}
+"""The last scenes of this process whose reduced links others share."""
+
+
+def _ends(job: Job) -> tuple[Scene, ...]:
+    """Scenes, as they are analysed, with which a point shares its reduced links."""
+    if not job.ends:
+        return ()
+    name = Job(job.base, {}, job.chosen, 0.0, None, job.ends).identity()
+    if name not in _ENDS:
+        _ENDS.clear()
+        _ENDS[name] = tuple(assembled(replace(job, values=values).scene())[0] for values in job.ends)
+    return _ENDS[name]
 
 
 def _since(scene: Scene, last: float) -> float:

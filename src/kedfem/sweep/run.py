@@ -20,6 +20,7 @@ from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.keys import with_values
 from kedfem.sweep.plot import write_plot
 from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
+from kedfem.sweep.sharing import Ends
 
 AHEAD = 2  # points that wait for each worker, so that none is idle
 ONE_THREAD = dict.fromkeys(
@@ -95,7 +96,8 @@ def sweep(
         refuse_without_growth(scene, axes[0], asked.edges)
     with claimed(folder or sweep_folder(base)) as target:
         chosen, planned = _planned(base, axes, watch)
-        point = _Points(base, chosen, asked, target)
+        jobs = [Job(base, values, chosen, asked.last) for values in _points(axes)]
+        point = _Points(base, chosen, asked, target, Ends.among(jobs))
         rows: dict[int, Row] = {}
         axes, found, pool = list(axes), list[Edge](), executor
         try:
@@ -136,6 +138,7 @@ class _Points:
     chosen: Chosen
     asked: Asked
     target: FilePath
+    ends: Ends
     before: int = 0
 
     def waiting(self, axes: Sequence[Axis], rows: dict[int, Row]) -> dict[int, tuple[str, Job]]:
@@ -146,6 +149,7 @@ class _Points:
                 continue
             job = Job(self.base, values, self.chosen, self.asked.last)
             try:
+                job = replace(job, ends=() if self.asked.keep else self.ends.of(job))
                 name = job.identity()
             except SceneError as error:
                 rows[k] = Row("failed", str(error))

@@ -60,6 +60,8 @@ def steady_table(found: Steady) -> Table:
         left = f"{100 * found.growth:.4g} % is left after a period"
         settles = f", 1 % after {found.periods:,} of them" if found.periods and found.periods > 1 else ""
         table.add_row("least damped vibration", f"{left}{settles}{': unstable' * found.unstable}")
+    if found.vibration:
+        table.add_row("vibration that grows", found.vibration)
     return table
 
 

@@ -28,7 +28,7 @@ from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.internal import own
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, displacements, march, ready
-from kedfem.dynamics.system.periodic import Periodic, Watch
+from kedfem.dynamics.system.periodic import Periodic, Search, Watch
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
@@ -73,6 +73,7 @@ class CorotationalSteps:
         self.factorisations, self.eased, self.sweeps = len(self.ready.parts), 0, 0
         self.steady: Periodic | None = None
         self.watch: Watch = lambda marched: None
+        self.search = Search()
         points = system.model.joints is not model.joints  # of force elements, beside those of joints
         self.elements = [f"motors.{name}" for name in scene.motors]
         self.elements += [f"springs.{name}" for name in scene.springs]
@@ -166,9 +167,9 @@ class CorotationalSteps:
             force = force @ to_ports.T
             if acting is not None:
                 force = force - (acting @ R).reshape(len(R), -1) @ inverse.T
-        return LinkHistory(u, v, a, self._deformation(k, found), R, F, force, found.energy[:, k].copy())
+        return LinkHistory(u, v, a, self.deformation(k, found), R, F, force, found.energy[:, k].copy())
 
-    def _deformation(self, k: int, found: History) -> Rows:
+    def deformation(self, k: int, found: History) -> Rows:
         """What stresses come from; of a planar beam with the strains that its points see."""
         link, bodies = self.links[k], self.ready.bodies
         if bodies.frame[k] != TANGENTIAL:

@@ -9,13 +9,13 @@ than linear functions is found anew (`possible`): strains, how far points have t
 keep what these are off by for ever.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.nominal import forcings
-from kedfem.dynamics.system.arrays import State, copied, ends_of
+from kedfem.dynamics.system.arrays import History, State, copied, ends_of
 from kedfem.dynamics.system.instant import TURN, Flat, Instant, Motion, turned
 from kedfem.dynamics.system.internal import own, remembered
 from kedfem.dynamics.system.march import Ready, march
@@ -39,14 +39,13 @@ class PeriodMap:
     start : any state of the system, where a search begins
     period : whole number of steps [s]
     length : time points whose history is held at once
-
-    marches : periods so far; largest : largest energy of deformation in the last of them, twice [J]
+    steps : in the period; marches : periods so far; largest : largest energy of deformation in the last one, twice [J]
     """
 
     def __init__(self, of: Ready, start: State, motion_at: Motion, period: float, length: int) -> None:
         self.of, self.motion_at, self.linear = of, motion_at, of.c.single
         self.marches, self.largest, self.start = 0, 0.0, copied(start)
-        self._steps = steps = round(period / of.c.h)
+        self.steps = steps = round(period / of.c.h)
         t = of.c.h * np.arange(1, steps + 1)
         self._parts = [motion_at(t[k : k + length]) for k in range(0, steps, length)]
         ends = ends_of([getattr(start, name).size for name in CARRIED])
@@ -79,20 +78,32 @@ class PeriodMap:
         ------
         ConvergenceError
         """
-        state, self.largest, done = self.state(x), 0.0, 0
+        self.largest, self.marches = 0.0, self.marches + 1
+        state = self.start
+        for state, found in self._marched(x, blow):  # noqa: B007 - the last one counts
+            self.largest = max(self.largest, 2 * float(found.energy.sum(axis=1).max()))
+        return self.vector(state)
+
+    def histories(self, x: Flat) -> Iterator[tuple[RigidMotion, History]]:
+        """Rigid motion and states over the period, part by part."""
+        for part, (_, found) in zip(self._parts, self._marched(x), strict=True):
+            yield part, found
+
+    def _marched(
+        self, x: Flat, blow: Sequence[Float[np.ndarray, "n d"]] | None = None
+    ) -> Iterator[tuple[State, History]]:
+        state, done = self.state(x), 0
         between = None if self.linear else self.motion_at
         for part in self._parts:
             loads = None if blow is None else self._struck(part, blow, done)
             state, found = march(self.of, state, part, between, loads=loads)
-            self.largest = max(self.largest, 2 * float(found.energy.sum(axis=1).max()))
             done += len(part.t)
-        self.marches += 1
-        return self.vector(state)
+            yield state, found
 
     def _struck(
         self, part: RigidMotion, blow: Sequence[Float[np.ndarray, "n d"]], done: int
     ) -> list[Float[np.ndarray, "T n d"]]:
-        over = max(BLOW * self._steps, SHORTEST)
+        over = max(BLOW * self.steps, SHORTEST)
         pulse = np.where((k := done + 1 + np.arange(len(part.t))) < over, np.sin(np.pi * k / over) ** 2, 0.0)
         every = zip(forcings(self.of.system.model, part), blow, strict=True)
         return [each.F + pulse[:, None, None] * more for each, more in every]

@@ -27,7 +27,7 @@ from kedfem.dynamics.system.instant import Motion
 from kedfem.dynamics.system.literal import Now
 from kedfem.dynamics.system.literal_steps import literal_march, oracle
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.periodic import Periodic, Watch
+from kedfem.dynamics.system.periodic import Periodic, Search, Watch
 from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
@@ -110,6 +110,7 @@ class SystemSteps:
         self.ready = ready(system, scheme)
         self.steady: Periodic | None = None
         self.watch: Watch = lambda marched: None
+        self.search = Search()
         self.oracle = oracle(self.ready) if literal else None
         self.stiffening = system.stiffening
         self.factorisations = len(self.ready.parts)
@@ -200,6 +201,10 @@ class SystemSteps:
                             self._products(found, k, v))
             )  # fmt: skip
         return out
+
+    def deformation(self, k: int, found: History) -> Rows:
+        """What stresses of link k come from."""
+        return displacements(self.ready, k, found.g)
 
     def _products(self, found: History, k: int, v: Rows) -> Products | None:
         """Products with the state of link k that its steps have at hand."""

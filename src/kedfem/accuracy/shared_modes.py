@@ -1,0 +1,49 @@
+"""Scenes that differ in the speed of their drive and in damping alone, and whose links have the same modes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from kedfem.accuracy.cache import key
+from kedfem.accuracy.prepared import Prepared, moving
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.state import Rayleigh
+from kedfem.scene import ConstantSpeed, Ramp, Scene, corotational_links, rayleigh
+
+T = TypeVar("T")
+_LAST: dict[str, Any] = {}
+"""The last reduction that scenes of this process share."""
+
+
+def alike(scene: Scene) -> str | None:
+    """What scenes have in common whose reduced links may be the same; None of one that shares them with none.
+
+    It is all but the damping and the speed of a drive that turns steadily, or comes to. Rigid links with co-rotational
+    frames depend on the step.
+    """
+    if scene.drive is None or not any(link.reduced for link in scene.links.values()):
+        return None
+    if corotational_links(scene) or not isinstance(scene.drive.motion, ConstantSpeed | Ramp):
+        return None
+    motion = scene.drive.motion.model_copy(update={"speed": 1.0})
+    drive = scene.drive.model_copy(update={"motion": motion})
+    return key(scene.model_copy(update={"drive": drive, "damping": None}))
+
+
+def last_of(name: str, made: Callable[[], T]) -> T:
+    """What this process has under a name, the last one alone."""
+    if name not in _LAST:
+        _LAST.clear()
+        _LAST[name] = made()
+    found: T = _LAST[name]
+    return found
+
+
+def as_alike(scene: Scene, model: Model) -> Prepared:
+    """A scene prepared with the model of another that is `alike`."""
+    return Prepared(scene, *moving(scene), damped_as(scene, model))
+
+
+def damped_as(scene: Scene, model: Model) -> Model:
+    """A model with the damping of a scene."""
+    return replace(model, damping=Rayleigh(*rayleigh(scene.damping)))

@@ -1,0 +1,45 @@
+"""By what small vibrations about a steady motion are multiplied in a period: the eigenvalues of Φ (Floquet).
+
+They are found by Arnoldi's method from a state that a random blow has left, so that vibrations show which the loads do
+not excite: by the largest magnitude a vibration grows, or falls, in a period.
+"""
+
+import numpy as np
+from jaxtyping import Complex
+
+from kedfem.dynamics.system.instant import Flat
+from kedfem.dynamics.system.krylov import Watched, arnoldi, combined, scale_of
+
+MOST, AGAIN = 80, 5  # marches, at most; those after which no larger one may have come up
+SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others
+SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
+
+
+def multipliers(steps: Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray, " f"], bool, Flat]:
+    """Eigenvalues of Φ, of largest magnitude first, whether the first is certain, and the real part of its vector."""
+    map_, tolerance = steps.map, SURE if steps.map.linear else ABOUT
+    links = map_.of.system.model.links
+    random = np.random.default_rng(0)
+    blow = [random.standard_normal((link.n, link.d)) for link in links]
+    v, scale = map_.change(steps(x, blow), y), scale_of(map_, y)
+    if not map_.linear and map_.size(v) > 0.0:
+        blow = [each * (SMALL * scale / map_.size(v)) for each in blow]
+        v = map_.change(steps(x, blow), y)
+    map_.weighed(v)
+    size = map_.whole(v)
+    if not size > 0.0:
+        return np.zeros(1, complex), True, 0 * v
+    by, found, since = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex), 0
+    basis = [v / size]
+    for H in arnoldi(steps, (x, y), basis, by, MOST):
+        values, shapes = np.linalg.eig(H[:-1].astype(complex))
+        order = np.argsort(-np.abs(values))
+        off = H[-1, -1] * np.abs(shapes[-1, order]) / np.linalg.norm(shapes[:, order], axis=0)
+        found = values[order]
+        sure = len(found) > 2 and off[0] <= tolerance * max(abs(found[0]), tolerance)
+        since = since + 1 if sure else 0
+        if since > AGAIN:  # the first that is found need not be the largest: some are hardly struck
+            good = off <= max(tolerance, 1e-4) * np.maximum(np.abs(found), tolerance)
+            return found[good], True, combined(shapes[:, order[0]].real, basis)
+    shape = combined(shapes[:, order[0]].real, basis)
+    return (found, True, shape) if len(found) < MOST else (found[:1], since > 0, shape)
