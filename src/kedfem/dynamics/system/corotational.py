@@ -26,9 +26,10 @@ from kedfem.dynamics.system.deflected import plucked, quasi_static
 from kedfem.dynamics.system.exerted import exerted, on_links
 from kedfem.dynamics.system.instant import Instant
 from kedfem.dynamics.system.internal import own
+from kedfem.dynamics.system.krylov import Watch
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, displacements, march, ready
-from kedfem.dynamics.system.periodic import Periodic, Search, Watch
+from kedfem.dynamics.system.periodic import Periodic, Search
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports

@@ -24,10 +24,11 @@ from kedfem.dynamics.system.deflected import plucked, quasi_static
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.exerted import ELEMENTS
 from kedfem.dynamics.system.instant import Motion
+from kedfem.dynamics.system.krylov import Watch
 from kedfem.dynamics.system.literal import Now
 from kedfem.dynamics.system.literal_steps import literal_march, oracle
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.periodic import Periodic, Search, Watch
+from kedfem.dynamics.system.periodic import Periodic, Search
 from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.start import rest
 from kedfem.dynamics.system.supports import supports
