@@ -7,12 +7,12 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.coupling import Attachment
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import port_columns
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import port_columns
-from kedfem.dynamics.reduction import Basis, energy_sorted, port_functions
-from kedfem.dynamics.substructure import Substructure, mass_matrix
+from kedfem.dynamics.modes.reduction import Basis, energy_sorted, port_functions
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
 

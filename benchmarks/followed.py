@@ -13,10 +13,10 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.stepping.transient import Steps, begun, started, steps_of, transient
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import Steps, begun, started, steps_of, transient
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, path_parameter, scene_from

@@ -50,9 +50,9 @@ def _slope(found: list[dict[str, float]], key: str) -> float:
 
 def one_size(size: tuple[int, int, int]) -> dict[str, float]:
     """Measure one block of so many elements."""
-    from kedfem.dynamics.cholesky import Cholesky
-    from kedfem.dynamics.scheme import generalised_alpha
-    from kedfem.dynamics.substructure import effective_matrix
+    from kedfem.dynamics.matrices.cholesky import Cholesky
+    from kedfem.dynamics.matrices.substructure import effective_matrix
+    from kedfem.dynamics.stepping.scheme import generalised_alpha
     from kedfem.links.build import link_axes
     from kedfem.links.solid import solid_link
     from kedfem.mesh import link_mesh

@@ -15,7 +15,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
 

@@ -13,7 +13,7 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.transient import steps_of
+from kedfem.dynamics.stepping.transient import steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 
@@ -89,7 +89,7 @@ def machine_speed() -> tuple[float, float]:
 
 def preparation() -> tuple[int, float, float]:
     """An arm of 27-node hexahedra as `benchmarks.growth` has them: unknowns, seconds to factor it, to reduce it."""
-    from kedfem.dynamics.reduction import static_parts
+    from kedfem.dynamics.modes.reduction import static_parts
 
     full = meshed(_thick_arm())
     factor = seconds(lambda: static_parts(full.model), 3)

@@ -13,9 +13,9 @@ from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from benchmarks.pages import seconds
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.substructure import effective_matrix
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.matrices.substructure import effective_matrix
+from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.build import link_axes
 from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link, mass_times

@@ -10,9 +10,9 @@ from jaxtyping import Float
 
 from benchmarks.pages import script, table, write_page
 from benchmarks.parts import PARTS, BenchPart, Size, ends, frequencies, loaded, part_link
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.substructure import effective_matrix
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.matrices.substructure import effective_matrix
+from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient, von_mises

@@ -14,7 +14,7 @@ from kedfem.accuracy.histories import Histories, histories, relative_errors, wor
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.model import Model, reduced_model
-from kedfem.dynamics.reduction import static_parts
+from kedfem.dynamics.modes.reduction import static_parts
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
 from kedfem.scene import scene_from
 

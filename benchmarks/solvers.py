@@ -10,9 +10,9 @@ import scipy.sparse.linalg
 
 from benchmarks.pages import script, seconds, table, write_page
 from benchmarks.scenes import bar_four_bar
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.substructure import effective_matrix
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.matrices.substructure import effective_matrix
+from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.build import bare_links
 
 SIZES = ((18, 3, 2), (36, 6, 4), (48, 9, 7))

@@ -12,9 +12,9 @@ from benchmarks.pages import script, table, write_loglog, write_page
 from benchmarks.scenes import bar_four_bar
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.history import LinkMoment
+from kedfem.dynamics.stepping.transient import snapshots, steps_of
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import snapshots, steps_of
 
 SIZES = ((6, 2, 1), (18, 3, 2), (36, 6, 4))
 LITERAL_STEPS, CONDENSED_STEPS = 5, 100

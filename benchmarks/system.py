@@ -9,16 +9,16 @@ from tests.rooms.test_acted import four_bar as hinged
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.scheme import generalised_alpha
 from kedfem.dynamics.segment import CONVERGED
-from kedfem.dynamics.substructure import factored
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.transient import started, steps_of, transient
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march, ready
 from kedfem.dynamics.system.sparse import SparsePart
-from kedfem.dynamics.system.start import rest
+from kedfem.dynamics.system.starts.start import rest
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.dynamics.transient import started, steps_of, transient
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 

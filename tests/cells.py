@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.literal import LiteralSteps
-from kedfem.dynamics.start import initial_rates
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.start import initial_rates
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.dynamics.stiffening import stiffening
-from kedfem.dynamics.system.accelerations import accelerated_in_a_step
-from kedfem.dynamics.system.start import rest
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
+from kedfem.dynamics.system.starts.start import rest
 from kedfem.errors import KedfemError
 from kedfem.scene.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
 from tests.moving import beam_in_space

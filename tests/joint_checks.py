@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.ports import turned_vectors
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import joint_axis, unit
 from kedfem.scene import GROUND, Joint, time_grid

@@ -7,7 +7,7 @@ from time import process_time
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.links.recovery import stress_recovery
 from kedfem.results.envelope import Envelope
 from kedfem.scene import read_scene

@@ -9,9 +9,9 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.dense import as_dense
+from kedfem.dynamics.joints.places import seat_of
+from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
-from kedfem.dynamics.places import seat_of
 from kedfem.errors import MeshError, OutputError, SceneError
 from kedfem.links.coupling_surfaces import CouplingSurface, port_weights, seat_couples
 from kedfem.links.record import Link

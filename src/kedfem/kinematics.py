@@ -11,8 +11,8 @@ from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import with_analysis
 from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
+from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.nominal import motions
-from kedfem.dynamics.places import slider_axis
 from kedfem.errors import MeshError, MotionError
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link

@@ -13,7 +13,7 @@ import numpy as np
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.levels import in_balance, level_steps, leveled
+from kedfem.dynamics.stepping.levels import in_balance, level_steps, leveled
 from kedfem.errors import OutputError, SceneError
 from kedfem.links.record import Link
 from kedfem.output.static_decks import (

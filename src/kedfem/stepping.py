@@ -14,11 +14,11 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.levels import leveled
-from kedfem.dynamics.literal import LiteralSteps
-from kedfem.dynamics.marks import Marks
 from kedfem.dynamics.model import Model, segments, ways
-from kedfem.dynamics.transient import Steps
+from kedfem.dynamics.stepping.levels import leveled
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.marks import Marks
+from kedfem.dynamics.stepping.transient import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived

@@ -13,7 +13,7 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.stability import stability_warning
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.links.build import bare_link
 from kedfem.mesh import SolidMesh, mesh_quality

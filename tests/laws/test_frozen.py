@@ -10,13 +10,13 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import moving
-from kedfem.dynamics.dense import SMALL
-from kedfem.dynamics.frozen import Frozen, Modes
-from kedfem.dynamics.lanczos import lanczos
-from kedfem.dynamics.literal import rotated_stiffness
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.matrices.dense import SMALL
+from kedfem.dynamics.modes.frozen import Frozen, Modes
+from kedfem.dynamics.modes.lanczos import lanczos
+from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.literal import Literal
+from kedfem.dynamics.system.oracle.literal import Literal
 from kedfem.dynamics.system.record import Driven, Held, Spring, System
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from

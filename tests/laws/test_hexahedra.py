@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
-from kedfem.dynamics.literal import rotated_stiffness
+from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis

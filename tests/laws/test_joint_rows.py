@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import Prepared
-from kedfem.dynamics.constraint_joints import needs_rows
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.joints.constraint_joints import needs_rows
+from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import GROUND
 from tests.joint_checks import (

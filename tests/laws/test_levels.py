@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepWatch, cheapest
-from kedfem.dynamics import levels as in_time
-from kedfem.dynamics.cost import factor_bytes
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.levels import LINEAR, level_steps, level_weights, leveled, most_levels
+from kedfem.dynamics.stepping import levels as in_time
+from kedfem.dynamics.stepping.cost import factor_bytes
+from kedfem.dynamics.stepping.levels import LINEAR, level_steps, level_weights, leveled, most_levels
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from kedfem.dynamics.system import impacts
 from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.starts import impacts
 from tests.cells import Cell, scene_of
 from tests.moving import bar, beam_in_space
 from tests.runs import Ran, ran

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
-from kedfem.dynamics.literal import rotated_stiffness
 from kedfem.dynamics.loads import applied
+from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
 from kedfem.links.coupling_surfaces import face_seat, is_flat, joint_seat, port_weights, surface_weights
 from kedfem.links.plane import plane_basis, plane_link, plane_stress

@@ -11,8 +11,8 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.joints.ports import port_values, port_vectors
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.ports import port_values, port_vectors
 from kedfem.links.coupling_surfaces import CouplingSurface, face_seat, joint_seat
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times

@@ -11,13 +11,13 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import _training, reduced
-from kedfem.dynamics.bases import bases
+from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.modes.bases import bases
+from kedfem.dynamics.modes.reduction import Basis, static_parts
+from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.nominal import instants
-from kedfem.dynamics.reduction import Basis, static_parts
-from kedfem.dynamics.residual import residual_deflections
-from kedfem.dynamics.substructure import coupled
-from kedfem.dynamics.transient import snapshots, steps_of
+from kedfem.dynamics.stepping.transient import snapshots, steps_of
 from kedfem.links.reduced import rigid, rigid_modes
 from kedfem.scene import scene_from
 from tests import scenes

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.literal import rotated_stiffness
+from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.bodies import euler_tensor, with_body
 from kedfem.links.coupling_surfaces import joint_seat, port_weights

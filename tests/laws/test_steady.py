@@ -17,10 +17,10 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.steady import Steady, steady_of, steady_warning
 from kedfem.analysis import analyse
-from kedfem.dynamics.frozen import Frozen
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.modes.frozen import Frozen
+from kedfem.dynamics.stepping.levels import level_steps, leveled
+from kedfem.dynamics.stepping.transient import started
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.transient import started
 from kedfem.errors import KedfemError, SolveError
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix

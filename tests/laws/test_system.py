@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Held, Spring, Stop
-from kedfem.dynamics.system.start import rest
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.system.starts.start import rest
 from kedfem.scene import Gear, Motor
 from tests.moving import bar, rising
 from tests.spatial_joints import BEAMS

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics.system.deflected import plucked, quasi_static, static
-from kedfem.dynamics.system.instant import Instant
+from kedfem.dynamics.stepping.transient import first_states
 from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.rates import coordinates, gradients, places
-from kedfem.dynamics.system.start import rest
-from kedfem.dynamics.transient import first_states
+from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.rates import coordinates, gradients, places
+from kedfem.dynamics.system.starts.start import rest
 from kedfem.errors import SolveError
 from tests.laws.test_system import HINGE, KINDS, elements, four_bar
 from tests.moving import bar
@@ -165,7 +165,7 @@ def test_an_arm_that_spins_freely_starts_as_one_that_is_driven() -> None:
 
 def free_rates(of: Begun) -> list[np.ndarray]:
     """The rates that its scene asks for."""
-    from kedfem.dynamics.start import initial_rates
+    from kedfem.dynamics.stepping.start import initial_rates
 
     return initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
 

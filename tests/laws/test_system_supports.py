@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics.system.deflected import quasi_static
+from kedfem.dynamics.system.forces.supports import Supports, supports
 from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.supports import Supports, supports
+from kedfem.dynamics.system.starts.deflected import quasi_static
 from tests.laws.test_system import elements
 from tests.laws.test_system import four_bar as beams
 from tests.moving import bar, channels, ran

@@ -13,7 +13,7 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.processes import memory_held
 from kedfem.results.audit import Account
 from kedfem.scene import GROUND, Scene, scene_from, time_grid

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import steps_of, transient
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from

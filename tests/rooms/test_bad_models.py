@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from kedfem.dynamics.cholesky import Cholesky
+from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError, SceneError, SolveError
 from kedfem.motion.linkage import linkage

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-import kedfem.dynamics.transient as runs
+import kedfem.dynamics.stepping.transient as runs
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.segment import FREE
+from kedfem.dynamics.stepping.transient import Steps, steps_of, transient
 from kedfem.dynamics.system import layout
 from kedfem.dynamics.system.corotational import CorotationalSteps
-from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.recording import recording

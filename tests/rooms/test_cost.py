@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics import cost
+from kedfem.dynamics.stepping import cost
+from kedfem.dynamics.stepping.transient import steps_of
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import steps_of
 from kedfem.scene import scene_from, time_grid
 from kedfem.stepping import frame_steps, stepped
 from kedfem.tables import check

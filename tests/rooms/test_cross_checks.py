@@ -8,8 +8,8 @@ import pytest
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.analysis import analyse
-from kedfem.dynamics.constraint_matrices import joint_rows
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.results.audit import Account
 from kedfem.results.constraint_forces import ConstraintForces
 from kedfem.results.constraint_work import interface

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics import substructure
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.joints.ports import port_values, port_vectors
+from kedfem.dynamics.matrices import substructure
+from kedfem.dynamics.matrices.substructure import mass_substructure
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.ports import port_values, port_vectors
-from kedfem.dynamics.substructure import mass_substructure
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.transient import Steps, snapshots, steps_of
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import Steps, snapshots, steps_of
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path

@@ -13,7 +13,7 @@ from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.variants import with_steps
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.links.build import bare_link
 from kedfem.links.indicator import indicator, singular_elements
 from kedfem.scene import scene_from, time_grid

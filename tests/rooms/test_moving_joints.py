@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.constraint_matrices import joint_rows
-from kedfem.dynamics.first_rows import interface_values
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.first_rows import interface_values
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment

@@ -16,8 +16,8 @@ from kedfem.accuracy.resolution import (
     resolution_warnings,
     step_error,
 )
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.scene import scene_from
 from tests import scenes
 from tests.scenes import bar, constant_speed, material

@@ -11,7 +11,8 @@ import pytest
 
 from kedfem.accuracy.histories import Histories, relative_errors
 from kedfem.analysis import Run, analyse
-from kedfem.dynamics import nominal, transient
+from kedfem.dynamics import nominal
+from kedfem.dynamics.stepping import transient
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import envelope, read_results
@@ -21,7 +22,7 @@ from tests.laws.test_levels import linkage
 from tests.scenes import constant_speed, four_bar, material
 
 STEPS = 96  # of an analysis
-LOOPS = {  # kinds of loops, as `dynamics.transient` chooses them, each in one of the ways to begin and to combine levels
+LOOPS = {  # as `dynamics.stepping.transient` chooses them, each in one of the ways to begin and to combine levels
     "dense": ("rigid-body", {"extrapolation_levels": 1}),
     "dense, two levels": ("rigid-body", {"extrapolation_levels": 2}),
     "system": ("springs", {"extrapolation_levels": 1}),
@@ -126,7 +127,8 @@ ELSEWHERE = """
 import sys
 from pathlib import Path
 from kedfem.analysis import analyse
-from kedfem.dynamics import nominal, transient
+from kedfem.dynamics import nominal
+from kedfem.dynamics.stepping import transient
 from tests.rooms.test_resume import turning
 nominal.POINTS = transient.POINTS = 16
 run = analyse(turning(Path(sys.argv[1]), frames=sys.argv[2], extrapolation_levels=2), resumes=True)

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kedfem.dynamics import cost, levels
-from kedfem.dynamics.levels import level_steps
+from kedfem.dynamics.stepping import cost, levels
+from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.errors import MeshError, SolveError
 from kedfem.links import build
 from kedfem.mesh import link

@@ -14,11 +14,11 @@ from kedfem.accuracy.plan import SEGMENTS, planned
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import _training, prepared
 from kedfem.analysis import analyse
-from kedfem.dynamics.bases import bases
 from kedfem.dynamics.model import Model, restored_model, segments, stored_model
+from kedfem.dynamics.modes.bases import bases
+from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.nominal import instants
-from kedfem.dynamics.reduction import energy_sorted, excited, port_functions, static_parts
-from kedfem.dynamics.transient import snapshots, steps_of, transient
+from kedfem.dynamics.stepping.transient import snapshots, steps_of, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery

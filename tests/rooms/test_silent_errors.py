@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics import transient
 from kedfem.dynamics.loads import coarse_steps
+from kedfem.dynamics.stepping import transient
+from kedfem.dynamics.stepping.transient import _finite
 from kedfem.dynamics.system import layout
-from kedfem.dynamics.transient import _finite
 from kedfem.errors import SceneError, SolveError
 from kedfem.scene import scene_from
 from tests.moving import bar, ran

@@ -10,7 +10,7 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.analysis import analyse
-from kedfem.dynamics.levels import level_steps, leveled
+from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.scene import read_scene, scene_from
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.transient import Snapshot
+from kedfem.dynamics.stepping.transient import Snapshot
 from kedfem.links.beam_axis import smooth_axis, straight_axis
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
 from kedfem.links.section import rectangle, tube

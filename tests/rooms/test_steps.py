@@ -12,9 +12,10 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.literal import LiteralSteps
 from kedfem.dynamics.nominal import motions
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.transient import Steps, snapshots, started, steps_of, transient
 from kedfem.dynamics.system import (
     algebra_kernel,
     bodies_kernel,
@@ -25,7 +26,6 @@ from kedfem.dynamics.system import (
     nominal_kernel,
 )
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.dynamics.transient import Steps, snapshots, started, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel

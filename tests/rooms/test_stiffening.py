@@ -11,15 +11,15 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffening
-from kedfem.dynamics.literal import LiteralSteps
+from kedfem.dynamics.joints.ports import add_port_forces
+from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.ports import add_port_forces
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.substructure import coupled
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.transient import started, steps_of, transient
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import started, steps_of, transient
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.recovery import point_rows
 from kedfem.links.reduced import rigid_modes

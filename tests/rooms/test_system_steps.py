@@ -9,9 +9,9 @@ import pytest
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.scheme import generalised_alpha
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.transient import Steps, steps_of, transient
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
-from kedfem.dynamics.transient import Steps, steps_of, transient
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording
 from kedfem.results.records import Channel

@@ -15,7 +15,7 @@ from kedfem.accuracy.resolution import resolution
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.nominal import drive_range, forcings, motions
-from kedfem.dynamics.start import initial_rates
+from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting

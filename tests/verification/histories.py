@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import work_on
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.start import Deflected, initial_states
-from kedfem.dynamics.state import Nominal, Rayleigh
-from kedfem.dynamics.system.instant import Instant
+from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.stepping.start import Deflected, initial_states
+from kedfem.dynamics.stepping.state import Nominal, Rayleigh
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import System
-from kedfem.dynamics.system.start import from_links
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.start import from_links
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion, resting
 

@@ -4,9 +4,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.literal import shared_nodes
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.stepping.literal import shared_nodes
 from kedfem.links.coupling_surfaces import face_seat, port_weights
 from kedfem.links.record import Link
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 from scipy.optimize import brentq
 
-from kedfem.dynamics.link_modes import link_modes
+from kedfem.dynamics.modes.link_modes import link_modes
 from kedfem.frequencies import Part, link_of_scene, part_from_file
 from kedfem.mesh import SolidMesh
 from kedfem.output.vtu import write_mesh

@@ -9,7 +9,7 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.links.beam import beam_link
 from kedfem.links.beam_axis import straight_axis
 from kedfem.links.bodies import flywheel_tensor, with_body

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kedfem.dynamics.literal import rotated_stiffness
-from kedfem.dynamics.scheme import generalised_alpha
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.beam import beam_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.section import rectangle

@@ -17,7 +17,7 @@ from kedfem.accuracy.variants import (
     with_links,
     with_steps,
 )
-from kedfem.dynamics.levels import most_levels
+from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, without_vibration
 

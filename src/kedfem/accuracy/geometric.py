@@ -28,10 +28,10 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import turned_vectors
 from kedfem.links.record import Link, in_space
 from kedfem.motion.rigid import RigidMotion
 

@@ -24,14 +24,14 @@ from kedfem.accuracy.histories import Histories, histories, relative_errors, wor
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.shared_modes import as_alike, damped_as, last_of
 from kedfem.accuracy.variants import shortened, with_analysis
-from kedfem.dynamics.bases import bases
-from kedfem.dynamics.dense import SMALL
 from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.matrices.dense import SMALL
+from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
+from kedfem.dynamics.modes.bases import bases
+from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
+from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.nominal import instants
-from kedfem.dynamics.reduction import Basis, enriched, static_parts
-from kedfem.dynamics.residual import residual_deflections
-from kedfem.dynamics.substructure import Substructure
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage

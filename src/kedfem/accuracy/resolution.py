@@ -10,9 +10,9 @@ from jaxtyping import Float
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts
 from kedfem.dynamics.nominal import instants
-from kedfem.dynamics.reduction import frozen_frequencies, static_parts
-from kedfem.dynamics.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, time_grid, turn_steps

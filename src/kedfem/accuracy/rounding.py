@@ -21,14 +21,14 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import Share
-from kedfem.dynamics.dense import coordinates
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.transient import Steps
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.sparse import Part, SparsePart, momentum
 from kedfem.dynamics.system.steps import SystemSteps
-from kedfem.dynamics.transient import Steps
 from kedfem.links.record import Link, in_space, mass_times
 from kedfem.links.reduced import rigid_modes
 

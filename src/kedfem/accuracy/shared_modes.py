@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.scene import ConstantSpeed, Ramp, Scene, corotational_links, rayleigh
 
 T = TypeVar("T")

@@ -6,9 +6,9 @@ from math import ceil, log
 
 import numpy as np
 
-from kedfem.dynamics.levels import level_weights
+from kedfem.dynamics.stepping.levels import level_weights
+from kedfem.dynamics.stepping.transient import Steps
 from kedfem.dynamics.system.periodic import Periodic
-from kedfem.dynamics.transient import Steps
 from kedfem.scene import Scene, time_grid, turn_steps
 
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less

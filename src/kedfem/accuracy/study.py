@@ -20,7 +20,7 @@ from kedfem.accuracy.study_variants import (
     reference_variant,
     varied,
 )  # fmt: skip
-from kedfem.dynamics.cost import estimated_cost
+from kedfem.dynamics.stepping.cost import estimated_cost
 from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled
 from kedfem.scene import Scene, time_grid

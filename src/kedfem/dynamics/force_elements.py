@@ -21,8 +21,8 @@ from kedfem.dynamics.force_element import (
     ForceElement,
     Vector,
 )
+from kedfem.dynamics.joints.places import seat_of, slider_axis
 from kedfem.dynamics.model import Model, Slider, on_segment
-from kedfem.dynamics.places import seat_of, slider_axis
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.links.record import Link

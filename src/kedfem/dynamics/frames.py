@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.state import Nodal
+from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential

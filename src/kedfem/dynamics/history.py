@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.state import LinkState, Nominal
+from kedfem.dynamics.stepping.state import LinkState, Nominal
 from kedfem.motion.rigid import RigidMotion
 
 
@@ -164,7 +164,7 @@ class Block:
     step : number of the first
     motion : rigid motion at them
     links : per link
-    levels : the same time points as each level of `dynamics.levels` has them, coarsest first; none of a single march
+    levels : the same time points as each level has them (`dynamics.stepping.levels`), coarsest first; none of one march
     fine : whether these are not the time points of the analysis, but all those of the finest level, numbered in its steps
     exerted : what constraint equations and force laws exert, of solvers that know it themselves
     """

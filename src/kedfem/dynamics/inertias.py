@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.loads import Pattern, Times, amounts, patterns
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.places import slider_axis
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross

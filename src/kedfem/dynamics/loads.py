@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.places import on_part, seat_of
+from kedfem.dynamics.joints.places import on_part, seat_of
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.coupling_surfaces import (
     CouplingSurface,
@@ -56,7 +56,7 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
-    own : turns as the link itself does, which no rigid-body orientation tells: `system.turning_loads`
+    own : turns as the link itself does, which no rigid-body orientation tells: `system.forces.turning_loads`
     """
 
     forces: Float[np.ndarray, "n d"]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kedfem.dynamics.dense import Coordinates
+from kedfem.dynamics.matrices.dense import Coordinates
 from kedfem.links.record import BeamElement, Link
 
 Tables = tuple[np.ndarray, ...]

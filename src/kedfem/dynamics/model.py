@@ -7,15 +7,15 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_joints import ConstraintJoint, needs_rows
-from kedfem.dynamics.constraint_ports import Ways
-from kedfem.dynamics.coupling import Attachment, SharedCut, joined
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, needs_rows
+from kedfem.dynamics.joints.constraint_ports import Ways
+from kedfem.dynamics.joints.coupling import Attachment, SharedCut, joined
+from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis, slider_guide
+from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
+from kedfem.dynamics.joints.slots import slot_ways
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
-from kedfem.dynamics.places import on_part, part_seat, slider_axis, slider_guide
-from kedfem.dynamics.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.rigid_links import made_rigid
-from kedfem.dynamics.slots import slot_ways
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted

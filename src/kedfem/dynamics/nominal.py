@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_matrices import joint_rows
-from kedfem.dynamics.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.history import Forcing
-from kedfem.dynamics.interface import static_tie
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.loads import applied
+from kedfem.dynamics.matrices.interface import static_tie
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.start import Instant
+from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix

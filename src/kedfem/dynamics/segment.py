@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation
-from kedfem.dynamics.state import Nodal
+from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link
 
 CONVERGED = 1e-7  # change of a iteration, of the largest that a step has made

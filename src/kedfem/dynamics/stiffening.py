@@ -13,13 +13,13 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Forcing
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import Rotation, port_columns
-from kedfem.dynamics.state import LinkState, Nodal, Nominal
-from kedfem.dynamics.substructure import Substructure, factored, mass_matrix
+from kedfem.dynamics.stepping.state import LinkState, Nodal, Nominal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions

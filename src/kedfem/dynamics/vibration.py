@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.system.corotational import CorotationalSteps
-from kedfem.dynamics.system.instant import TURN, Flat
+from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.march import displacements
 from kedfem.dynamics.system.period_map import PeriodMap
 from kedfem.dynamics.system.periodic import Periodic

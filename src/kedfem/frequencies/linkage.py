@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
-from kedfem.dynamics.frozen import Frozen, Modes
 from kedfem.dynamics.history import Snapshot, bent
+from kedfem.dynamics.modes.frozen import Frozen, Modes
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import Curve, Stop, System
 from kedfem.errors import SceneError

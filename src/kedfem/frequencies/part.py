@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.accuracy.plan import plan_for
-from kedfem.dynamics.frozen import Modes
 from kedfem.dynamics.history import bent
-from kedfem.dynamics.link_modes import (
+from kedfem.dynamics.modes.frozen import Modes
+from kedfem.dynamics.modes.link_modes import (
     Support,
     clamped_on,
     held_at,

@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, carried_fields, fields_of, flow
 from kedfem.results.constraint_forces import ConstraintForces

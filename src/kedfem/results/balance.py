@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
-from kedfem.dynamics.ports import turned_vectors
+from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.results.moments import Constants, Field, Nominal, dot, in_world, paired, rotated, turned
 
 Scalars = Float[np.ndarray, " T"]

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_joints import ConstraintJoint, in_plane
-from kedfem.dynamics.constraint_matrices import directions, joint_rows, port_rows
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
+from kedfem.dynamics.joints.constraint_matrices import directions, joint_rows, port_rows
+from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import turned_ports
 from kedfem.motion.rigid import resting
 
 DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_matrices import JointRows, joint_rows
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
 from kedfem.dynamics.model import Model
 
 

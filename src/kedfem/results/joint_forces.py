@@ -7,12 +7,12 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.constraint_joints import ordered
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import ordered
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
-from kedfem.dynamics.ports import turned_ports
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import joint_axis

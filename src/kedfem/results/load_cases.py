@@ -14,13 +14,13 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.cholesky import Cholesky
-from kedfem.dynamics.coupling import Attachment
 from kedfem.dynamics.history import LinkMoment, Snapshot
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import port_vectors
 from kedfem.dynamics.loads import applied
+from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.ports import port_vectors
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, turned_stress, von_mises

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.state import Rayleigh
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.record import Link, Matrix
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion

@@ -10,7 +10,7 @@ from kedfem.dynamics.force_element import kernel_table
 from kedfem.dynamics.force_elements import rigid_actions
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
-from kedfem.dynamics.places import slider_axis
+from kedfem.dynamics.joints.places import slider_axis
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, moving_pair
 from kedfem.motion.path import Path

@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.joints.places import on_part, part_seat
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.places import on_part, part_seat
 from kedfem.errors import KedfemError
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery, point_rows

@@ -13,10 +13,10 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.singular import SingularPasses
-from kedfem.dynamics.cost import Cost, estimated_cost, tried_cost
 from kedfem.dynamics.force_elements import actions
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.transient import Steps
+from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
+from kedfem.dynamics.stepping.transient import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.initial import initial_twists

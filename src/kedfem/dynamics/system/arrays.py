@@ -22,7 +22,7 @@ class Coefficients(NamedTuple):
     """Of one member of generalised-α at a fixed step, and of Rayleigh damping.
 
     c_M [1/s²], c_K [-] : of A = c_M M + c_K K0
-    acceleration, rate : (3,) Newmark's formulas, see `dynamics.scheme`
+    acceleration, rate : (3,) Newmark's formulas, see `dynamics.stepping.scheme`
     h, late, early : step, h γ, h (1 − γ) [s]
     alpha [1/s], beta [s] : C0 = α M + β K0
     tolerance, floor : change of a pass, of what a step moves and at least [-, kg^½ m]

@@ -12,7 +12,13 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_joints import ConstraintJoint, bore_axis, in_plane, joint_frame, ordered
+from kedfem.dynamics.joints.constraint_joints import (
+    ConstraintJoint,
+    bore_axis,
+    in_plane,
+    joint_frame,
+    ordered,
+)
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (

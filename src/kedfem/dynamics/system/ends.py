@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.constraint_joints import ConstraintJoint, Side
-from kedfem.dynamics.constraint_matrices import seen_from
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
+from kedfem.dynamics.joints.constraint_matrices import seen_from
 from kedfem.dynamics.system.record import FACE, LINE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End, Line
 from kedfem.motion.rigid import RigidMotion
 

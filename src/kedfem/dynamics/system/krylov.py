@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.system.instant import Flat
+from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.period_map import PeriodMap
 
 WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is

@@ -7,14 +7,16 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import SMALL, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.matrices.dense import SMALL, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.matrices.substructure import effective_coefficients
+from kedfem.dynamics.matrices.substructure import factored as condensed
 from kedfem.dynamics.metric import element_tables
-from kedfem.dynamics.scheme import Scheme
-from kedfem.dynamics.state import Rayleigh
-from kedfem.dynamics.substructure import effective_coefficients
-from kedfem.dynamics.substructure import factored as condensed
+from kedfem.dynamics.stepping.scheme import Scheme
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of
+from kedfem.dynamics.system.forces.stresses import stress_tables
+from kedfem.dynamics.system.forces.turning_loads import turning_loads
 from kedfem.dynamics.system.record import (
     COORDINATE,
     COROTATIONAL,
@@ -46,8 +48,6 @@ from kedfem.dynamics.system.sparse import (
     sparse_part,
     stiffness_tables,
 )
-from kedfem.dynamics.system.stresses import stress_tables
-from kedfem.dynamics.system.turning_loads import turning_loads
 from kedfem.links.record import BeamPoint, Link
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}

@@ -7,10 +7,10 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.dense import rows_of, work_over_time
 from kedfem.dynamics.force_element import stiffness_factors
+from kedfem.dynamics.matrices.dense import rows_of, work_over_time
 from kedfem.dynamics.nominal import forcing_of, forcings
-from kedfem.dynamics.scheme import Scheme
+from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.arrays import (
     Bodies,
     Coefficients,
@@ -23,11 +23,11 @@ from kedfem.dynamics.system.arrays import (
 )
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
+from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import System, is_affine, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
-from kedfem.dynamics.system.stresses import NO_TERMS, Stressed, stressed
-from kedfem.dynamics.system.turning_loads import turning
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
@@ -197,7 +197,7 @@ def _in_parts(
 ) -> tuple[State, History]:
     """One step in two, each of these in two again where it must be; where a stop is met if that is why."""
     if met:
-        from kedfem.dynamics.system.impacts import divided  # which marches
+        from kedfem.dynamics.system.starts.impacts import divided  # which marches
 
         return divided(of, state, last, between, halvings)
     if not of.halves:

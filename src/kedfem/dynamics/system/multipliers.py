@@ -7,7 +7,7 @@ not excite: by the largest magnitude a vibration grows, or falls, in a period.
 import numpy as np
 from jaxtyping import Complex
 
-from kedfem.dynamics.system.instant import Flat
+from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.krylov import Watched, arnoldi, combined, scale_of
 
 MOST, AGAIN = 80, 5  # marches, at most; those after which no larger one may have come up

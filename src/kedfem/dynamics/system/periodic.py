@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Complex
 
 from kedfem.dynamics.system.arrays import State
-from kedfem.dynamics.system.instant import TURN, Flat
+from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.krylov import Watch, Watched, arnoldi, combined, scale_of
 from kedfem.dynamics.system.multipliers import multipliers
 from kedfem.dynamics.system.period_map import CARRIED, PeriodMap

@@ -14,12 +14,12 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.coupling import Attachment
-from kedfem.dynamics.dense import DensePart
-from kedfem.dynamics.held import held_substructure
-from kedfem.dynamics.ports import port_columns
-from kedfem.dynamics.state import Nodal
-from kedfem.dynamics.substructure import Substructure, mass_matrix
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import port_columns
+from kedfem.dynamics.matrices.dense import DensePart
+from kedfem.dynamics.matrices.held import held_substructure
+from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix
+from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.arrays import Masses, Trial, ends_of
 from kedfem.links.record import Link
 from kedfem.processes import caught_in

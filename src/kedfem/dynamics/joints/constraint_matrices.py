@@ -1,0 +1,124 @@
+"""Rows of joints over time: C(t) from the rigid motion, and what one time point needs of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
+from kedfem.motion.constraints import cross
+from kedfem.motion.rigid import RigidMotion
+
+REPEATED = (
+    1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
+)
+
+
+@dataclass(frozen=True, slots=True)
+class JointRows:
+    """Rows e = C z of all joints at T time points, z the interface unknowns.
+
+    C : (T, r, k) [-, 1/m]
+    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold, e = 0
+    """
+
+    C: Float[np.ndarray, "T r k"]
+    stiffness: Float[np.ndarray, " r"]
+    damping: Float[np.ndarray, " r"]
+
+    def part(self, first: int, end: int) -> "JointRows":
+        """The time points from one number up to another."""
+        return replace(self, C=self.C[first:end])
+
+    @property
+    def soft(self) -> Bool[np.ndarray, " r"]:
+        """Which rows are springs."""
+        return np.asarray(np.isfinite(self.stiffness))
+
+
+@dataclass(frozen=True, slots=True)
+class Directions:
+    """What a joint's rows are along, at T time points, world axes.
+
+    point : (T, 3) its point, on link i [m]
+    gap, turn : (T, r, 3)
+    """
+
+    point: Float[np.ndarray, "T 3"]
+    gap: Float[np.ndarray, "T r 3"]
+    turn: Float[np.ndarray, "T r 3"]
+
+
+def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion) -> JointRows | None:
+    """Rows of all joints at the times of a motion; None without any."""
+    if not joints:
+        return None
+    return JointRows(
+        np.concatenate([rows_over(joint, motion) for joint in joints], axis=1),
+        np.concatenate([joint.stiffness for joint in joints]),
+        np.concatenate([joint.damping for joint in joints]),
+    )
+
+
+def rows_over(joint: ConstraintJoint, motion: RigidMotion) -> Float[np.ndarray, "T r k"]:
+    """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns."""
+    shares = port_rows(joint, motion)
+    C = np.sum([np.tensordot(on, side.onto, ((2, 3), (0, 1))) for side, on in shares], axis=0)
+    size = np.sqrt(sum((on**2).sum(axis=(2, 3)) for _, on in shares))
+    C[np.linalg.norm(C, axis=2) < REPEATED * size] = 0.0
+    return np.asarray(C)
+
+
+def port_rows(joint: ConstraintJoint, motion: RigidMotion) -> list[tuple[Side, Float[np.ndarray, "T r _ _"]]]:
+    """Rows of one joint on the displacements at the ports of each of its sides that has any, world components."""
+    along = directions(joint, motion)
+    own = [
+        (side, sign * _side_rows(side, joint, along, motion))
+        for side, sign in zip(joint.sides, (1.0, -1.0), strict=True)
+        if side is not None
+    ]
+    others = [(side, c * rows) for c, other in joint.plus for side, rows in port_rows(other, motion)]
+    return own + others
+
+
+def directions(joint: ConstraintJoint, motion: RigidMotion) -> Directions:
+    """Where a joint is and what its rows are along: fixed in link j, but for a universal joint's last."""
+    i, j = joint.bodies
+    R = motion.R[:, j].transpose(0, 2, 1)
+    gap, turn = joint.gap @ R, joint.turn @ R
+    if joint.cross is not None:
+        a, b = motion.R[:, i] @ joint.cross[0], motion.R[:, j] @ joint.cross[1]
+        turn[:, -1] = cross(a, b)
+    return Directions(motion.p[:, i] + motion.R[:, i] @ joint.at, gap, turn)
+
+
+def travel(joint: ConstraintJoint, motion: RigidMotion) -> Float[np.ndarray, " T"]:
+    """How far a joint's point on link i has gone along the axis fixed in link j [m]."""
+    return np.asarray(seen_from(motion, joint.bodies, joint.at) @ joint.axis)
+
+
+def seen_from(
+    motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "T 3"]:
+    """Where a point of body i is in the frame of body j, from where both are drawn (T, 3) [m]."""
+    i, j = bodies
+    point = motion.p[:, i] + motion.R[:, i] @ at
+    return np.asarray(((point - motion.p[:, j])[:, None] @ motion.R[:, j])[:, 0] - at)
+
+
+def _side_rows(
+    side: Side, joint: ConstraintJoint, along: Directions, motion: RigidMotion
+) -> Float[np.ndarray, "T r p d"]:
+    """gap · u + turn · θ of one link at the joint's point: with r from the coupling surface, gap · u₀ + (r × gap + turn)
+    · θ."""
+    d, R = side.onto.shape[1], motion.R[:, side.body]
+    if side.stations is not None:
+        N = side.stations.at(travel(joint, motion))
+        c = np.einsum("tp,trb,pba->trpa", N, along.gap @ R, side.seat[:, :3])
+    else:
+        origin = motion.p[:, side.body] + R @ side.origin
+        r = (along.point - origin)[:, None]
+        on = np.concatenate([along.gap @ R, (cross(r, along.gap) + along.turn) @ R], axis=2)
+        c = np.einsum("trb,pba->trpa", on, side.seat)
+    return np.asarray(c @ R[:, None, :d, :d].transpose(0, 1, 3, 2))

@@ -1,0 +1,73 @@
+"""Joints enforced by constraint equations at the first time point: C z = 0 differentiated, C z' = −C' z, C z'' = −2 C' z'
+− C'' z."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import port_rotation, port_values
+from kedfem.dynamics.matrices.interface import RowState, Tie
+from kedfem.dynamics.stepping.state import LinkState, NodalOf
+
+# differences of fourth and third order at the first of five instants
+FIRST = np.array([-25, 48, -36, 16, -3]) / 12
+SECOND = np.array([35, -104, 114, -56, 11]) / 12
+INSTANTS = len(FIRST)
+
+
+@dataclass(frozen=True, slots=True)
+class FirstRows:
+    """Rows at the first time point: C, C', C'' (r, k), and which are springs."""
+
+    rows: JointRows
+    C: Float[np.ndarray, "r k"]
+    C1: Float[np.ndarray, "r k"]
+    C2: Float[np.ndarray, "r k"]
+
+    def _hard(self, target: Float[np.ndarray, " r"], force: Float[np.ndarray, " k"]) -> Tie:
+        hard = ~self.rows.soft
+        return Tie(self.C[hard], np.zeros(int(hard.sum())), target[hard], force)
+
+    def rate_tie(self, z: Float[np.ndarray, " k"], z1: Float[np.ndarray, " k"]) -> Tie:
+        """Of changes of the rates that close the rows."""
+        return self._hard(-self.C1 @ z - self.C @ z1, np.zeros(len(z)))
+
+    def acceleration_tie(self, z: Float[np.ndarray, " k"], z1: Float[np.ndarray, " k"]) -> Tie:
+        """Of accelerations; springs push as they are deflected."""
+        e, e1 = self.C @ z, self.C1 @ z + self.C @ z1
+        soft, of = self.rows.soft, self.rows
+        push = -of.stiffness[soft] * e[soft] - of.damping[soft] * e1[soft]
+        return self._hard(-2 * self.C1 @ z1 - self.C2 @ z, self.C[soft].T @ push)
+
+    def state(self, joints: Sequence[Attachment], states: Sequence[LinkState]) -> RowState:
+        """What rows carry into the first step."""
+        z, z1, z2 = (interface_values(joints, [getattr(s, x) for s in states]) for x in ("u", "v", "a"))
+        e = np.stack([
+            self.C @ z, self.C1 @ z + self.C @ z1, self.C2 @ z + 2 * self.C1 @ z1 + self.C @ z2,
+        ])  # fmt: skip
+        return RowState(interface_forces(joints, states), e * self.rows.soft)
+
+
+def first_rows(rows: JointRows, h: float) -> FirstRows:
+    """From rows at five instants, each h after the other [s]."""
+    C1, C2 = np.tensordot(FIRST, rows.C, 1) / h, np.tensordot(SECOND, rows.C, 1) / h**2
+    return FirstRows(rows.part(0, 1), rows.C[0], C1, C2)
+
+
+def interface_values(joints: Sequence[Attachment], u: Sequence[NodalOf]) -> Float[np.ndarray, " k"]:
+    """z from states with joints closed, world components: W u = B z."""
+    w = np.concatenate([port_values(joint, x) for joint, x in zip(joints, u, strict=True)])
+    return np.asarray(np.linalg.lstsq(np.vstack([joint.B for joint in joints]), w, rcond=None)[0])
+
+
+def interface_forces(joints: Sequence[Attachment], states: Sequence[LinkState]) -> Float[np.ndarray, " k"]:
+    """Σ Bᵀ R λ: what rows exert."""
+    each = [
+        joint.B.T @ (port_rotation(joint, s.R) @ s.port_forces)
+        for joint, s in zip(joints, states, strict=True)
+    ]
+    return np.asarray(np.sum(each, axis=0))

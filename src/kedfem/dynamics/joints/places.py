@@ -1,0 +1,67 @@
+"""Where joints are on links: their coupling surfaces, on links and on segments of links."""
+
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.constraint_joints import bore_axis
+from kedfem.errors import KedfemError, MeshError, SceneError
+from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
+from kedfem.links.record import Link
+from kedfem.motion.linkage import joint_axis
+from kedfem.scene import GROUND, Scene
+
+T = TypeVar("T")
+
+
+def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
+    """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
+    if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
+        return None
+    guide = slider_guide(scene, name)
+    return joint_axis(scene.joints[guide]) if guide else None
+
+
+def slider_guide(scene: Scene, name: str) -> str:
+    """The joint that a rigid slider slides in, "" if there is none: one on the ground first, as it may carry others."""
+    on = [key for key, joint in scene.joints.items() if joint.kind == "prismatic" and name in joint.links]
+    return next((key for key in on if GROUND in scene.joints[key].links), on[0] if on else "")
+
+
+def seat_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
+    """The coupling surface of a joint on a link."""
+    joint = scene.joints[name]
+    axis = bore_axis(joint, link.name)
+    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
+
+
+def on_part(
+    links: Mapping[str, Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
+) -> tuple[str, T]:
+    """The segment of a link that has something at a point, nearest first, and what was found on it.
+
+    Raises
+    ------
+    MeshError, SceneError
+        That of the nearest segment, if none has it.
+    """
+    parts = {key: link for key, link in links.items() if link.name == name}
+    gap = {
+        key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min())
+        for key, link in parts.items()
+    }
+    first: KedfemError | None = None
+    for key in sorted(parts, key=lambda key: gap[key]):
+        try:
+            return key, found(parts[key])
+        except (MeshError, SceneError) as error:
+            first = first or error
+    raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
+
+
+def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, CouplingSurface]:
+    """The segment of a link on which a joint sits, and the seat."""
+    at = np.asarray(scene.joints[joint].at)
+    return on_part(links, name, at, lambda link: seat_of(scene, joint, link))

@@ -1,0 +1,57 @@
+"""Ports of one link: the displacements there, W u, and forces on them, Wᵀ λ, in the link frame or turned."""
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.stepping.state import Nodal
+
+Rotation = Float[np.ndarray, "d d"]
+
+
+def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
+    """Wᵀ for all held components of a link with n functions, (dn, q)."""
+    p, d = len(attachment.weights), attachment.components
+    W = np.zeros((p, d, n, d))
+    for k in range(d):
+        W[:, k, attachment.nodes, k] = attachment.weights
+    return np.asarray(W.reshape(d * p, d * n)[attachment.keep].T)
+
+
+def port_values(attachment: Attachment, u: Nodal) -> Float[np.ndarray, " q"]:
+    """W u, the held components."""
+    return np.asarray((attachment.weights @ u[attachment.nodes]).ravel()[attachment.keep])
+
+
+def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q"]:
+    """R on all held components."""
+    port, component = np.divmod(attachment.keep, attachment.components)
+    return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
+
+
+def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p d"]:
+    """Port forces as one row per port, zero where a component is not held."""
+    full = np.zeros((len(attachment.weights), attachment.components))
+    full.ravel()[attachment.keep] = force
+    return full
+
+
+def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray, " q"]) -> None:
+    """Add Wᵀ λ to nodal forces in place."""
+    out[attachment.nodes] += attachment.weights.T @ port_vectors(attachment, force)
+
+
+def turned_vectors(
+    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T p d"]:
+    """R λ over time, a row per port in world components, zero where a component is not held."""
+    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
+    vectors.reshape(len(force), -1)[:, attachment.keep] = force
+    return np.asarray(vectors @ R.transpose(0, 2, 1))
+
+
+def turned_ports(
+    attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
+) -> Float[np.ndarray, "T q"]:
+    """R λ over time: port forces of the link frame in world components."""
+    return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]

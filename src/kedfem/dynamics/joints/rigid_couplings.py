@@ -1,0 +1,35 @@
+"""Coupling surfaces of joints with rigid couplings: added stiffness of their links, before anything else is made of
+these."""
+
+from collections.abc import Mapping
+
+from kedfem.dynamics.joints.places import part_seat
+from kedfem.links.record import Link
+from kedfem.links.rigid_coupling import with_stiff_seat
+from kedfem.scene import Scene
+
+
+def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
+    """Links, or their segments, whose coupling surfaces of joints with rigid couplings keep their shape.
+
+    A coupling surface of several joints is made stiff once; beams and rigid links need nothing.
+
+    Raises
+    ------
+    MeshError
+        If such a joint finds no coupling surface on one of its links.
+    """
+    out, done = dict(links), set()
+    meshed = {link.name for link in links.values() if link.meshed}
+    for name, joint in scene.joints.items():
+        for link in (
+            joint.links[:1] if joint.kind == "slot" else joint.links
+        ):  # a slot's line is no coupling surface
+            if link not in meshed or not joint.stiff(link) or scene.links[link].fidelity == "rigid":
+                continue
+            key, seat = part_seat(scene, name, out, link)
+            which = (key, seat.facets.tobytes() if seat.facets is not None else b"")
+            if which not in done:
+                out[key] = with_stiff_seat(out[key], seat)
+                done.add(which)
+    return out

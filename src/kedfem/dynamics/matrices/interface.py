@@ -1,0 +1,135 @@
+"""The common system of all links' port points, where joints hold or spring by rows that vary in time.
+
+    H z = f + Cᵀ m,   e = C z,   e_r = 0 of a row that holds,   m_r = −κ_r e_r of a spring
+
+Without its rows a linkage at rest may be one that moves, H singular. So a part σ < κ of every spring, and as much of a
+spring beside each row that holds, is put into H' = H + Cᵀ σ C; with m' = m + σ e the rest is
+
+    (C H'⁻¹ Cᵀ + diag 1/(κ − σ)) m' = target − C H'⁻¹ f
+
+exact for every σ, one equation of springs and of what holds (1/κ = 0), and well conditioned however stiff springs are.
+
+In a step of generalised-α the forces balance as (1 − α_f) Cᵀ₁ μ₁ + α_f Cᵀ₀ μ₀, each along its own directions. The second
+part is known, and the new μ₁ acts along the new rows alone: joint forces at the end of a step are free of what else would
+swing from step to step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.stepping.scheme import Scheme
+from kedfem.errors import SolveError
+
+DEPENDENT = 1e-11  # what is left of a row's own compliance where other rows hold what it holds
+
+
+@dataclass(frozen=True, slots=True)
+class Tie:
+    """What rows ask at one solution of the interface system.
+
+    C : (r, k); compliance : (r,) 1/κ, zero of rows that hold
+    target : (r,) C z of rows that hold; zero of springs
+    force : (k,) known forces on the interface
+    """
+
+    C: Float[np.ndarray, "r k"]
+    compliance: Float[np.ndarray, " r"]
+    target: Float[np.ndarray, " r"]
+    force: Float[np.ndarray, " k"]
+
+
+@dataclass(frozen=True, slots=True)
+class RowState:
+    """What rows carry from step to step.
+
+    p : (k,) Cᵀ μ, their forces on the interface unknowns
+    e : (3, r) e, e', e''
+    """
+
+    p: Float[np.ndarray, " k"]
+    e: Float[np.ndarray, "3 r"]
+
+
+def solved(
+    H: Float[np.ndarray, "k k"], f: Float[np.ndarray, " k"], tie: Tie | None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+    """Interface unknowns z and the rows' forces m.
+
+    Raises
+    ------
+    SolveError
+        If H is not positive definite.
+    """
+    k = 0.0 if tie is None else _beside(H, tie)
+    try:
+        if tie is not None:
+            H = H + (tie.C.T * k) @ tie.C
+        factor = scipy.linalg.cho_factor(H, lower=True, check_finite=False)
+    except np.linalg.LinAlgError as error:
+        raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
+    if tie is None:
+        return np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False)), np.zeros(0)
+    Y = scipy.linalg.solve_triangular(factor[0], tie.C.T, lower=True, check_finite=False)
+    z = np.asarray(scipy.linalg.cho_solve(factor, f + tie.force, check_finite=False))
+    compliance = tie.compliance / (1 - k * tie.compliance)
+    G = Y.T @ Y + np.diag(compliance)
+    L, kept = semidefinite_factor(G)
+    m = np.zeros(len(G))
+    for _ in range(2):  # the second closes joints to rounding
+        left = tie.target - tie.C @ z - compliance * m
+        change = np.zeros(len(G))
+        change[kept] = scipy.linalg.cho_solve((L, True), left[kept], check_finite=False)
+        m += change
+        z += scipy.linalg.solve_triangular(factor[0], Y @ change, lower=True, trans="T", check_finite=False)
+    return z, m - k * (tie.C @ z)
+
+
+def _beside(H: Float[np.ndarray, "k k"], tie: Tie) -> Float[np.ndarray, " r"]:
+    """σ of each row: about as stiff as the interface is, at most half of a spring."""
+    size = (tie.C**2).sum(axis=1)
+    usual = np.where(size > 0, np.trace(H) / len(H) / np.where(size > 0, size, 1.0), 0.0)
+    return np.asarray(usual / (1 + 2 * usual * tie.compliance))
+
+
+def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, "q q"], np.ndarray]:
+    """Cholesky factor of the rows that do not depend on those before them, and which these are."""
+    L = np.zeros_like(G)
+    kept: list[int] = []
+    for i in range(len(G)):
+        n = len(kept)
+        row = np.zeros(n)
+        for a, j in enumerate(kept):
+            row[a] = (G[i, j] - row[:a] @ L[a, :a]) / L[a, a]
+        left = G[i, i] - row @ row
+        if left > DEPENDENT * G[i, i]:
+            L[n, :n], L[n, n] = row, np.sqrt(left)
+            kept.append(i)
+    return L[: len(kept), : len(kept)], np.array(kept, int)
+
+
+def step_tie(C: Float[np.ndarray, "r k"], rows: JointRows, scheme: Scheme, state: RowState) -> Tie:
+    """What the rows ask in a step: κ = (1 − α_f) (k + c a₁), with e' by Newmark's formula."""
+    share = 1 - scheme.alpha_f
+    kappa = share * (rows.stiffness + rows.damping * scheme.a1)
+    known = C.T @ (share * rows.damping * (scheme.rate @ state.e))
+    return Tie(C, 1 / kappa, np.zeros(len(C)), scheme.alpha_f * state.p + known)
+
+
+def after_step(tie: Tie, z: np.ndarray, m: np.ndarray, scheme: Scheme, state: RowState) -> RowState:
+    """The rows' state at the end of a step."""
+    p = (tie.C.T @ m + tie.force - scheme.alpha_f * state.p) / (1 - scheme.alpha_f)
+    e0, e1, e2 = state.e
+    e = tie.C @ z
+    second = scheme.a0 * (e - e0) - scheme.acceleration[1] * e1 - scheme.acceleration[2] * e2
+    first = e1 + scheme.h * ((1 - scheme.gamma) * e2 + scheme.gamma * second)
+    return RowState(p, np.stack([e, first, second]))
+
+
+def static_tie(rows: JointRows, at: int) -> Tie:
+    """What the rows ask of a linkage at rest."""
+    C = rows.C[at]
+    return Tie(C, 1 / rows.stiffness, np.zeros(len(C)), np.zeros(C.shape[1]))

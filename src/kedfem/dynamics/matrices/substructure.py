@@ -1,0 +1,246 @@
+"""Links condensed onto their ports, and all of them solved together: joints on a dozen unknowns.
+
+Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, port_values
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.dynamics.matrices.interface import Tie, solved
+from kedfem.dynamics.stepping.scheme import Scheme
+from kedfem.dynamics.stepping.state import Nodal, NodalOf, Rayleigh
+from kedfem.errors import SolveError
+from kedfem.links.record import Link
+
+ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally well
+
+
+@dataclass(frozen=True, slots=True)
+class Substructure:
+    """A link seen from its q port components and e anchors, all constant in the link frame.
+
+    A holds a free link by its inertia only, so a long step would leave it nearly singular. Factored is therefore
+    Ã = A + κ E Eᵀ, E a few components of nodes far apart (the anchors): A g = r + Wᵀ λ is Ã g = r + Wᵀ λ + E μ with
+    μ = κ Eᵀ g. Exact for every κ. With C = [Wᵀ E] and y = Ã⁻¹ r,
+
+        [λ; μ] = S ([W g; 0] − Cᵀ y),   S = (Cᵀ Ã⁻¹ C − diag(0, 1/κ))⁻¹,   g = y + Ã⁻¹ C [λ; μ].
+
+    solve : (n, d) → (n, d), Ã⁻¹
+    Y : (dn, q + e) Ã⁻¹ C
+    S : (q + e, q + e)
+    anchors : (e,) components of the state
+    """
+
+    solve: Callable[[Nodal], Nodal]
+    attachment: Attachment
+    Y: Float[np.ndarray, "k c"]
+    S: Float[np.ndarray, "c c"]
+    anchors: Int[np.ndarray, " e"]
+
+    def seen(self, y: Nodal) -> Float[np.ndarray, " c"]:
+        """Cᵀ y: values at ports and anchors."""
+        return np.concatenate([port_values(self.attachment, y), y.ravel()[self.anchors]])
+
+
+def substructure(
+    attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
+    anchors: Int[np.ndarray, " e"] | None = None, kappa: Float[np.ndarray, " e"] | None = None,
+) -> Substructure:  # fmt: skip
+    """Condense a link onto its ports and anchors.
+
+    Parameters
+    ----------
+    n : functions of the link
+    solve, solve_many : Ã⁻¹ for one state (n, d) and for columns (dn, k)
+    anchors, kappa : components that Ã holds in addition to A, none if not given, and how stiffly [N/m]
+    """
+    held = np.zeros(0, int) if anchors is None else anchors
+    E = np.zeros((attachment.components * n, len(held)))
+    E[held, np.arange(len(held))] = 1.0
+    C = np.concatenate([port_columns(attachment, n), E], axis=1)
+    Y = solve_many(C)
+    F = C.T @ Y
+    if kappa is not None:
+        at = np.arange(len(F) - len(held), len(F))
+        F[at, at] -= 1 / kappa
+    return Substructure(solve, attachment, Y, _stiffness(F, len(held)), held)
+
+
+def _stiffness(F: Float[np.ndarray, "c c"], anchored: int) -> Float[np.ndarray, "c c"]:
+    """F⁻¹ = B⁻ᵀ J B⁻¹, F = B J Bᵀ, J = 1 of the ports and −1 of the last, the anchors, that are let go.
+
+    A link that is stiff near its ports, as beams in space are in their hubs, is 1e6 times as stiff there as it is heavy.
+    Of that, B⁻¹ has the square root: joint forces keep four digits that an inverse by elimination would lose.
+    """
+    p = len(F) - anchored
+    B = np.zeros_like(F)
+    B[:p, :p] = np.linalg.cholesky(F[:p, :p])
+    if anchored:
+        Z = scipy.linalg.solve_triangular(B[:p, :p], F[:p, p:], lower=True, check_finite=False)
+        B[p:, :p] = Z.T
+        B[p:, p:] = np.linalg.cholesky(Z.T @ Z - F[p:, p:])
+    inverse = scipy.linalg.solve_triangular(B, np.eye(len(F)), lower=True, check_finite=False)
+    return np.asarray((inverse[:p].T @ inverse[:p]) - inverse[p:].T @ inverse[p:])
+
+
+def coupled(
+    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None = None
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
+    """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
+
+    The mechanism of [KED, eq. (19)]: joints make shared points move together.
+
+    Parameters
+    ----------
+    parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
+    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
+
+    Returns
+    -------
+    g : per link (n, d), link frame
+    forces : per link (q,) λ on the link at its ports, link frame
+    """
+    y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
+    v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
+    held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
+    RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
+    z = np.zeros(parts[0].attachment.B.shape[1])
+    if len(z):
+        # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
+        H, f = np.zeros((len(z), len(z))), np.zeros(len(z))
+        for part, b, c, x in zip(parts, RB, held, v, strict=True):
+            H[np.ix_(c, c)] += b.T @ part.S @ b
+            f[c] += b.T @ (part.S @ x)
+        z, _ = solved(H, f, tie)
+    forces = [part.S @ (b @ z[c] - x) for part, b, c, x in zip(parts, RB, held, v, strict=True)]
+    g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
+    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
+
+
+def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:
+    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns that the link has a share in."""
+    B = part.attachment.B[:, held]
+    out = np.zeros((len(part.S), len(held)))
+    out[: len(B)] = port_rotation(part.attachment, R).T @ B
+    return out
+
+
+def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
+    """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
+    anchors = anchors_of(link)
+    if link.full is not None:
+        return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
+    springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
+    factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
+    with _condensing(link):
+        return substructure(
+            joint,
+            link.n,
+            lambda r: factor.solve(r.ravel()).reshape(r.shape),
+            factor.solve_many,
+            anchors,
+            kappa,
+        )
+
+
+@contextmanager
+def _condensing(link: Link) -> Iterator[None]:
+    """Says which link has stiffnesses so far apart that nothing is left of its flexibility at its interface points."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"links.{link.name}: must have a flexibility at its joints that is more than rounding beside its least stiff "
+            "motion, got none: it may be very thin beside its length, or its sizes in other units than meant"
+        ) from error
+
+
+def mass_substructure(link: Link, joint: Attachment) -> Substructure:
+    """The link condensed with A = M; the three components of a solid share one factor.
+
+    Conjugate gradients would spare it, but a heavy body on a bore costs them their convergence.
+    """
+    of = {id(m): Cholesky(m, f"links.{link.name}: mass") for m in {id(m): m for m in link.mass}.values()}
+
+    def solve(b: Nodal) -> Nodal:
+        return np.stack([np.array(of[id(m)].solve(b[:, k])) for k, m in enumerate(link.mass)], axis=1)
+
+    def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
+        return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
+
+    with _condensing(link):
+        return substructure(joint, link.n, solve, solve_many)
+
+
+def _dense_factored(
+    link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
+) -> Substructure:
+    """`factored` of a reduced link, whose matrices are dense."""
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal().mean()))
+    dense = A.toarray()
+    dense[anchors, anchors] += kappa
+    try:
+        factor = scipy.linalg.cho_factor(dense, check_finite=False)
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"links.{link.name}: effective matrix must be positive definite, got {error}"
+        ) from error
+
+    def solve_many(B: np.ndarray) -> np.ndarray:
+        return np.asarray(scipy.linalg.cho_solve(factor, B, check_finite=False))
+
+    with _condensing(link):
+        return substructure(
+            joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
+        )
+
+
+def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
+    """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
+    if link.full is not None:
+        # as functions are mass-orthonormal, those with most of 1 and x move the link most
+        share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()
+        return (link.d * np.argsort(share)[::-1][: link.d + 1, None] + np.arange(link.d)).ravel()
+    if link.kind == "beam":
+        return np.arange(3) + 3 * (link.n // 2)
+    if link.kind == "spatial_beam":
+        # its nodes may be in line: the turn about it is held by the slopes of one
+        values = np.flatnonzero(link.one)
+        return np.asarray(np.arange(9) + 3 * values[len(values) // 2])
+    nodes = np.flatnonzero(link.one)
+    X = link.X[nodes]
+    first = int(np.linalg.norm(X - X.mean(axis=0), axis=1).argmax())
+    arms = X - X[first]
+    second = int(np.linalg.norm(arms, axis=1).argmax())
+    third = int(np.linalg.norm(np.cross(arms, arms[second]), axis=1).argmax())
+    far = nodes[[first, second, third][: link.d]]
+    return (link.d * far[:, None] + np.arange(link.d)).ravel()
+
+
+def effective_coefficients(scheme: Scheme, damping: Rayleigh) -> tuple[float, float]:
+    """c_M [1/s²] and c_K [-] of A = c_M M + c_K K0 = (1 − α_m) a0 M + (1 − α_f) (K0 + a1 C0)."""
+    c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
+    return c_m * scheme.a0 + c_f * scheme.a1 * damping.alpha, c_f * (1 + scheme.a1 * damping.beta)
+
+
+def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
+    """A = c_M M + c_K K0 in the link frame, (dn, dn): constant because of [KED, eqs. (12)(14)]."""
+    return sp.csr_array(c_M * mass_matrix(link) + c_K * link.K0)
+
+
+def mass_matrix(link: Link) -> sp.csr_array:
+    """M = m ⊗ I, (dn, dn), [KED, eqs. (9)(11)]."""
+    unit = np.eye(link.d)
+    return sp.csr_array(
+        sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass))
+    )

@@ -1,0 +1,41 @@
+"""A basis for every link of a model, or segment of one, from what its loads do at some instants of the motion."""
+
+from collections.abc import Collection, Sequence
+
+from kedfem.dynamics.matrices.substructure import Substructure
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions
+from kedfem.dynamics.modes.segment_modes import segment_basis
+from kedfem.dynamics.stepping.start import Instant
+from kedfem.dynamics.stepping.state import NodalOf
+
+
+def bases(
+    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure],
+    only: Collection[str] | None = None,
+) -> list[Basis | None]:  # fmt: skip
+    """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
+
+    Segments with co-rotational frames are among them: what they do is looked at in rigid-body frames, all segments
+    coupled.
+
+    Parameters
+    ----------
+    parts : `static_parts` of the model
+    only : names of the links that need one; all if not given
+    """
+    deflections: list[list[NodalOf]] = [[] for _ in model.links]
+    for instant in instants:
+        for kept, found in zip(deflections, excited(model, parts, instant), strict=True):
+            kept.extend(found)
+    return [
+        _basis(model, k, part, found) if only is None or model.links[k].name in only else None
+        for k, (part, found) in enumerate(zip(parts, deflections, strict=True))
+    ]
+
+
+def _basis(model: Model, k: int, part: Substructure, deflections: Sequence[NodalOf]) -> Basis:
+    link, joint = model.links[k], model.joints[k]
+    if link.fit is not None:
+        return segment_basis(link, joint, part, deflections)
+    return energy_sorted(link, port_functions(link, joint, part), deflections)

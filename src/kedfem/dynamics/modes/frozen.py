@@ -1,0 +1,153 @@
+"""Natural frequencies and mode shapes of a linkage frozen at positions of its rigid-body motion.
+
+    (K + κ c cᵀ) x = ω² M x,   joints closed: W x = Rᵀ B z,  C z = 0
+
+K = T K0 Tᵀ of links, κ the tangents of force laws there. All links are factored once, with
+K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.balance`), and a block
+Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the others.
+Forces that stretch a link or a spring do not change its stiffness here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.modes.lanczos import Block, lanczos
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.arrays import Coefficients
+from kedfem.dynamics.system.layout import as_arrays, coefficients, factored
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.record import System
+from kedfem.dynamics.system.sparse import SparsePart, momentum
+from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.links.reduced import wave_frequency
+from kedfem.motion.rigid import RigidMotion
+
+RIGID_MOTIONS = 6  # of a free body: so many equal frequencies must be found, at the least
+STILL = 1e-8  # ω²/s below which a motion has no strain: free chains of tests/laws/test_frozen.py leave less
+FIRST = 1e-3  # s, of the slowest link's (√(E/ρ)/L)², before the first frequency is known
+NEAR = (1e-3, 1e6)  # ω² of the first vibration over s; beyond, links are factored again with s = ω²
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """Modes of a frozen linkage.
+
+    omega : (f,) natural circular frequencies in rising order, those of motions without strain zero [rad/s]
+    shapes : per link (f, n, d), of unit mass all together, world components [kg^-½]
+    still : how many of them are motions without strain
+    """
+
+    omega: Float[np.ndarray, " f"]
+    shapes: tuple[Float[np.ndarray, "f n d"], ...]
+    still: int
+
+    @property
+    def frequencies(self) -> Float[np.ndarray, " v"]:
+        """Of vibrations alone [Hz]."""
+        return self.omega[self.still :] / (2 * np.pi)
+
+
+class Frozen:
+    """A system whose modes are asked for at positions.
+
+    Parameters
+    ----------
+    count : vibrations that are wanted
+    free : motions without strain that there may be, which are found beside them
+
+    factorisations : of links, so far
+    """
+
+    def __init__(self, system: System, count: int, free: int = 0) -> None:
+        self.system, self.count, self.free = system, count, free
+        elastic = [link for link in system.model.links if not link.rigid] or list(system.model.links)
+        self.shift = FIRST * min(map(wave_frequency, elastic)) ** 2
+        self.factorisations = 0
+        self._settled = False
+        self._factored()
+
+    def _factored(self) -> None:
+        self.of = _ready(self.system, self.shift)
+        self.held = [_held(self.of, k) for k in range(len(self.of.parts))]
+        self._like: Instant | None = None
+        self.factorisations += len(self.held)
+
+    def at(self, motion: RigidMotion) -> Modes:
+        """The lowest modes at a position.
+
+        Parameters
+        ----------
+        motion : of one time
+        """
+        lowest, shapes = self._modes(motion)
+        while not self._settled:
+            first = lowest[lowest > STILL * self.shift][:1]
+            low, high = NEAR
+            self._settled = not len(first) or low <= first[0] / self.shift <= high
+            if not self._settled:
+                self.shift = float(first[0])
+                self._factored()
+                lowest, shapes = self._modes(motion)
+        still = int((np.abs(lowest) <= STILL * self.shift).sum())
+        end = still + self.count
+        omega = np.sqrt(np.where(np.abs(lowest) <= STILL * self.shift, 0.0, lowest))[:end]
+        bodies = range(len(self.of.parts))
+        per_link = (np.array([rows(self.of, k, x[own(self.of, k)]) for x in shapes.T[:end]]) for k in bodies)
+        return Modes(omega, tuple(per_link), still)
+
+    def _modes(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
+        """ω² in rising order, and shapes on the coordinates of all bodies."""
+        now = Instant(self.of, lambda t: motion, float(motion.t[0]), self._like)
+        self._like = now
+        balance = Balance(self.of, self.held, now.R, asked(now))
+
+        def answer(r: Block) -> Block:
+            return np.stack([balance.solved(each).x for each in r.T], axis=1)
+
+        size = int(self.of.bodies.at[-1])
+        block = max(RIGID_MOTIONS, self.free)
+        theta, shapes = lanczos(answer, self._momentum, size, self.count + self.free, block)
+        return 1 / theta - self.shift, shapes
+
+    def _momentum(self, x: Block) -> Block:
+        """M x."""
+        out = x.copy()
+        for k, (part, link) in enumerate(zip(self.of.parts, self.system.model.links, strict=True)):
+            if isinstance(part, SparsePart):
+                here = own(self.of, k)
+                out[here] = np.stack([momentum(link, each) for each in x[here].T], axis=1)
+        return out
+
+
+def asked(now: Instant) -> Asked:
+    """What joints, drives and force laws ask of a small motion about a position: laws with their tangents there."""
+    z = np.zeros((3, now.of.system.unknowns))
+    C, e = now.gradients(z[0]), now.coordinates(z)
+    hard, stiffness = now.hard(C), now.forces(e)[:, 1]
+    kept = hard | ((stiffness != 0.0) & (np.abs(C).max(axis=1, initial=0.0) > 0.0))
+    compliance = np.where(hard, 0.0, 1 / np.where(stiffness != 0.0, stiffness, 1.0))[kept]
+    return Asked(C[kept], np.zeros(len(compliance)), compliance, z[0])
+
+
+def _ready(system: System, shift: float) -> Ready:
+    """A system whose bodies are factored with K0 + s M."""
+    c = _shifted(system, shift)
+    parts = factored(system.model.links, system.model.joints, c)
+    return Ready(system, generalised_alpha(1.0, 1.0), c, parts, *as_arrays(system, parts))
+
+
+def _shifted(system: System, shift: float) -> Coefficients:
+    c = coefficients(generalised_alpha(1.0, 1.0), Rayleigh(0.0, 0.0), system.model.links, single=True)
+    return c._replace(c_M=shift, c_K=1.0)
+
+
+def _held(of: Ready, k: int) -> HeldBody:
+    part = of.parts[k]
+    if isinstance(part, SparsePart):
+        return stepped_body(part, 1.0)
+    return HeldBody(part.G, part.Y, part.Y, part.S, part.W)

@@ -1,0 +1,63 @@
+"""The residual of a reduced model in the full equation, and the deflection that would answer it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.history import LinkMoment, Snapshot
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.ports import add_port_forces
+from kedfem.dynamics.matrices.interface import static_tie
+from kedfem.dynamics.matrices.substructure import Substructure, coupled
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.stepping.start import damping_times
+from kedfem.dynamics.stepping.state import NodalOf, Rayleigh
+from kedfem.links.record import Link, mass_times
+from kedfem.motion.newton import cross_matrix
+
+
+def residual_deflections(
+    full: Model, parts: Sequence[Substructure], model: Model, snapshot: Snapshot
+) -> list[NodalOf]:
+    """Static answers of the linkage to r = P − M R0'' − M δ'' − C δ' − K δ + Wᵀ λ, [KED, eq. (20)], link frames.
+
+    Their strain energy is the residual in the norm dual to the energy's.
+
+    Parameters
+    ----------
+    full : the model that was reduced
+    parts : `static_parts` of it
+    model, snapshot : the reduced model and its state at one time
+    """
+    k = snapshot.k
+    motion = snapshot.motion.part(k, k + 1)
+    W = cross_matrix(motion.omega[0])
+    forcing = forcings(full, motion)
+    rhs = [
+        _residual(link, full.damping, small, state, each.F[0], W[body, : link.d, : link.d])
+        for link, small, state, each, body in zip(
+            full.links, model.links, snapshot.states, forcing, full.bodies, strict=True
+        )
+    ]
+    for r, joint, state in zip(rhs, full.joints, snapshot.states, strict=True):
+        add_port_forces(r, joint, state.port_forces)
+    rows = joint_rows(full.rows, motion)
+    tie = None if rows is None else static_tie(rows, 0)
+    return [x.copy() for x in coupled(parts, [state.R for state in snapshot.states], rhs, tie)[0]]
+
+
+def _residual(
+    link: Link, damping: Rayleigh, small: Link, state: LinkMoment, F: Float[np.ndarray, "n d"],
+    spin: Float[np.ndarray, "d d"],
+) -> Float[np.ndarray, "n d"]:  # fmt: skip
+    """Without the port forces; the rate of g is that of the co-rotated deformation, Rᵀ (δ' − ω × δ)."""
+    a, g, rate = state.a, state.g, (state.v - state.u @ spin.T) @ state.R
+    if small is not link and small.Q is not None:
+        a, g, rate = small.Q @ a, small.Q @ g, small.Q @ rate
+    r = (F - mass_times(link.mass, a)) @ state.R
+    r -= (link.K0 @ g.ravel()).reshape(r.shape)
+    if damping.present:
+        r -= damping_times(link, damping, rate)
+    return np.asarray(r)

@@ -1,0 +1,134 @@
+"""What a run will cost: from a few real steps of its own solver; of large models from the sizes alone."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.matrices.dense import SMALL
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.levels import level_steps
+from kedfem.dynamics.stepping.transient import Steps
+from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
+from kedfem.scene import Scene, time_grid
+
+# of a link of N unknowns, from `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD)
+FACTOR_FLOPS, SOLVE_BYTES = 1.0e4, 45.0  # times N^1.5
+SWEEPS = 4.0  # times the work of a step with rigid-body frames, where frames follow
+OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
+LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
+ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
+TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
+FIRST, MORE, MOST = (
+    4,
+    4,
+    1024,
+)  # steps that are tried: a few, then so many times as many until they take ENOUGH more
+ENOUGH = 0.2  # seconds
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Estimated seconds to factor and to step, bytes of memory and of one animation frame; how many steps were tried."""
+
+    factor: float
+    steps: float
+    memory: float
+    frame_bytes: float
+    tried: int = 0
+
+
+def estimated_cost(scene: Scene, model: Model) -> Cost:
+    """Cost of the condensed solver from the links' unknowns and this machine's memory and arithmetic speed."""
+    N, fill, levels = _unknowns(model), _fill(model), scene.analysis.extrapolation_levels or 1
+    bandwidth, rate = _machine()
+    small = bool((N <= SMALL).all())
+    step = (LOOP if small else OVERHEAD) + float(
+        (SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()
+    ) / bandwidth
+    if any(link.fit is not None for link in model.links):
+        step *= SWEEPS
+    return Cost(
+        factor=levels * FACTOR_FLOPS * float(fill.sum()) / rate,
+        steps=(2**levels - 1) * time_grid(scene).steps * step,
+        memory=levels * factor_bytes(model) + LINK_BYTES * float(N.sum()) + ASSEMBLY_BYTES * float(N.max()),
+        frame_bytes=120.0 * sum((link.full or link).n for link in model.links),
+    )
+
+
+def factor_bytes(model: Model) -> float:
+    """Memory of the factors of all links, for one step size."""
+    return FACTOR_BYTES * float(_fill(model).sum())
+
+
+def factor_words(model: Model) -> str:
+    """What is about to be factored, of large models with the memory that it takes, for whoever watches."""
+    unknowns = float(_unknowns(model).sum())
+    if unknowns <= TRIED:
+        return "factor"
+    return f"factor: {unknowns:,.0f} unknowns, about {factor_bytes(model) / 1e9:.2g} GB"
+
+
+def _unknowns(model: Model) -> Float[np.ndarray, " L"]:
+    return np.array([float(link.unknowns) for link in model.links])
+
+
+def _fill(model: Model) -> Float[np.ndarray, " L"]:
+    thin = [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]
+    return np.asarray(_unknowns(model) ** 1.5 * thin)
+
+
+def tried_cost(scene: Scene, model: Model, run: Callable[[Scene, list[Steps]], None]) -> Cost:
+    """Cost from some real steps of the solver that the run will have; of large models from their sizes.
+
+    Parameters
+    ----------
+    run : takes all steps of a scene, with all that is made of them
+
+    Raises
+    ------
+    SolveError
+        If the first steps cannot be taken.
+    """
+    cost = estimated_cost(scene, model)
+    N = _unknowns(model)
+    weight = float((N * [PLANE_FILL if link.kind == "plane" else 1.0 for link in model.links]).sum())
+    if weight > TRIED:
+        return cost
+    start = perf_counter()
+    solvers = level_steps(scene, model)
+    factor, total = perf_counter() - start, time_grid(scene).steps
+
+    def seconds(steps: int) -> float:
+        first = perf_counter()
+        run(_begun(scene, steps), solvers)
+        return perf_counter() - first
+
+    few = tried = min(FIRST, total)
+    seconds(few)  # compiled code is loaded
+    once = took = seconds(few)
+    while tried < min(MOST, total) and took - once < ENOUGH:  # beside what a start takes
+        tried = min(MORE * tried, MOST, total)
+        took = seconds(tried)
+    step = max(took - once, 0.0) / (tried - few) if tried > few else once / few
+    return replace(cost, factor=factor, steps=once + step * (total - few), tried=tried)
+
+
+def _begun(scene: Scene, steps: int) -> Scene:
+    """The first steps of a scene's analysis."""
+    h = time_grid(scene).step
+    changed = {"end_time": steps * h, "revolutions": None, "step": h, "steps_per_revolution": None}
+    return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=changed)})
+
+
+def _machine() -> tuple[float, float]:
+    """Bytes read per second and floating point operations per second, measured on the spot."""
+    a = np.ones(4_000_000)
+    t0 = perf_counter()
+    a.sum()
+    t1 = perf_counter()
+    b = np.ones((600, 600))
+    b @ b
+    return 8 * len(a) / (t1 - t0), 2 * 600**3 / (perf_counter() - t1)

@@ -1,0 +1,297 @@
+"""Forces of constraints and laws on bodies, hubs of prescribed bodies, efforts of drives: from a march's multipliers.
+
+A multiplier is a force along its coordinate: on an end i it is the force m ∂e/∂x_i and the moment m ∂e/∂θ_i. A body
+that the drive carries has no unknowns; all that acts on it, and P − M R0'', its hub must balance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.model import PrescribedBody
+from kedfem.dynamics.system.arrays import History
+from kedfem.dynamics.system.ends import corners, end_of, line_weights, same_end
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    DISTANCE,
+    FACE,
+    GAP,
+    LINE,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RIGID,
+    Constraint,
+    Driven,
+    End,
+    Spring,
+    Term,
+)
+from kedfem.dynamics.system.starts.instant import renumbered
+from kedfem.links.record import Link
+from kedfem.motion.constraints import cross
+from kedfem.motion.linkage import joint_axis
+from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import GROUND, Scene
+
+Vectors = Float[np.ndarray, "T 3"]
+Wrench = tuple[Vectors, Vectors]
+"""Force [N] and moment [N m], world components."""
+
+
+@dataclass(frozen=True, slots=True)
+class Supports:
+    """A march over T times: its history, the rigid-body motion at these, and what follows for forces.
+
+    Parameters
+    ----------
+    z : (T, k) interface unknowns in the order of the system
+    """
+
+    of: Ready
+    scene: Scene
+    history: History
+    motion: RigidMotion
+    z: Float[np.ndarray, "T k"]
+
+    def on(self, body: int, about: Vectors) -> Wrench:
+        """What all constraints and laws exert on a body, by its number in the linkage, with the moment about points."""
+        force, moment = np.zeros((2, *about.shape))
+        system = self.of.system
+        for n, each in enumerate(system.constraints):
+            for term in each.terms:
+                if body in {system.ends[term.i].body, system.ends[term.j].body}:
+                    m = term.factor * self.history.multiplier[:, n, None]
+                    for end, x, f, t in self.exerted(each, term):
+                        if end.body == body:
+                            force += m * f
+                            moment += m * (t + cross(x - about, f))
+        return force, moment
+
+    def exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
+        """Both ends of a term with their places, and force and moment there of a unit multiplier."""
+        ends = [self.of.system.ends[n] for n in (term.i, term.j)]
+        z = np.zeros_like(self.z) if each.linear else self.z
+        (x_i, Q_i), (x_j, Q_j) = (poses(end, self.motion, z) for end in ends)
+        if term.kind in (GAP, DISTANCE):
+            a_i, a_j = Q_i @ (term.a - ends[0].origin), Q_j @ (term.a_j - ends[1].origin)
+            gap = x_i + a_i - x_j - a_j
+            n = Q_j @ term.b if term.kind == GAP else gap / np.linalg.norm(gap, axis=1)[:, None]
+            reach = a_j + gap if term.kind == GAP else a_j
+            return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
+        turn = turning(term, Q_i, Q_j)
+        return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
+
+    def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
+        """Where a point of the body of end n, as drawn, is as a constraint sees it."""
+        end = self.of.system.ends[n]
+        x, Q = poses(end, self.motion, np.zeros_like(self.z) if each.linear else self.z)
+        return np.asarray(x + Q @ (at - end.origin))
+
+    def of_joint(self, k: int, joint: str, about: Vectors) -> Wrench:
+        """What a joint of shared interface points exerts on body k of the model; these where the rigid-body motion has
+        them.
+
+        From all λ and what laws exert on interface points that depend on the joint's, see `Attachment`.
+        """
+        model, bodies, number = self.of.system.model, self.of.bodies, self.of.system.model.bodies[k]
+        ports, beam = model.joints[k], model.links[k].kind == "beam"
+        every = np.zeros((len(about), ports.components * len(ports.points)))
+        for j, share in enumerate(ports.shares):
+            if share.any():
+                every += self.history.port_force[:, bodies.port_at[j] : bodies.port_at[j + 1]] @ share.T
+        if ports.from_rows.any():
+            every += self._on_interface() @ ports.from_rows.T
+        force, moment = np.zeros((2, *about.shape))
+        for port, (X, name) in enumerate(zip(ports.points, ports.joints, strict=True)):
+            if name == joint:
+                here = every[:, ports.components * port :][:, : ports.components]
+                f = np.zeros_like(about)
+                flat = 2 if beam else ports.components
+                f[:, :flat] = here[:, :flat]
+                force, moment = force + f, moment + cross(self.place(number, X) - about, f)
+                if beam:
+                    moment[:, 2] += here[:, 2]
+        return force, moment
+
+    def _on_interface(self) -> Float[np.ndarray, "T m"]:
+        """What all constraints and laws exert on interface points of their own, side by side as `coupling` has them."""
+        out = []
+        for row in self.of.system.model.rows:
+            for joint in (row, *(other for _, other in row.plus)):
+                for side in joint.sides:
+                    if side is not None and side.shared:
+                        ends = corners(side) if row.name.startswith("rigid.") else [end_of(side, joint)]
+                        out += [self.on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
+        return np.concatenate(out, axis=1)
+
+    def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
+        """What a joint's constraints and laws exert on the points of one of its ends."""
+        y = np.zeros((len(self.z), *end.onto.shape[:2]))
+        for n, each in enumerate(self.of.system.constraints):
+            for term in each.terms if each.name == name else ():
+                for other, _, f, t in self.exerted(each, term):
+                    if same_end(other, end):
+                        m = term.factor * self.history.multiplier[:, n, None, None]
+                        z = np.zeros_like(self.z) if each.linear else self.z
+                        y += m * point_forces(end, self.motion, z, f, t)
+        return y
+
+    def place(self, body: int, at: Float[np.ndarray, "3"]) -> Vectors:
+        """Where a point of a body as drawn is in the rigid-body motion."""
+        return np.asarray(self.motion.p[:, body] + self.motion.R[:, body] @ at)
+
+    def hub(self, carried: PrescribedBody) -> Wrench:
+        """What the driven joint exerts on a body that it carries, with the moment about the joint's point."""
+        centre = self.place(carried.body, np.asarray(self.scene.joints[carried.hub].at))
+        force, moment = (-x for x in self.on(carried.body, centre))
+        rows = applied(carried.link, carried.loads, self.motion, carried.body)
+        f, t = resultant(carried.link, rows, self.motion, carried.body, centre)
+        force, moment = force - f, moment - t
+        for k, link in enumerate(self.of.system.model.links):
+            both = {link.name, carried.link.name}
+            for name in (name for name, joint in self.scene.joints.items() if both == set(joint.links)):
+                f, t = self.of_joint(k, name, centre)
+                force, moment = force + f, moment + t
+        return force, moment
+
+    def effort(self, name: str) -> Float[np.ndarray, " T"]:
+        """Torque of the drive on a hinge, force of that on a slide, along its axis [N m or N]."""
+        model, joint = self.of.system.model, self.scene.joints[name]
+        number = list(self.scene.driven_joints).index(name)
+        for n, each in enumerate(self.of.system.constraints):
+            if isinstance(each.law, Driven | Spring) and each.law.drive == number:
+                return np.asarray(self.history.multiplier[:, n])
+        carried = next((x for x in model.carried if x.hub == name), None)
+        if carried is not None:
+            wrench = self.hub(carried)
+        else:
+            on = next(link for link in joint.links if link != GROUND)
+            own = [(k, model.bodies[k]) for k, link in enumerate(model.links)
+                   if link.name == on and name in model.joints[k].joints]  # fmt: skip
+            centre = self.place(own[0][1], np.asarray(joint.at))
+            force, moment = np.sum([self.of_joint(k, name, centre) for k, _ in own], axis=0)
+            wrench = (force, moment)
+        return np.asarray(wrench[0 if joint.kind == "prismatic" else 1] @ joint_axis(joint))
+
+
+def supports(of: Ready, scene: Scene, history: History, motion: RigidMotion) -> Supports:
+    """What a march says of forces.
+
+    Parameters
+    ----------
+    history, motion : over the same times
+    """
+    return Supports(of, scene, history, motion, history.z[:, renumbered(of)])
+
+
+def resultant(
+    link: Link, rows: Float[np.ndarray, "T n d"], motion: RigidMotion, body: int, about: Vectors
+) -> Wrench:
+    """Resultant of nodal forces on a link that only moves rigidly, and moment about points."""
+    flat = 2 if link.planar else 3
+    f = np.zeros((*rows.shape[:2], 3))
+    f[:, :, :flat] = rows[:, :, :flat]
+    X = link.X @ motion.R[:, body].transpose(0, 2, 1)
+    arms = X + link.one[:, None] * (motion.p[:, body] - about)[:, None]
+    moment = np.cross(arms, f).sum(axis=1)
+    if link.kind == "beam":
+        moment[:, 2] += rows[:, :, 2] @ link.one
+    return np.einsum("tnk,n->tk", f, link.one), moment
+
+
+def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
+    """Moment on end i of a unit multiplier on a turn or an angle; on j it is the opposite."""
+    a = Q_i @ term.a
+    if term.kind != ANGLE:
+        return cross(a, Q_j @ term.b)
+    a_j = Q_j @ term.a_j
+    across_j = cross(Q_j @ term.b, a_j)
+    along, across = (a * a_j).sum(axis=1)[:, None], (a * across_j).sum(axis=1)[:, None]
+    return cross(a, (along * across_j - across * a_j) / (along**2 + across**2))
+
+
+def poses(
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
+) -> tuple[Vectors, Float[np.ndarray, "T 3 3"]]:
+    """Place and orientation of an end over time."""
+    R = motion.R[:, end.body]
+    x = motion.p[:, end.body] + R @ end.origin
+    if end.form == RIGID:
+        return x, R
+    d = end.onto.shape[1]
+    u = np.einsum("pdk,tk->tpd", end.onto, z)
+    if end.line is not None:
+        u = np.einsum("tp,tpd->td", line_weights(end, motion), u)[:, None]
+    flat = 2 if end.form == PLANAR_BEAM else d
+    x[:, :flat] += u[:, 0, :flat]
+    if end.form in (POINT, LINE):
+        return x, R
+    if end.form == PLANAR_BEAM:
+        c, s, Q = np.cos(u[:, 0, 2]), np.sin(u[:, 0, 2]), np.zeros_like(R)
+        Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1], Q[:, 2, 2] = c, -s, s, c, 1.0
+        return x, Q @ R
+    return x, _rotations(_directions(end, R, u), end)
+
+
+def _directions(
+    end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]
+) -> Float[np.ndarray, "T 3 3"]:
+    """Directions of a surface as they are, row k direction k."""
+    d = end.onto.shape[1]
+    D = np.zeros((len(u), 3, 3))
+    for k in range(end.known):
+        D[:, k] = R @ end.directions[k]
+        D[:, k, :d] += (u[:, k + 1] - u[:, 0]) / end.lengths[k]
+    if end.form == PLANAR:
+        if end.known == 1:
+            D[:, 1] = cross(np.array([0.0, 0.0, 1.0]), D[:, 0])
+        D[:, 2] = [0, 0, 1]
+    if end.form == FACE:
+        D[:, 2] = cross(D[:, 0], D[:, 1])
+        D[:, 2] /= np.linalg.norm(D[:, 2], axis=1)[:, None]
+    return D
+
+
+def _rotations(D: Float[np.ndarray, "T 3 3"], end: End) -> Float[np.ndarray, "T 3 3"]:
+    """Q of Σ D_k ⊗ e_k = Q U."""
+    left, _, right = np.linalg.svd(D.transpose(0, 2, 1) @ end.directions)
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    return np.asarray(left @ right)
+
+
+def point_forces(
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"], force: Vectors, moment: Vectors
+) -> Float[np.ndarray, "T p d"]:
+    """Forces at an end's interface points that do what a force and a moment on it do: q_k of `ends_kernel`."""
+    p, d, _ = end.onto.shape
+    y = np.zeros((len(z), p, d))
+    flat = 2 if end.form == PLANAR_BEAM else d
+    y[:, 0, :flat] = force[:, :flat]
+    if end.line is not None:
+        return np.asarray(np.einsum("tp,td->tpd", line_weights(end, motion), y[:, 0]))
+    if end.form == PLANAR_BEAM:
+        y[:, 0, 2] = moment[:, 2]
+    if end.form in (POINT, PLANAR_BEAM):
+        return y
+    R, u = motion.R[:, end.body], np.einsum("pdk,tk->tpd", end.onto, z)
+    D = _directions(end, R, u)
+    Q = _rotations(D, end)
+    U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
+    G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
+    turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]
+    q = [(Q @ cross(turn, e)[:, :, None])[:, :, 0] for e in end.directions]
+    if end.form == PLANAR and end.known == 1:
+        q[0] = q[0] + cross(q[1], np.array([0.0, 0.0, 1.0]))
+    if end.form == FACE:
+        size = np.linalg.norm(cross(D[:, 0], D[:, 1]), axis=1)[:, None]
+        n = D[:, 2]
+        q[0] = q[0] - (q[2] * cross(D[:, 1], n)).sum(axis=1)[:, None] / size * n
+        q[1] = q[1] - (q[2] * cross(n, D[:, 0])).sum(axis=1)[:, None] / size * n
+    for k in range(end.known):
+        y[:, k + 1] += q[k][:, :d] / end.lengths[k]
+        y[:, 0] -= q[k][:, :d] / end.lengths[k]
+    return y

@@ -1,0 +1,113 @@
+"""Loads that turn with bodies whose frames are their own: where a load acts, two directions of the body show how.
+
+They are y_m = R e_m + Σ_a w_ma u_a, e_m as drawn: of a beam in space the section's directions where the load is, of other
+bodies those of the mean deformation, linear in u. With a = y_1/|y_1|, n = a × y_2/|a × y_2| and G = (a, n × a, n), the
+nodal forces are p G G0ᵀ, G0 as drawn; of a planar beam they turn by ψ where the load is. A torque fixed in the world is
+three loads, the couples about the body's axes e_k, times m · G G0ᵀ e_k.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.matrices.dense import Coordinates, work_on
+from kedfem.dynamics.system.arrays import TurningLoads
+from kedfem.links.record import Link
+
+Loads = Sequence[Sequence[Pattern]]
+Shown = tuple[Float[np.ndarray, "2 3"], Float[np.ndarray, "2 n"]]
+
+
+def turning(loads: Loads) -> list[tuple[int, Pattern]]:
+    """All loads that turn with their bodies, with the bodies' numbers."""
+    return [(k, load) for k, own in enumerate(loads) for load in own if load.own]
+
+
+def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Loads) -> TurningLoads:
+    """As flat arrays, on the coordinates of all bodies."""
+    every, force_at, shown_at = turning(loads), [0], [0]
+    drawn, shown, force, axis, fixed = [], [], [], [], []
+    for k, load in every:
+        link, part = links[k], parts[k]
+        e, weights = shown_by(link, load.forces)
+        G0 = axes(e[None])[0]
+        own = load.forces @ G0[: link.d, : link.d] if link.kind != "beam" else load.forces
+        force.append(work_on(part, own).ravel())
+        of = 2 if link.kind == "beam" else 0
+        T = part.T[of] if part.T else np.eye(link.n)
+        shown.append((weights @ T).ravel())
+        drawn.append(e)
+        about, world = load.share if load.share is not None else (np.zeros(3), np.zeros(3))
+        axis.append(G0.T @ about)
+        fixed.append(world)
+        force_at.append(force_at[-1] + len(force[-1]))
+        shown_at.append(shown_at[-1] + len(shown[-1]))
+    return TurningLoads(
+        body=np.array([k for k, _ in every], int), force_at=np.array(force_at), shown_at=np.array(shown_at),
+        planar_beam=np.array([links[k].kind == "beam" for k, _ in every], bool),
+        drawn=np.array(drawn).reshape(-1, 2, 3), shown=np.concatenate([np.zeros(0), *shown]),
+        force=np.concatenate([np.zeros(0), *force]), axis=np.array(axis).reshape(-1, 3),
+        fixed=np.array(fixed, float).reshape(-1, 3),
+    )  # fmt: skip
+
+
+def turned(
+    link: Link, load: Pattern, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T n d"],
+    factor: Float[np.ndarray, " T"],
+) -> Float[np.ndarray, "T n d"]:  # fmt: skip
+    """Nodal forces over time, world components.
+
+    Parameters
+    ----------
+    R : of the rigid-body motion of its body; u : displacement
+    factor : of `Pattern.factor`
+    """
+    e, weights = shown_by(link, load.forces)
+    out = np.zeros_like(u)
+    if link.kind == "beam":
+        angle = u[:, :, 2] @ weights[0]
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
+        out[:, :, :2] = load.forces[:, :2] @ (R[:, :2, :2] @ turn).transpose(0, 2, 1)
+        out[:, :, 2] = load.forces[:, 2]
+        return np.asarray(factor[:, None, None] * out)
+    y = e @ R.transpose(0, 2, 1)
+    y[:, :, : link.d] += weights @ u
+    Q = axes(y) @ axes(e[None])[0].T
+    if load.share is not None:
+        about, world = load.share
+        factor = factor * (Q @ about @ world)
+    return np.asarray(factor[:, None, None] * (load.forces @ Q[:, : link.d, : link.d].transpose(0, 2, 1)))
+
+
+def axes(y: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray, "T 3 3"]:
+    """G of directions over time, its axes in columns; of planar ones about z."""
+    a = y[:, 0] / np.linalg.norm(y[:, 0], axis=1)[:, None]
+    n = np.cross(a, y[:, 1])
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    return np.stack([a, np.cross(n, a), n], axis=2)
+
+
+def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
+    """Directions as drawn, and weights of the link's functions on what they move by.
+
+    Raises
+    ------
+    ValueError
+        If the link has no frame of its own.
+    """
+    if link.kind == "beam":
+        share = np.abs(forces[:, :2]).sum(axis=1)
+        return np.eye(3)[:2], np.stack([share / share.sum(), 0 * share])
+    if link.triples is not None:
+        at_stations = (abs(link.triples) @ np.abs(forces).sum(axis=1)).reshape(-1, 3).sum(axis=1)
+        share = at_stations / at_stations.sum()
+        weights = np.stack([share @ link.triples[m::3].toarray() for m in (1, 2)])
+        return weights @ link.X, weights
+    if link.fit is None:
+        raise ValueError(f"link {link.name} must have a frame of its own")
+    s = 2 if link.planar else 3
+    fit = np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])
+    return np.eye(3)[:2], fit[:2]

@@ -1,0 +1,272 @@
+"""The oracle: a system as one writes it down, its tangents assembled anew at each iteration, until rounding is left.
+
+Unknown are the displacements u of all bodies (full rows, world components), the interface unknowns z, the forces λ at
+interface points and the multipliers m of constraints:
+
+    M [(1 − α_m) u1'' + α_m u0''] + (1 − α_f) (f1 − F1) + α_f (f0 − F0) = Wᵀ λ,   W u = B z,
+    Bᵀ λ = Cᵀ m + α_f C₀ᵀ μ₀,   e(z) = 0 of constraints,   m = −(1 − α_f) φ(e, e') of force laws
+
+Nothing of `step_kernel` or what it calls is used here: internal forces are those of `dynamics.frames`,
+coordinates those of `motion.values`.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
+from kedfem.dynamics.joints.ports import port_columns
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.matrices.substructure import mass_matrix
+from kedfem.dynamics.stepping.scheme import Scheme
+from kedfem.dynamics.system.oracle.literal_places import force, placed, turned_load, valued
+from kedfem.dynamics.system.oracle.literal_tangent import Inverse, inverse, tangent
+from kedfem.dynamics.system.record import (
+    Driven,
+    Held,
+    System,
+)
+from kedfem.errors import SolveError
+from kedfem.motion.rigid import RigidMotion
+
+ITERATIONS = 40
+RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
+SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
+BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
+Column = Float[np.ndarray, " _"]
+Seen = tuple[float, np.ndarray]
+"""Angle of a frame, and g, g', g'' (3, n, d) seen from it."""
+
+
+@dataclass(slots=True)
+class Now:
+    """One time: rows of all bodies flat, and what belongs to them; as `record.State`, but in nodal rows."""
+
+    u: Column
+    v: Column
+    a: Column
+    f: Column
+    F: Column
+    g: list[list[Seen]]
+    z: Column
+    e: Float[np.ndarray, "3 r"]
+    turned: Column
+    bearing: Column
+    damped: list[np.ndarray]
+    z_rates: Float[np.ndarray, "3 k"]
+    multiplier: Column = field(default_factory=lambda: np.zeros(0))
+    port_force: Column = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass
+class Literal:
+    """Steps of a system by assembled tangents; `scheme` as any step's.
+
+    keeps : whether steps go on with the tangent of the step before while changes fall with it, which is dear to assemble
+    kept : the tangent's inverse
+    """
+
+    system: System
+    scheme: Scheme
+    keeps: bool = False
+    kept: Inverse | None = None
+
+    def __post_init__(self) -> None:
+        model = self.system.model
+        sizes = [link.unknowns for link in model.links]
+        ends = np.cumsum([0, *sizes])
+        self.of = [slice(a, b) for a, b in pairwise(ends)]
+        self.N, self.k = int(ends[-1]), self.system.unknowns
+        self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
+        self.M = np.zeros((self.N, self.N))
+        for link, at in zip(model.links, self.of, strict=True):
+            self.M[at, at] = mass_matrix(link).toarray()
+        q = [len(joint.keep) for joint in model.joints]
+        self.W, self.B = np.zeros((sum(q), self.N)), np.zeros((sum(q), self.k))
+        row = 0
+        for link, joint, at in zip(model.links, model.joints, self.of, strict=True):
+            here = slice(row, row + len(joint.keep))
+            self.W[here, at], self.B[here] = port_columns(joint, link.n).T, joint.B
+            row = here.stop
+
+    def rates(
+        self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Newmark's formulas."""
+        n, r = self.scheme.acceleration, self.scheme.rate
+        return r[0] * (x - x0) - r[1] * v0 - r[2] * a0, n[0] * (x - x0) - n[1] * v0 - n[2] * a0
+
+    def step(self, old: Now, at: RigidMotion) -> Now:
+        """The state one step later.
+
+        Raises
+        ------
+        SolveError
+            If the iterations do not converge.
+        """
+        if self.keeps:
+            try:
+                return self._stepped(old, at, patience=1)
+            except SolveError:
+                pass
+        self.kept = None
+        return self._stepped(old, at, patience=0)
+
+    def _stepped(self, old: Now, at: RigidMotion, patience: int) -> Now:
+        """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
+        scheme, r, hard = self.scheme, len(self.system.constraints), self.hard
+        now = self._guess(old, at)
+        q, size, slow = len(self.W), np.inf, 0
+        lam, m = np.zeros(q), np.zeros(r)
+        if patience and len(old.multiplier):
+            m[hard] = (1 - scheme.alpha_f) * old.multiplier[hard]
+        for _ in range(ITERATIONS):
+            self._evaluated(now, old, at)
+            e, C = self.coordinates(now.z, now.turned, at)
+            now.e[0] = e
+            now.e[1], now.e[2] = self.rates(e, *old.e)
+            own = self._own_rates(now, old, at)
+            for n, each in enumerate(self.system.constraints):
+                if n not in hard:
+                    m[n] = -(1 - scheme.alpha_f) * force(each, at, now.e[0, n], own[n])[0]
+            left = [
+                self._unbalanced(now, old) - self.W.T @ lam,
+                self.W @ now.u - self.B @ now.z,
+                self.B.T @ lam - C.T @ m - scheme.alpha_f * old.bearing,
+                now.e[0, hard],
+            ]
+            if self.kept is None:
+                self.kept = inverse(tangent(self, now, old, at, C, m), C[hard])
+            used = self.kept
+            change = used(-np.concatenate(left))
+            now.u = now.u + change[: self.N]
+            now.z = now.z + change[self.N : self.N + self.k]
+            lam += change[self.N + self.k : self.N + self.k + q]
+            m[hard] += change[self.N + self.k + q :]
+            before, size = size, float(np.abs(change[: self.N]).max())
+            slow = slow + 1 if size > SLOW * before else 0
+            self.kept = None if slow > patience else self.kept
+            if size <= 1e-14 * max(1.0, np.abs(now.u).max()) or (size < 1e-11 and size > 0.5 * before):
+                borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
+                if float(np.abs(left[0]).max()) > BALANCED * borne:
+                    break
+                self.kept = used
+                return self._ended(now, old, at, m, lam)
+        raise SolveError(
+            f"analysis.solver: the iterations of the monolithic solver must converge to a balance, got none at "
+            f'{float(at.t[0]):.6g} s: take solver = "condensed", or a smaller step'
+        )
+
+    def _guess(self, old: Now, at: RigidMotion) -> Now:
+        h = self.scheme.h
+        u = old.u + h * old.v + h * h / 2 * old.a
+        F = self.applied(at)
+        zero = np.zeros_like(old.u)
+        z = np.linalg.lstsq(self.B, self.W @ u, rcond=None)[0] if self.k else old.z
+        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [],
+                   old.z_rates)  # fmt: skip
+
+    def applied(self, at: RigidMotion) -> Column:
+        """P − M R0'' of all bodies, world components."""
+        model = self.system.model
+        every = zip(model.links, model.loads, model.bodies, strict=True)
+        return np.concatenate([applied(link, loads, at, body)[0].ravel() for link, loads, body in every])
+
+    def _evaluated(self, now: Now, old: Now, at: RigidMotion) -> None:
+        """Rates, and internal forces of all bodies."""
+        now.v, now.a = self.rates(now.u, old.u, old.v, old.a)
+        found = [self.force_of(k, now.u[own], old, at) for k, own in enumerate(self.of)]
+        now.f = np.concatenate([f for f, _, _ in found])
+        now.g, now.damped = [g for _, g, _ in found], [C for _, _, C in found]
+
+    def force_of(self, k: int, u: Column, old: Now, at: RigidMotion) -> tuple[Column, list[Seen], np.ndarray]:
+        """Internal force of body k, world components; deformations with their rates; damped quantities with theirs."""
+        link, damping = self.system.model.links[k], self.system.model.damping
+        whole = at.R[0, self.system.model.bodies[k]]
+        R = whole[: link.d, : link.d]
+        x = u.reshape(link.n, link.d) @ R
+        Mx = (self.M[self.of[k], self.of[k]] @ x.ravel()).reshape(x.shape)
+        if link.fit is None:
+            Kx = (link.K0 @ x.ravel()).reshape(x.shape)
+            C = damping.alpha * Mx + damping.beta * Kx
+            C = np.stack([C, *self.rates(C, *old.damped[k])])
+            return ((Kx + C[1]) @ R.T).ravel(), [], C
+        y = x + link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
+        C = damping.alpha * Mx
+        C = np.stack([C, *self.rates(C, *old.damped[k])])
+        f = C[1].copy()
+        seen: list[Seen] = []
+        for frame, (angle, g0) in zip(frames_of(link), old.g[k], strict=True):
+            Q, turn = rotation(link, frame.fit, y, angle)
+            g = deformation(link, y, Q, turn)
+            rates = self.rates(g, *g0)
+            f += frame_force(link, frame, Followed(Q, turn, g, *rates), y, damping.beta)[0]
+            seen.append((turn, np.stack([g, *rates])))
+        own = [load for load in self.system.model.loads[k] if load.own]
+        x = u.reshape(link.n, link.d)
+        pushed = [load.factor(at.t, at.phi)[0] * turned_load(link, load, whole, x) for load in own]
+        return (f @ R.T - sum(pushed, np.zeros_like(f))).ravel(), seen, C
+
+    def _unbalanced(self, now: Now, old: Now) -> Column:
+        s = self.scheme
+        inertia = self.M @ ((1 - s.alpha_m) * now.a + s.alpha_m * old.a)
+        return np.asarray(inertia + (1 - s.alpha_f) * (now.f - now.F) + s.alpha_f * (old.f - old.F))
+
+    def coordinates(
+        self, z: Column, turned: Column, at: RigidMotion, which: Collection[int] | None = None
+    ) -> tuple[Column, Float[np.ndarray, "r k"]]:
+        """All coordinates less their drives' travels, and their gradients; zero but for some, if these are given."""
+        R, p, constraints, place = at.R[0], at.p[0], self.system.constraints, 0
+        e, C = np.zeros(len(constraints)), np.zeros((len(constraints), self.k))
+        for n, each in enumerate(constraints):
+            if which is not None and n not in which:
+                place += len(each.terms)
+                continue
+            for term in each.terms:
+                where = np.zeros(self.k) if each.linear else z
+                poses = [placed(self.system.ends[x], R, p, where) for x in (term.i, term.j)]
+                value, row, turned[place] = valued(self.system, term, poses, turned[place])
+                e[n] += term.factor * value
+                C[n] += term.factor * row
+                place += 1
+            drive = getattr(each.law, "drive", -1)
+            e[n] -= at.drives[0, drive] if drive >= 0 else 0.0
+            if each.linear:
+                e[n] = C[n] @ z
+        return e, C
+
+    def _own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
+        """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
+
+        Of others by differences: the mechanism and z move on, and back, as their rates tell.
+        """
+        from scipy.spatial.transform import Rotation
+
+        out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
+        if len(self.hard) == len(out):
+            return np.asarray(out)
+        ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)
+        values = []
+        for dt in ahead:
+            turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
+            moved = replace(at, R=turn[None], p=at.p + dt * at.v)
+            values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
+        rates = np.array([1, -8, 8, -1]) @ np.array(values) / (12 * RATES * self.scheme.h)
+        for n, each in enumerate(self.system.constraints):
+            if not each.linear and getattr(each.law, "drive", -1) < 0:
+                out[n] = rates[n]
+        return np.asarray(out)
+
+    def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column, lam: Column) -> Now:
+        self._evaluated(now, old, at)
+        e, C = self.coordinates(now.z, now.turned, at)
+        now.e = np.stack([e, *self.rates(e, *old.e)])
+        now.z_rates = np.stack([now.z, *self.rates(now.z, *old.z_rates)])
+        now.multiplier = m / (1 - self.scheme.alpha_f)
+        now.bearing = C.T @ now.multiplier
+        before = old.port_force if len(old.port_force) else 0 * lam
+        now.port_force = (lam - self.scheme.alpha_f * before) / (1 - self.scheme.alpha_f)
+        return now

@@ -1,0 +1,164 @@
+"""The oracle's own view of ends, coordinates and laws: one at a time, by singular values and the rows of rigid motion."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.system.forces.turning_loads import shown_by
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    DISTANCE,
+    FACE,
+    LINE,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RATE,
+    RIGID,
+    TIME,
+    Constraint,
+    Curve,
+    End,
+    Spring,
+    Stop,
+    System,
+    Term,
+    law_at,
+)
+from kedfem.links.record import Link
+from kedfem.motion.constraints import ConstraintEquation, stacked
+from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.values import features, jacobian
+
+Column = Float[np.ndarray, " _"]
+
+
+def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[float]:
+    """Force of a law against its coordinate, at one time."""
+    match law_at(each.law, at.t, at.phi):
+        case Spring(stiffness=k, damping=c, free=free):
+            return (k * (e - free) + c * rate,)
+        case Curve(over=over, at=places, value=value):
+            x = float(at.t[0]) if over == TIME else (rate if over == RATE else e)
+            return (-float(np.interp(x, places, value)),)
+        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
+            if lower <= e <= upper:
+                return (0.0,)
+            beyond = e - upper if e > upper else e - lower
+            force = k * beyond + c * rate
+            return (force if force * beyond > 0 else 0.0,)
+        case _:
+            raise ValueError(f"{each.name}: a constraint has no force law")
+
+
+def turned_load(
+    link: Link, load: Pattern, R: Float[np.ndarray, "3 3"], u: Float[np.ndarray, "n d"]
+) -> Float[np.ndarray, "n d"]:
+    """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations from QR factors."""
+    drawn, weights = shown_by(link, load.forces)
+    if link.kind == "beam":
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_rotvec([0, 0, float(weights[0] @ u[:, 2])]).as_matrix() @ R
+        return np.asarray(
+            load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]])
+        )
+    moved = drawn @ R.T
+    moved[:, : link.d] += weights @ u
+    turn = _orthonormal(moved) @ _orthonormal(drawn).T
+    share = 1.0 if load.share is None else float(load.share[1] @ turn @ load.share[0])
+    return np.asarray(share * load.forces @ turn[: link.d, : link.d].T)
+
+
+def _orthonormal(pair: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "3 3"]:
+    q, r = np.linalg.qr(pair.T)
+    q = q * np.sign(np.diag(r))
+    return np.column_stack([q, np.cross(q[:, 0], q[:, 1])])
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position and orientation of an end, and how both change with z: (3, k) each, δQ = [δθ]× Q."""
+
+    x: Float[np.ndarray, "3"]
+    Q: Float[np.ndarray, "3 3"]
+    by_x: Float[np.ndarray, "3 k"]
+    by_Q: Float[np.ndarray, "3 k"]
+
+
+def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
+    """Where an end is: of a surface the rotation nearest to its directions, by singular values."""
+    _, d, k = end.onto.shape
+    pin = R[end.line.pin] if end.line is not None else None
+    R, x = R[end.body], p[end.body] + R[end.body] @ end.origin
+    by_x, by_Q = np.zeros((3, k)), np.zeros((3, k))
+    if end.form == RIGID:
+        return Pose(x, R, by_x, by_Q)
+    onto = end.onto
+    if end.line is not None:  # the pin's place in the frame of the line
+        from scipy.interpolate import CubicSpline
+
+        away = p[end.line.pin] + pin @ end.line.at - p[end.body]
+        s = float((away @ R - end.line.at) @ end.line.axis)
+        onto = np.einsum("p,pdk->dk", CubicSpline(end.line.stations.s, np.eye(len(onto)))(s), onto)[None]
+    u = onto @ z
+    flat = 2 if end.form == PLANAR_BEAM else d
+    x[:flat] += u[0, :flat]
+    by_x[:flat] = onto[0, :flat]
+    if end.form == PLANAR_BEAM:
+        c, s = np.cos(u[0, 2]), np.sin(u[0, 2])
+        by_Q[2] = end.onto[0, 2]
+        return Pose(x, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R, by_x, by_Q)
+    if end.form in (POINT, LINE):
+        return Pose(x, R, by_x, by_Q)
+    D, by = np.zeros((3, 3)), np.zeros((3, 3, k))  # direction, component
+    for n in range(end.known):
+        D[n] = R @ end.directions[n]
+        D[n, :d] += (u[n + 1] - u[0]) / end.lengths[n]
+        by[n, :d] = (end.onto[n + 1] - end.onto[0]) / end.lengths[n]
+    if end.form == PLANAR:
+        if end.known == 1:
+            D[1], by[1] = np.cross([0, 0, 1], D[0]), np.cross([0, 0, 1], by[0], axisb=0, axisc=0)
+        D[2] = [0, 0, 1]
+    if end.form == FACE:
+        normal = np.cross(D[0], D[1])
+        size = np.linalg.norm(normal)
+        D[2] = normal / size
+        change = np.cross(by[0], D[1], axisa=0, axisc=0) + np.cross(D[0], by[1], axisb=0, axisc=0)
+        by[2] = (change - np.outer(D[2], D[2] @ change)) / size
+    A = D.T @ end.directions
+    left, _, right = np.linalg.svd(A)
+    Q = left @ right
+    U = Q.T @ A
+    B = np.einsum("ba,nbk,nc->ack", Q, by, end.directions)
+    axial = np.stack([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])
+    return Pose(x, Q, by_x, Q @ np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial))
+
+
+def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[float, Column, float]:
+    """A term's value, its gradient by z, and an angle to be near the next time."""
+    one, other = poses
+    if term.kind == DISTANCE:
+        ends = system.ends[term.i], system.ends[term.j]
+        arms = [
+            pose.Q @ (a - end.origin) for pose, a, end in zip(poses, (term.a, term.a_j), ends, strict=True)
+        ]
+        gap = one.x + arms[0] - other.x - arms[1]
+        size = float(np.linalg.norm(gap))
+        n = gap / size
+        by = [n @ pose.by_x + np.cross(arm, n) @ pose.by_Q for pose, arm in zip(poses, arms, strict=True)]
+        return size, by[0] - by[1], near
+    origin = [x.x - x.Q @ system.ends[n].origin for x, n in zip(poses, (term.i, term.j), strict=True)]
+    rows = stacked([ConstraintEquation(term.kind, 1, 2, term.a, term.b, "", term.a_j)])
+    at = (np.stack([np.eye(3), one.Q, other.Q])[None], np.stack([np.zeros(3), *origin])[None])
+    f = features(rows, at, np.full((1, len(rows.angles)), near))
+    J = jacobian(rows, f, 3)[0, 0]
+    row = np.zeros(one.by_x.shape[1])
+    for pose, of, start in zip(poses, (J[:6], J[6:]), origin, strict=True):
+        # the twist of a body at the origin of its drawn coordinates: v = δx − δθ × (x − start)
+        row += of[:3] @ pose.by_x + (of[3:] - np.cross(pose.x - start, of[:3])) @ pose.by_Q
+    value = float(f.value[0, 0])
+    return value, row, value if term.kind == ANGLE else near

@@ -1,0 +1,109 @@
+"""The oracle's tangents: of bodies and force laws by differences, assembled in one matrix with all constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.linalg import lu_factor, lu_solve, qr
+
+from kedfem.dynamics.system.oracle.literal_places import force
+from kedfem.motion.rigid import RigidMotion
+
+if TYPE_CHECKING:
+    from kedfem.dynamics.system.oracle.literal import Literal, Now
+
+DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
+REPEATED = 1e-9  # singular values of rows of length one that repeat each other
+Matrix = Float[np.ndarray, "_ _"]
+Column = Float[np.ndarray, " _"]
+Inverse = Callable[[Column], Column]
+"""Solutions for right sides."""
+
+
+def tangent(of: Literal, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Column) -> Matrix:
+    """Of all equations by all unknowns.
+
+    Parameters
+    ----------
+    C, m : gradients of all constraints, and their multipliers
+    """
+    s, N, k, q, hard = of.scheme, of.N, of.k, len(of.W), of.hard
+    J = np.zeros((N + k + q + len(hard),) * 2)
+    J[:N, :N] = (1 - s.alpha_m) * s.a0 * of.M
+    for n, own in enumerate(of.of):
+        J[own, own] += (1 - s.alpha_f) * _of_body(of, n, now, old, at)
+    J[:N, N + k : N + k + q] = -of.W.T
+    J[N : N + q, :N], J[N : N + q, N : N + k] = of.W, -of.B
+    balance = slice(N + q, N + q + k)
+    J[balance, N + k : N + k + q] = of.B.T
+    J[balance, N : N + k] = -_of_pull(of, now, old, at, m)
+    J[balance, N + k + q :] = -C[hard].T
+    J[N + q + k :, N : N + k] = C[hard]
+    return J
+
+
+def _of_body(of: Literal, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix:
+    """Of the internal force of body n: K + a₁ C with a rigid-body frame, else by differences; world components."""
+    model, own, a1 = of.system.model, of.of[n], of.scheme.a1
+    link = model.links[n]
+    if link.fit is None:
+        R = np.kron(np.eye(link.n), at.R[0, model.bodies[n], : link.d, : link.d])
+        K = R @ (link.K0 @ R.T)
+        return np.asarray(K + a1 * (model.damping.alpha * of.M[own, own] + model.damping.beta * K))
+    pushed = np.eye(own.stop - own.start) * DIFFERENCE
+    change = [of.force_of(n, now.u[own] + x, old, at)[0] - now.f[own] for x in pushed]
+    return np.array(change).T / DIFFERENCE
+
+
+def _of_pull(of: Literal, now: Now, old: Now, at: RigidMotion, m: Column) -> Matrix:
+    """Of all constraints' forces Cᵀ m on interface unknowns, by those which a constraint that is not linear sees."""
+    out = np.zeros((of.k, of.k))
+    varied = [n for n, x in enumerate(of.system.constraints) if not x.linear or n not in of.hard]
+    felt = np.array([_felt(of, n) for n in varied]).reshape(len(varied), of.k)
+    for column in np.flatnonzero(felt.any(axis=0)):
+        x, pushed = DIFFERENCE * np.eye(of.k)[column], []
+        which = [n for n, each in zip(varied, felt[:, column], strict=True) if each]
+        for sign in (1, -1):
+            e, moved = of.coordinates(now.z + sign * x, now.turned.copy(), at, which)
+            pull, rate = m.copy(), of.rates(e, *old.e)[0]
+            for n in set(which).difference(of.hard):
+                each = of.system.constraints[n]
+                pull[n] = -(1 - of.scheme.alpha_f) * force(each, at, e[n], rate[n])[0]
+            pushed.append(moved[which].T @ pull[which])
+        out[:, column] = (pushed[0] - pushed[1]) / (2 * DIFFERENCE)
+    return out
+
+
+def _felt(of: Literal, n: int) -> Bool[np.ndarray, " k"]:
+    """Whether interface unknowns move the ends of constraint n."""
+    ends = {end for term in of.system.constraints[n].terms for end in (term.i, term.j)}
+    each = [np.any(of.system.ends[end].onto != 0.0, axis=(0, 1)) for end in ends]
+    return np.asarray(np.any(each, axis=0))
+
+
+def inverse(J: Matrix, C: Matrix) -> Inverse:
+    """Of scaled equations; where constraints C, the last of them, repeat each other, with multipliers of least size."""
+    size = np.linalg.norm(C, axis=1)
+    some = size > REPEATED * size.max(initial=0.0)  # one that says nothing is rounding of any direction
+    unit = C * np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
+    R, order = qr(unit.T, mode="r", pivoting=True)
+    told = order[: int((np.abs(np.diag(R)) > REPEATED).sum())] if len(C) else order[:0]
+    first = len(J) - len(C)
+    kept = np.concatenate([np.arange(first), first + np.sort(told)])
+    own = J[np.ix_(kept, kept)]
+    rows = 1 / np.maximum(np.abs(own).max(axis=1), 1e-300)
+    scaled = own * rows[:, None]
+    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
+    factors = lu_factor(scaled * columns)
+    least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(told) < len(C) else np.eye(len(C))
+
+    def solution(right: Column) -> Column:
+        out = np.zeros(len(J))
+        out[kept] = lu_solve(factors, right[kept] * rows) * columns
+        out[first:] = least @ out[first:]
+        return out
+
+    return solution

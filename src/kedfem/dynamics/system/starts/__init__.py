@@ -1,0 +1,1 @@
+"""Where marches of a system begin: rates and accelerations that fit, deflections without vibration, divided steps."""

@@ -1,0 +1,211 @@
+"""All bodies balanced together at one instant, with any matrix of each: what starts of a march are found by.
+
+    A_i x_i = r_i + W_iᵀ λ_i,   W_i (x_i + moved_i) = Rᵀ B z,   Σ Bᵀ R λ = Cᵀ m + known,   C z + m / κ = target
+
+A need not be symmetric: the inertia of a deflection that turns with its link is not. With Z the null space of W and
+W M = 1,
+
+    G = Z (Zᵀ A Z)⁻¹ Zᵀ,   Y = (1 − G A) M,   Ȳ = (1 − Gᵀ Aᵀ) M,   S = Ȳᵀ A Y,   x = G r + Y w,   λ = S w − Ȳᵀ r
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from jaxtyping import Float
+from scipy.sparse.linalg import LinearOperator, splu
+
+from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.ports import port_rotation
+from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.sparse import SparsePart, sparse_part
+from kedfem.errors import SolveError
+from kedfem.links.record import Link
+
+DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
+
+Flat = Float[np.ndarray, " _"]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What constraints and laws ask of one solution.
+
+    C : (r, k) gradients, in the order of the system's interface unknowns
+    target : (r,) of C z; compliance : (r,) 1/κ, zero of constraints
+    known : (k,) forces on the interface
+    """
+
+    C: Float[np.ndarray, "r k"]
+    target: Flat
+    compliance: Flat
+    known: Flat
+
+
+@dataclass(frozen=True, slots=True)
+class HeldBody:
+    """A body seen from its interface points, in its frame: G, Y, Ȳ, S as above, W (q, N); a sparse one's G acts."""
+
+    G: Any
+    Y: Float[np.ndarray, "N q"]
+    left: Float[np.ndarray, "N q"]
+    S: Float[np.ndarray, "q q"]
+    W: Float[np.ndarray, "q N"]
+
+
+def held_body(A: Float[np.ndarray, "N N"], W: Float[np.ndarray, "q N"]) -> HeldBody:
+    """A body with any matrix A, held at its interface points by a basis of the null space of W.
+
+    Raises
+    ------
+    SolveError
+        If A is singular where these are held.
+    """
+    q = len(W)
+    V, L = scipy.linalg.qr(W.T) if q else (np.eye(len(A)), np.zeros((len(A), 0)))
+    Z = V[:, q:]
+    try:
+        G = Z @ np.linalg.solve(Z.T @ A @ Z, Z.T)
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"a body held at its interface points must have a definite matrix, got {error}"
+        ) from error
+    M = V[:, :q] @ np.linalg.inv(L[:q]).T
+    Y, left = M - G @ (A @ M), M - G.T @ (A.T @ M)
+    return HeldBody(G, Y, left, left.T @ A @ Y, W)
+
+
+def sparse_body(link: Link, joint: Attachment, of: Substructure) -> HeldBody:
+    """A sparse body with the symmetric matrix that was factored."""
+    return stepped_body(sparse_part(link, joint, of), 1.0)
+
+
+def stepped_body(part: SparsePart, share: float) -> HeldBody:
+    """A sparse body with the matrix that it is factored for, divided by a share."""
+
+    def applied(r: Flat) -> Flat:
+        return share * np.asarray(part.held(r.reshape(part.components, -1).T)[0].T).ravel()
+
+    G = LinearOperator((len(part.Y),) * 2, applied, dtype=float)
+    return HeldBody(G, part.Y, part.Y, part.S / share, part.W)
+
+
+def mass_body(of: Ready, k: int) -> HeldBody:
+    """Body k with its mass for a matrix, which is one in the coordinates of dense bodies."""
+    part, link, joint = of.parts[k], of.system.model.links[k], of.system.model.joints[k]
+    if isinstance(part, SparsePart):
+        return sparse_body(link, joint, mass_substructure(link, joint))
+    return held_body(np.eye(part.W.shape[1]), part.W)
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """x (N,) of all bodies, z (k,), multipliers m (r,), forces (q,) on bodies at interface points; world components.
+
+    f : (N,) internal force that stands against x, if any
+    """
+
+    x: Flat
+    z: Flat
+    m: Flat
+    forces: Flat
+    f: Flat | None = None
+
+
+class Balance:
+    """A system of bodies and constraints at one instant, factored.
+
+    Parameters
+    ----------
+    held : of all bodies
+    R : (bodies, 3, 3) frames of their matrices, link to world
+    asked : constraints that repeat others get no force
+    """
+
+    def __init__(
+        self, of: Ready, held: Sequence[HeldBody], R: Float[np.ndarray, "_ 3 3"], asked: Asked
+    ) -> None:
+        self.of, self.held, self.R, self.asked = of, held, R, asked
+        joints = of.system.model.joints
+        self.columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
+        self.RT = [port_rotation(joint, each[: joint.components, : joint.components]).T
+                   for joint, each in zip(joints, R, strict=True)]  # fmt: skip
+        self.RB = [RT @ joint.B[:, c] for RT, joint, c in zip(self.RT, joints, self.columns, strict=True)]
+        self.kept = _independent(asked.C, asked.compliance)
+        self._factored()
+
+    def _factored(self) -> None:
+        """The matrix of z and the multipliers, these scaled so that both parts are about as large."""
+        k, r = self.of.system.unknowns, len(self.kept)
+        blocks = [RB.T @ each.S @ RB for each, RB in zip(self.held, self.RB, strict=True)]
+        places = [(np.repeat(c, len(c)), np.tile(c, len(c))) for c in self.columns]
+        index = tuple(np.concatenate(each) for each in zip(*places, strict=True))
+        H = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), index), (k, k))
+        usual = np.abs(H.diagonal()).mean() if k else 1.0
+        rows, compliance = self.asked.C[self.kept], self.asked.compliance[self.kept]
+        size = np.linalg.norm(rows, axis=1)
+        self.scale = usual / np.where(size > 0, size, 1.0)
+        C = sp.csr_array(rows * self.scale[:, None])
+        self.matrix = sp.csc_array(
+            sp.block_array([[H, -C.T], [C, sp.diags_array(self.scale**2 * compliance)]])
+        )
+        if k + r == 0:
+            return
+        try:
+            self.factor = splu(self.matrix)
+        except RuntimeError as error:
+            raise SolveError(
+                "joints: bodies must be held by joints or springs, got some that move freely"
+            ) from error
+
+    def solved(self, r: Flat, moved: Flat | None = None) -> Solved:
+        """All bodies under given right-hand sides.
+
+        Parameters
+        ----------
+        r : (N,) world components
+        moved : (N,) what closes the joints together with x
+        """
+        at, ports = self.of.bodies.at, self.of.bodies.port_at
+        k, f, local, offset = self.of.system.unknowns, self.asked.known.copy(), [], []
+        for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
+            here = slice(int(at[i]), int(at[i + 1]))
+            local.append(self.turned(i, r[here], back=True))
+            offset.append(
+                np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True)
+            )
+            f[self.columns[i]] += RB.T @ (each.left.T @ local[i] + each.S @ offset[i])
+        right = np.concatenate([f, self.scale * self.asked.target[self.kept]])
+        found = right
+        if len(right):
+            found = self.factor.solve(right)
+            found = found + self.factor.solve(right - self.matrix @ found)
+        z, m = found[:k], np.zeros(len(self.asked.target))
+        m[self.kept] = self.scale * found[k:]
+        x, forces = np.zeros(len(r)), np.zeros(int(ports[-1]))
+        for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
+            w = RB @ z[self.columns[i]] - offset[i]
+            x[at[i] : at[i + 1]] = self.turned(i, each.G @ local[i] + each.Y @ w)
+            forces[ports[i] : ports[i + 1]] = self.RT[i].T @ (each.S @ w - each.left.T @ local[i])
+        return Solved(x, z, m, forces)
+
+    def turned(self, i: int, x: Flat, back: bool = False) -> Flat:
+        """R x, or Rᵀ x, of a body's coordinates."""
+        d = int(self.of.bodies.components[i])
+        R = self.R[i, :d, :d]
+        return np.asarray((R.T if back else R) @ x.reshape(d, -1)).ravel()
+
+
+def _independent(C: Float[np.ndarray, "r k"], compliance: Float[np.ndarray, " r"]) -> np.ndarray:
+    """Numbers of laws, and of constraints that do not repeat others."""
+    size = np.linalg.norm(C, axis=1)
+    hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
+    soft = np.flatnonzero(compliance > 0.0)
+    if len(hard):
+        _, upper, order = scipy.linalg.qr((C[hard] / size[hard, None]).T, mode="economic", pivoting=True)
+        hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
+    return np.sort(np.concatenate([hard, soft]))

@@ -1,0 +1,112 @@
+"""Steps that are divided where a stop with damping is met: its push begins at once, with c e'.
+
+Before that time the stop is left out, so that both parts of the step are smooth; between them the push changes
+accelerations as the matrix of the step after it lets them. Where a push ends, and where it begins without damping, it is
+continuous: steps keep their order there undivided.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from kedfem.dynamics.system.arrays import Constraints, History, State, copied
+from kedfem.dynamics.system.march import Motion, Ready, march, shortened
+from kedfem.dynamics.system.sparse import SparsePart, momentum
+from kedfem.dynamics.system.starts.accelerations import in_a_step
+from kedfem.dynamics.system.starts.balance import Asked
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.internal import own
+
+NEAR = 1e-3  # of a step: a stop that is met so near to its beginning or end is met there
+
+Coordinates = Float[np.ndarray, " r"]
+
+
+def divided(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
+    """One step in which a stop with damping is met, in two parts.
+
+    Parameters
+    ----------
+    last : end of the step [s]
+    between : rigid-body motion at any times
+    halvings : how often parts may be divided
+    """
+    begins = float(state.time[0])
+    h = last - begins
+    apart = apart_from(of.constraints, state.e[0]) & (state.multiplier == 0.0)
+    free = replace(of, constraints=without(of.constraints, apart), halves=[])
+    alone, reached = march(free, state, between(np.array([last])), between, halvings - 1)
+    share = np.where(apart, _met(of.constraints, state, reached, h), np.inf)
+    first = float(share.min())
+    if not np.isfinite(
+        first
+    ):  # another force brings it there, such as that of a stop which is met in the same step
+        return march(of, state, between(np.array([last])), between, 0)
+    met = share <= first + NEAR
+    if first >= 1 - NEAR:
+        return _pushed(of, alone, between, met), reached
+    if first > NEAR:
+        to = np.array([begins + first * h])
+        state, _ = march(shortened(free, first * h), state, between(to), between, halvings - 1)
+        h *= 1 - first
+    rest = shortened(of, h)
+    state = _pushed(rest, state, between, met)
+    return march(rest, state, between(np.array([last])), between, halvings - 1)
+
+
+def apart_from(of: Constraints, e: Coordinates) -> Bool[np.ndarray, " r"]:
+    """Stops with damping between whose limits a coordinate is."""
+    return np.asarray(of.jumps & (of.numbers[:, 0] <= e) & (e <= of.numbers[:, 1]))
+
+
+def without(of: Constraints, which: Bool[np.ndarray, " r"]) -> Constraints:
+    """The same without some stops: their limits are out of reach."""
+    numbers = of.numbers.copy()
+    numbers[which, 0], numbers[which, 1] = -np.inf, np.inf
+    return of._replace(numbers=numbers, jumps=of.jumps & ~which)
+
+
+def _met(of: Constraints, state: State, reached: History, h: float) -> Coordinates:
+    """When each coordinate first passes a limit, of a step in which none pushes: on the cubic through both ends."""
+    out = np.full(len(of.law), np.inf)
+    for n in np.flatnonzero(of.jumps):
+        e0, e1, v0, v1 = state.e[0, n], reached.e[-1, n], h * state.e[1, n], h * reached.rate[-1, n]
+        for limit in of.numbers[n, :2]:
+            if (limit - e0) * (e1 - limit) >= 0 and e1 != e0 and np.isfinite(limit):
+                cubic = np.polynomial.Polynomial(
+                    [e0 - limit, v0, 3 * (e1 - e0) - 2 * v0 - v1, 2 * (e0 - e1) + v0 + v1]
+                )
+                roots = cubic.roots()
+                real = roots.real[
+                    (np.abs(roots.imag) < 1e-9) & (roots.real >= -1e-9) & (roots.real <= 1 + 1e-9)
+                ]
+                out[n] = min(out[n], float(np.clip(real, 0.0, 1.0).min(initial=1.0)))
+    return out
+
+
+def _pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"]) -> State:
+    """The state at which stops begin to push, with −c e' each."""
+    state = copied(state)
+    now = Instant(of, between, float(state.time[0]))
+    z = state.z[:, now.always.number]
+    C = now.gradients(z[0])
+    m = np.where(met, -of.constraints.numbers[:, 3] * now.coordinates(z)[1], 0.0)
+    hard = now.hard(C)
+    none = np.zeros(int(hard.sum()))
+    found = in_a_step(now, np.zeros_like(state.u), Asked(C[hard], none, none, C.T @ m))
+    m[hard] += found.m
+    state.a[:] += found.x
+    if found.f is not None:
+        state.f[:] += found.f
+    state.port_force[:] += found.forces
+    state.multiplier[:] += m
+    state.z[2, now.always.number] += found.z
+    state.e[2] += C @ found.z
+    state.bearing[now.always.number] += C.T @ m
+    for k, part in enumerate(of.parts):
+        if isinstance(part, SparsePart):
+            here, N = own(of, k), own(of, k).stop - own(of, k).start
+            at = 3 * here.start + 2 * N
+            state.momentum[at : at + N] += momentum(of.system.model.links[k], found.x[here])
+    return state

@@ -1,0 +1,199 @@
+"""A system at one time of its rigid-body motion: all that starts ask of bodies, coordinates and laws there."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+from scipy.sparse.linalg import splu
+
+from kedfem.dynamics.matrices.dense import work_on
+from kedfem.dynamics.matrices.substructure import factored
+from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
+from kedfem.dynamics.system.forces.turning_loads import turning
+from kedfem.dynamics.system.march import Ready, driving
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    COORDINATE,
+    RATE,
+    TIME,
+    Curve,
+    Driven,
+    Held,
+    Law,
+    Spring,
+    Stop,
+    law_at,
+)
+from kedfem.dynamics.system.sparse import SparsePart, softening
+from kedfem.dynamics.system.starts.balance import HeldBody, mass_body, sparse_body
+from kedfem.dynamics.system.starts.internal import Inside, Still, inside, own, rows
+from kedfem.dynamics.system.starts.rates import coordinates, gradients, places, term_values, travels
+from kedfem.motion.newton import cross_matrix
+from kedfem.motion.rigid import RigidMotion
+
+TURN = 2 * np.pi
+SOFTER = 1e-6  # of the lowest elastic eigenvalue: what holds a dense body that nothing else holds
+NOTHING = 1e-10  # gradient of a constraint that the interface satisfies by itself
+
+Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
+Flat = Float[np.ndarray, " _"]
+
+
+@dataclass(frozen=True, slots=True)
+class Always:
+    """What does not depend on time.
+
+    number : (k,) where each interface unknown of the system stands in a state
+    closed : z from displacements at all interface points, w = B z as nearly as can be
+    still : internal forces of bodies
+    least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
+    held, mass : a sparse body with that stiffness, and a body with its mass for a matrix, factored once
+    """
+
+    number: Int[np.ndarray, " k"]
+    closed: Callable[[Flat], Flat]
+    still: Still
+    least: Callable[[int], float]
+    held: Callable[[int], HeldBody]
+    mass: Callable[[int], HeldBody]
+
+
+class Instant:
+    """A system at one time of its rigid-body motion.
+
+    Parameters
+    ----------
+    like : another of the same system: what does not depend on time is taken from there
+    """
+
+    def __init__(self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None) -> None:
+        motion = motion_at(np.array([time]))
+        self.of, self.time, self.motion = of, time, motion
+        along = driving(of, motion)
+        self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
+        self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
+        self.travels = travels(of.system, self.at)
+        self.always: Always = always(of) if like is None else like.always
+
+    def inside(self, u: Flat, v: Flat) -> list[Inside]:
+        """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
+        of, spins = self.of, cross_matrix(self.omega)
+        out = [inside(of, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
+        pushed = self.pushed(u)
+        return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
+
+    def pushed(self, u: Flat) -> Flat:
+        """Loads that turn with bodies (N,) on the coordinates at a displacement, world components."""
+        of, out = self.of, np.zeros_like(u)
+        for (k, load), amount in zip(turning(of.system.model.loads), self.amounts, strict=True):
+            link, here = of.system.model.links[k], own(of, k)
+            force = turned_load(link, load, self.R[k][None], rows(of, k, u[here])[None], amount[None])[0]
+            out[here] += work_on(of.parts[k], force).ravel()
+        return out
+
+    def interface(self, x: Flat) -> Flat:
+        """Interface unknowns from coordinates whose joints are closed: B z = W x."""
+        w = [part.W @ x[own(self.of, k)] for k, part in enumerate(self.of.parts)]
+        return self.always.closed(np.concatenate(w))
+
+    def coordinates(self, z: Float[np.ndarray, "3 k"]) -> Float[np.ndarray, "3 r"]:
+        """Coordinates of all constraints less what drives ask, with their rates."""
+        e = coordinates(self.of.system, self.at, z)
+        for n, each in enumerate(self.of.system.constraints):
+            drive = getattr(each.law, "drive", -1)
+            if drive >= 0 and not each.linear:
+                e[:, n] -= [self.motion.drives[0, drive], *self.travels[1:, n]]
+                if each.terms[0].kind == ANGLE:
+                    e[0, n] -= TURN * np.round(e[0, n] / TURN)
+        return e
+
+    def gradients(self, z: Flat) -> Float[np.ndarray, "r k"]:
+        """Of all coordinates by z."""
+        return gradients(self.of.system, self.at, z)
+
+    def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
+        """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
+        laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
+        return np.array([push(law, self.time, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
+
+    def hard(self, C: Float[np.ndarray, "r k"]) -> Bool[np.ndarray, " r"]:
+        """Which are constraints that say something of z."""
+        fixed = [isinstance(each.law, Held | Driven) for each in self.of.system.constraints]
+        return np.asarray(np.array(fixed, bool) & (np.abs(C).max(axis=1, initial=0.0) > NOTHING))
+
+
+def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float]:
+    """Force of a law along its coordinate, and how it falls with the coordinate and with its rate."""
+    match law:
+        case Spring(stiffness=k, damping=c, free=free):
+            return -k * (e - free) - c * rate, k, c
+        case Curve(over=over, at=at, value=value):
+            x = {TIME: t, RATE: rate, COORDINATE: e}[over]
+            n = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
+            inside = at[0] < x < at[-1]
+            slope = (value[n] - value[n - 1]) / (at[n] - at[n - 1]) if inside else 0.0
+            falls = {TIME: (0.0, 0.0), RATE: (0.0, -slope), COORDINATE: (-slope, 0.0)}[over]
+            return float(np.interp(x, at, value)), *falls
+        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
+            beyond = max(e - upper, 0.0) + min(e - lower, 0.0)
+            force = -k * beyond - c * rate
+            return (force, k, c) if force * beyond < 0 else (0.0, 0.0, 0.0)
+        case _:
+            return 0.0, 0.0, 0.0
+
+
+def always(of: Ready) -> Always:
+    """What starts of a system ask at every time."""
+    still, links, joints = Still(of), of.system.model.links, of.system.model.joints
+    lowest = cache(lambda: SOFTER * _lowest(of, still))
+
+    def least(k: int) -> float:
+        return softening(links[k]) if isinstance(of.parts[k], SparsePart) else lowest()
+
+    def held(k: int) -> HeldBody:
+        return sparse_body(links[k], joints[k], factored(links[k], joints[k], least(k), 1.0))
+
+    return Always(
+        renumbered(of), closure(of), still, cache(least), cache(held), cache(partial(mass_body, of))
+    )
+
+
+def _lowest(of: Ready, still: Still) -> float:
+    """Least eigenvalue of free dense bodies that strain."""
+    every = zip(still.K, of.system.model.links, of.parts, strict=True)
+    dense = [(K, link) for K, link, part in every if not isinstance(part, SparsePart) and K.any()]
+    return min((float(np.linalg.eigvalsh(K)[3 if link.planar else 6]) for K, link in dense), default=1.0)
+
+
+def closure(of: Ready) -> Callable[[Flat], Flat]:
+    """z from displacements at all interface points, w = B z as nearly as can be."""
+    B = sp.vstack([sp.csr_array(joint.B) for joint in of.system.model.joints], format="csc")
+    if not B.shape[1]:
+        return lambda w: np.zeros(0)
+    factor = splu(sp.csc_array(B.T @ B))
+    return lambda w: np.asarray(factor.solve(B.T @ w))
+
+
+def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
+    """Where each interface unknown of the system stands in a state."""
+    number, bodies = np.zeros(of.system.unknowns, int), of.bodies
+    for k, joint in enumerate(of.system.model.joints):
+        number[np.flatnonzero(joint.B.any(axis=0))] = bodies.columns[
+            bodies.column_at[k] : bodies.column_at[k + 1]
+        ]
+    return number
+
+
+def turned(now: Instant, z: Flat) -> Flat:
+    """Angles of all terms, within half a turn of zero; of drives of what these ask."""
+    found = term_values(now.of.system, now.at, z)
+    near, place = np.zeros(len(found)), 0
+    for each in now.of.system.constraints:
+        drive = getattr(each.law, "drive", -1)
+        near[place] = now.motion.drives[0, drive] if drive >= 0 else 0.0
+        place += len(each.terms)
+    angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
+    return np.asarray(np.where(angles, found + TURN * np.round((near - found) / TURN), 0.0))

@@ -1,0 +1,158 @@
+"""What a body is inside where a march begins: internal force, frames and damped quantities from u and u'."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.dynamics.frames import Followed, frames_of, seen_from
+from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
+from kedfem.dynamics.segment import internal_force, mean_orientation, position
+from kedfem.dynamics.stepping.state import Nodal
+from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.blank import empty_state, empty_trial, room
+from kedfem.dynamics.system.layout import points_of
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.record import RIGID_BODY
+from kedfem.dynamics.system.sparse import SparsePart, component_order
+from kedfem.links.record import Link, mass_times
+
+Flat = Float[np.ndarray, " N"]
+
+
+class Still:
+    """Internal forces of all bodies where they do not move in their frames: what balances of deflections ask for.
+
+    K : per body its stiffness on coordinates, in its frame
+    """
+
+    def __init__(self, of: Ready) -> None:
+        self.of = of
+        self.K: list[Any] = [
+            sp.csr_array(link.K0)[order := component_order(link)][:, order] if isinstance(part, SparsePart)
+            else component_first(part.T, link.K0)
+            for part, link in zip(of.parts, of.system.model.links, strict=True)
+        ]  # fmt: skip
+        none = (
+            np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
+        )
+        self._c = of.c._replace(acceleration=none, rate=none, late=0.0, early=0.0, alpha=0.0, beta=0.0)
+        self._state, self._work = empty_state(of.bodies, of.constraints), room(of.bodies)
+        self._trial = empty_trial(of.bodies, of.ends, of.constraints, self._state)
+
+    def forces(
+        self, R: Float[np.ndarray, "M 3 3"], u: Flat, amounts: Float[np.ndarray, " w"]
+    ) -> tuple[Flat, Float[np.ndarray, "L 3 3"]]:
+        """f (N,), world components, and the bodies' orientations, at a displacement u.
+
+        Parameters
+        ----------
+        R : of all bodies of the linkage in the rigid-body motion
+        amounts : of loads that turn with bodies
+        """
+        from kedfem.dynamics.system.still_kernel import still_forces
+
+        bodies, trial = self.of.bodies, self._trial
+        trial.u[:] = u
+        still_forces(self._c, bodies, R, amounts, self._state, trial, self._work)
+        f, mean = trial.f.copy(), R[bodies.motion].copy()
+        for k, frame in enumerate(bodies.frame):
+            if frame > RIGID_BODY:
+                mean[k] = trial.Rp[k]
+            else:
+                here = own(self.of, k)
+                f[here] = self.sprung(k, mean[k], u[here])
+        return f, mean
+
+    def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
+        """R K0 Rᵀ u of the displacement u (N,) of body k, world components."""
+        d = int(self.of.bodies.components[k])
+        turn = R[:d, :d]
+        g = turn.T @ u.reshape(d, -1)
+        return np.asarray(turn @ (self.K[k] @ g.ravel()).reshape(d, -1)).ravel()
+
+
+@dataclass(frozen=True, slots=True)
+class Inside:
+    """A body at one time: internal force f (N,) on its coordinates, world components; R (3, 3) its mean orientation.
+
+    g : (n, d) its displacement in the rigid-body frame [m]; energy : ½ gᵀ K0 g, as its frames see it [J]
+    frames : what its frames see; damped : (3, n, d) damping force without its rate, and its rates, rigid-body frame
+    """
+
+    f: Flat
+    R: Float[np.ndarray, "3 3"]
+    frames: list[Followed]
+    damped: Float[np.ndarray, "3 n d"]
+    g: Nodal
+    energy: float
+
+
+def rows(of: Ready, k: int, x: Flat) -> Nodal:
+    """Nodal rows (n, d) of body k from its coordinates."""
+    link = of.system.model.links[k]
+    return np.asarray(rows_of(link, of.parts[k], x.reshape(1, link.d, link.n))[0])
+
+
+def own(of: Ready, k: int) -> slice:
+    """Where the coordinates of body k stand."""
+    return slice(int(of.bodies.at[k]), int(of.bodies.at[k + 1]))
+
+
+def drawn(link: Link) -> Nodal:
+    """Position of a body as drawn; ψ of a planar beam has none."""
+    return position(link, np.zeros((link.n, link.d)))
+
+
+def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
+    """[ω]× x of rows; of a planar beam ψ stays out of it."""
+    d = x.shape[1]
+    return np.asarray(x @ spin[:d, :d].T)
+
+
+def inside(
+    of: Ready, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
+) -> Inside:
+    """Body k at the displacement u with the rate v.
+
+    Parameters
+    ----------
+    R, spin : of the rigid-body motion, and its [ω]×
+    """
+    link, damping = of.system.model.links[k], of.system.model.damping
+    d = link.d
+    x, x1 = rows(of, k, u), rows(of, k, v)
+    g, g1 = x @ R[:d, :d], (x1 - turned_rate(spin, x)) @ R[:d, :d]
+    y = position(link, g)
+    damped = np.zeros((3, *g.shape))
+    for m, each in enumerate((g, g1)):
+        damped[m] = damping.alpha * mass_times(link.mass, each)
+        if link.fit is None and damping.beta:
+            damped[m] += damping.beta * (link.K0 @ each.ravel()).reshape(each.shape)
+    frames = [seen_from(link, frame, y, g1) for frame in frames_of(link)]
+    f, energy = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
+    mean = R.copy()
+    mean[:d, :d] = mean_orientation(link, x, R[:d, :d])
+    return Inside(work_on(of.parts[k], f).ravel(), mean, frames, damped, g, energy)
+
+
+def remembered(of: Ready, k: int, found: Inside, state: State) -> None:
+    """What a step remembers of body k, put into the state."""
+    link, part, here = of.system.model.links[k], of.parts[k], own(of, k)
+    state.f[here] = found.f
+    N = here.stop - here.start
+    for m in range(3):
+        at = 3 * here.start + m * N
+        state.damped[at : at + N] = work_on(part, found.damped[m]).ravel()
+    points, b = points_of(link), np.searchsorted(of.bodies.beams.segment, k)
+    for e, (point, seen) in enumerate(zip(points, found.frames, strict=False)):
+        state.strain[0, b, :, e] = point.strains @ seen.g.ravel()
+        state.strain[1, b, :, e] = point.strains @ seen.g1.ravel()
+        state.direction[b, :, e], state.turn[b, e] = seen.Q[:2, :2] @ point.tangent, seen.angle
+    for seen in found.frames if not points else ():
+        state.Q[k, : link.d, : link.d], state.angle[k] = seen.Q, seen.angle
+        for m, x in enumerate((seen.g, seen.g1)):
+            at = 3 * here.start + m * N
+            state.seen[at : at + N] = coordinates(link, part, x).ravel()

@@ -1,0 +1,130 @@
+"""Where a march begins at rest: rates as given, and accelerations that balance forces and keep all constraints.
+
+Rates of constraints are exact (`rates`), the bars of rigid links among them.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.first_rows import interface_forces
+from kedfem.dynamics.joints.ports import turned_ports
+from kedfem.dynamics.matrices.dense import coordinates, work_on
+from kedfem.dynamics.stepping.state import LinkState
+from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.blank import empty_state
+from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.sparse import SparsePart, momentum
+from kedfem.dynamics.system.starts.accelerations import accelerations
+from kedfem.dynamics.system.starts.balance import DEPENDENT, Asked, Balance, Solved
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
+from kedfem.dynamics.system.starts.internal import own, remembered
+
+Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
+
+
+def rest(
+    of: Ready, motion_at: Motion, rates: Sequence[np.ndarray] | None = None, time: float = 0.0,
+    accelerated: Accelerated = accelerations,
+) -> State:  # fmt: skip
+    """The state at a time without elastic displacement.
+
+    Parameters
+    ----------
+    motion_at : rigid-body motion at given times
+    rates : per body (n, d) δ', world components; none if not given. They are changed as little as can be, in kinetic
+        energy, to keep all constraints
+    accelerated : accelerations under given forces, `accelerated_in_a_step` where springs or motors pull at once
+    """
+    now = Instant(of, motion_at, time)
+    v = as_coordinates(of, rates or [])
+    return begun(now, np.zeros_like(v), v, accelerated)
+
+
+def from_links(now: Instant, links: Sequence[LinkState]) -> State:
+    """The state whose displacements, rates, accelerations and forces are those of links in nodal rows.
+
+    Nodal rows know internal forces of links a million times as stiff as others to more digits than coordinates do.
+    """
+    of, joints = now.of, now.of.system.model.joints
+    u, v = (as_coordinates(of, [getattr(x, name) for x in links]) for name in "uv")
+    state = begun(now, u, v)
+    state.a[:] = as_coordinates(of, [x.a for x in links])
+    z = np.stack([now.interface(x) for x in (u, v, state.a)])
+    state.z[:, now.always.number], state.e[:] = z, now.coordinates(z)
+    if len(state.multiplier):
+        _multiplied(now, z[0], interface_forces(joints, links), state)
+    for k, (part, joint, x) in enumerate(zip(of.parts, joints, links, strict=True)):
+        here, ports = own(of, k), slice(int(of.bodies.port_at[k]), int(of.bodies.port_at[k + 1]))
+        N = here.stop - here.start
+        state.f[here] = work_on(part, x.f @ x.R.T).ravel()
+        state.port_force[ports] = turned_ports(joint, x.R[None], x.port_forces[None])[0]
+        for m, each in enumerate(x.C if x.C is not None else ()):
+            state.damped[3 * here.start + m * N : 3 * here.start + (m + 1) * N] = work_on(part, each).ravel()
+        if isinstance(part, SparsePart):
+            moved = [each.T.ravel() for each in (x.Mu, x.Mv, x.Ma)]
+            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moved)
+    return state
+
+
+def _multiplied(now: Instant, z: Flat, p: Flat, state: State) -> None:
+    """Multipliers of a state whose constraints and laws exert p on the interface unknowns together."""
+    C = now.gradients(z)
+    hard = now.hard(C)
+    left = p - C[~hard].T @ state.multiplier[~hard]
+    state.multiplier[hard] = np.linalg.lstsq(C[hard].T, left, rcond=DEPENDENT)[0]
+    state.bearing[now.always.number] = p
+
+
+def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
+    """Nodal rows (n, d) of all bodies as coordinates; zero if not given."""
+    out = np.zeros(int(of.bodies.at[-1]))
+    for k, each in enumerate(given):
+        out[own(of, k)] = coordinates(of.system.model.links[k], of.parts[k], each).ravel()
+    return out
+
+
+def begun(now: Instant, u: Flat, v: Flat, accelerated: Accelerated = accelerations) -> State:
+    """The state with given displacements, and rates that are made to keep all constraints."""
+    of = now.of
+    z, none = now.interface(u), np.zeros(of.system.unknowns)
+    C = now.gradients(z)
+    hard = now.hard(C)
+    v = v + _closing(now, C[hard], now.coordinates(np.stack([z, now.interface(v), none]))[1, hard])
+    z1 = now.interface(v)
+    e = now.coordinates(np.stack([z, z1, none]))
+    m = np.where(hard, 0.0, now.forces(e)[:, 0])
+    asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
+    inside = now.inside(u, v)
+    found = accelerated(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
+    m[hard] = found.m
+    e[2] += C @ found.z
+    state = empty_state(of.bodies, of.constraints)
+    for k, each in enumerate(inside):
+        remembered(of, k, each, state)
+    if found.f is not None:
+        state.f[:] += found.f
+    state.time[0], state.F[:], state.u[:], state.v[:] = now.time, now.F, u, v
+    state.z[:, now.always.number] = np.stack([z, z1, found.z])
+    state.a[:], state.port_force[:] = found.x, found.forces
+    state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
+    state.turned[:] = turned(now, z)
+    for k, part in enumerate(of.parts):
+        if isinstance(part, SparsePart):
+            here, link = own(of, k), of.system.model.links[k]
+            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(
+                [momentum(link, x[here]) for x in (u, v, found.x)]
+            )
+    return state
+
+
+def _closing(now: Instant, C: Float[np.ndarray, "r k"], open_: Flat) -> Flat:
+    """The smallest change of rates, in kinetic energy, that closes constraints."""
+    of = now.of
+    none = np.zeros(int(of.bodies.at[-1]))
+    if not np.abs(open_).max(initial=0.0):
+        return none
+    held = [now.always.mass(k) for k in range(len(of.parts))]
+    asked = Asked(C, -open_, np.zeros(len(C)), np.zeros(of.system.unknowns))
+    return Balance(of, held, now.R, asked).solved(none).x
