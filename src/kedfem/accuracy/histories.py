@@ -9,12 +9,12 @@ from jaxtyping import Float
 from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.transient import Steps
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.periodic import Periodic, Search
-from kedfem.dynamics.stepping.transient import Steps
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 

@@ -9,31 +9,31 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
 from kedfem.dynamics.joints.constraint_ports import Ways
 from kedfem.dynamics.joints.coupling import joined
-from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
-from kedfem.dynamics.loads import initial_forces
-from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
+from kedfem.dynamics.loads import initial_forces
+from kedfem.dynamics.matrices.dense import coordinates
+from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.start import initial_rates
-from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.forces.exerted import exerted, on_links
-from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.internal import own
+from kedfem.dynamics.system.forces.supports import supports
+from kedfem.dynamics.system.forces.turning_loads import turned, turning
 from kedfem.dynamics.system.krylov import Watch
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, displacements, march, ready
 from kedfem.dynamics.system.periodic import Periodic, Search
 from kedfem.dynamics.system.record import TANGENTIAL, System
+from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
+from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.starts.start import rest
-from kedfem.dynamics.system.forces.supports import supports
-from kedfem.dynamics.system.forces.turning_loads import turned, turning
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.period_map import PeriodMap
+from kedfem.dynamics.system.starts.instant import Flat
 
 WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
 Watch = Callable[[int], None]

@@ -7,8 +7,8 @@ not excite: by the largest magnitude a vibration grows, or falls, in a period.
 import numpy as np
 from jaxtyping import Complex
 
-from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.krylov import Watched, arnoldi, combined, scale_of
+from kedfem.dynamics.system.starts.instant import Flat
 
 MOST, AGAIN = 80, 5  # marches, at most; those after which no larger one may have come up
 SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others

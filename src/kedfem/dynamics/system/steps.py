@@ -9,29 +9,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_ports import Ways
 from kedfem.dynamics.joints.coupling import Attachment, joined
-from kedfem.dynamics.history import Forcing, LinkHistory, Products
+from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.exerted import ELEMENTS
-from kedfem.dynamics.system.starts.instant import Motion
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.krylov import Watch
+from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.oracle.literal import Now
 from kedfem.dynamics.system.oracle.literal_steps import literal_march, oracle
-from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.periodic import Periodic, Search
 from kedfem.dynamics.system.record import End, System
+from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
+from kedfem.dynamics.system.starts.instant import Motion
 from kedfem.dynamics.system.starts.start import rest
-from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
