@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from docs.site.pages import write_pages
 from typer.testing import CliRunner
 
 from kedfem.cli import app
@@ -155,3 +156,19 @@ def test_the_notebook_runs_and_shows_its_bar(monkeypatch: pytest.MonkeyPatch) ->
     stresses = [float(row.split()[1]) for row in table.splitlines()[2:]]
     assert len(stresses) == 5
     assert sorted(stresses) == stresses  # longer rods bend more under their own inertia
+
+
+def test_generated_pages_are_made(tmp_path: Path) -> None:
+    """Gallery, command line and messages, as the build of the site makes them; it has them checked by Sphinx."""
+    write_pages(tmp_path, tmp_path / "site")
+    commands = (tmp_path / "reference" / "command-line.md").read_text("utf-8")
+    assert {"## `kedfem run`", "## `kedfem sweep`"} <= set(commands.splitlines())
+    messages = (tmp_path / "reference" / "messages.md").read_text("utf-8")
+    assert "links.crank.materal: unknown key, did you mean 'material'?" in messages.splitlines()
+    assert messages.count("```{code-block} none") == messages.count("\n```\n") > 10
+    names = {path.parent.name for path in (ROOT / "examples").glob("*/scene.toml")}
+    assert {page.stem for page in (tmp_path / "gallery").glob("*.md")} == names | {"index"}
+    for name in names:
+        page = (tmp_path / "gallery" / f"{name}.md").read_text("utf-8")
+        assert f"    kedfem run examples/{name}/scene.toml\n" in page
+        assert f"../pictures/{name}.png" in page

@@ -77,7 +77,7 @@ def messages() -> str:
     parts = [INTRODUCTION]
     for table, rows in groupby(faults(), key=lambda row: row[0]):
         parts.append(
-            f"### {table}\n\n```{code - block} none\n:class: wrapped\n\n"
+            f"### {table}\n\n```{{code-block}} none\n:class: wrapped\n\n"
             + "\n".join(line for _, line in rows)
             + "\n```\n\n"
         )
