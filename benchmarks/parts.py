@@ -17,10 +17,10 @@ from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import effective_matrix
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.build import link_axes
-from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import point_rows, von_mises
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.tetrahedra import tetrahedral

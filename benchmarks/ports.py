@@ -13,10 +13,10 @@ from benchmarks.parts import PARTS, BenchPart, Size, ends, frequencies, loaded, 
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import effective_matrix
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.links.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient, von_mises
-from kedfem.links.rigid_coupling import STIFF, radius, surface_gram, with_stiff_seat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
+from kedfem.links.surfaces.rigid_coupling import STIFF, radius, surface_gram, with_stiff_seat
 
 PLATE = next(part for part in PARTS if part.name == "plate with bores")
 LOADS = {"pull": (1.0, 0.0, 0.0), "bend": (0.0, 1.0, 0.0)}

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from geometry import PARTS
-from kedfem.links.part_candidates import face_kind
+from kedfem.links.surfaces.part_candidates import face_kind
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import link_from

@@ -13,9 +13,9 @@ from kedfem.dynamics.joints.places import seat_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
 from kedfem.errors import MeshError, OutputError, SceneError
-from kedfem.links.coupling_surfaces import CouplingSurface, port_weights, seat_couples
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights, seat_couples
 from kedfem.motion.assembly import assembled
 from kedfem.results import replacing
 from kedfem.results.files import reason

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kedfem.links.section import rectangle
+from kedfem.links.beams.section import rectangle
 from tests.rooms.test_dynamics import run, worst_difference
 from tests.verification.linear import free_map, frequencies
 from tests.verification.spatial_beams import (

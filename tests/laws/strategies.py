@@ -9,10 +9,10 @@ from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kedfem.links.beam import beam_link
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.section import Section, rectangle
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.section import Section, rectangle
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
 from kedfem.mesh.elements.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity

@@ -5,11 +5,11 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from kedfem.links.beam import beam_link
-from kedfem.links.beam_recovery import straight_run
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.beam_recovery import straight_run
+from kedfem.links.beams.section import rectangle
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.section import rectangle
 from tests.laws.strategies import MATERIAL
 
 LENGTH, HEIGHT, THICKNESS = 2.0, 0.05, 0.02

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 
 from kedfem.dynamics.stepping.literal import rotated_stiffness
-from kedfem.links.beam import element_mass, element_stiffness, strain_rows
+from kedfem.links.beams.beam import element_mass, element_stiffness, strain_rows
 from tests.laws.strategies import (
     LAW,
     LOBATTO,

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
-from kedfem.links.beam import beam_link
-from kedfem.links.beam_axis import straight_axis
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.beam_axis import straight_axis
+from kedfem.links.beams.section import rectangle
+from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.links.section import rectangle
 from kedfem.links.segments import Segments, beam_segments, segmented, space_segments
-from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
 from tests.laws.strategies import examples
 from tests.runs import Ran, ran

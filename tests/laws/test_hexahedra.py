@@ -12,7 +12,7 @@ from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
-from kedfem.links.surface import surface
+from kedfem.links.surfaces.surface import surface
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import NODES, shape_gradients
 from kedfem.motion.newton import cross_matrix

@@ -6,14 +6,14 @@ from hypothesis import given
 
 from kedfem.dynamics.loads import applied
 from kedfem.links.bodies import euler_tensor, inertia_of, with_body, with_point_mass
-from kedfem.links.coupling_surfaces import (
+from kedfem.links.record import Link, mass_times
+from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
     face_seat,
     joint_seat,
     port_weights,
     surface_weights,
 )
-from kedfem.links.record import Link, mass_times
 from kedfem.mesh import SolidMesh
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from kedfem.links.metric import beam_element, node_rotations, pulled_back, strains_of
+from kedfem.links.beams.metric import beam_element, node_rotations, pulled_back, strains_of
+from kedfem.links.beams.section import rectangle
+from kedfem.links.beams.spatial_beam import rigidities, space_strains
 from kedfem.links.record import BeamElement
-from kedfem.links.section import rectangle
-from kedfem.links.spatial_beam import rigidities, space_strains
 from tests.laws.strategies import LAW, MATERIAL, Motion, motions, seeds
 from tests.laws.test_spatial_beams import elements
 

@@ -10,11 +10,17 @@ from skfem.models.elasticity import linear_elasticity
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
-from kedfem.links.coupling_surfaces import face_seat, is_flat, joint_seat, port_weights, surface_weights
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
+from kedfem.links.surfaces.coupling_surfaces import (
+    face_seat,
+    is_flat,
+    joint_seat,
+    port_weights,
+    surface_weights,
+)
 from kedfem.mesh import QuadMesh
 from kedfem.mesh.elements.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
 from kedfem.scene import Material

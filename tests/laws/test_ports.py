@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.joints.ports import port_values, port_vectors
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.links.coupling_surfaces import CouplingSurface, face_seat, joint_seat
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import reduced, rigid, rigid_functions, rigid_modes
-from kedfem.links.rigid_coupling import STIFF, surface_gram, with_stiff_seat
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_seat, joint_seat
+from kedfem.links.surfaces.rigid_coupling import STIFF, surface_gram, with_stiff_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from

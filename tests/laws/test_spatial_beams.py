@@ -7,12 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.stepping.literal import rotated_stiffness
-from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
-from kedfem.links.bodies import euler_tensor, with_body
-from kedfem.links.coupling_surfaces import joint_seat, port_weights
-from kedfem.links.record import Link
-from kedfem.links.section import Section, cowper, rectangle, torsion_stress, tube
-from kedfem.links.spatial_beam import (
+from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
+from kedfem.links.beams.section import Section, cowper, rectangle, torsion_stress, tube
+from kedfem.links.beams.spatial_beam import (
     HUB_INERTIA,
     rigidities,
     section_strains,
@@ -21,6 +18,9 @@ from kedfem.links.spatial_beam import (
     space_strains,
     spatial_beam_link,
 )
+from kedfem.links.bodies import euler_tensor, with_body
+from kedfem.links.record import Link
+from kedfem.links.surfaces.coupling_surfaces import joint_seat, port_weights
 from tests.laws.strategies import LAW, MATERIAL, Motion, motions, rotations, seeds, vectors
 from tests.laws.test_hexahedra import ROUNDING, dense_mass, node_rotation
 from tests.laws.test_loads_and_joints import kinetic_energy

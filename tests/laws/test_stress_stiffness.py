@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from kedfem.links.beam import beam_link, shape_functions
+from kedfem.links.beams.beam import beam_link, shape_functions
+from kedfem.links.beams.section import rectangle
+from kedfem.links.beams.spatial_beam import space_strains
+from kedfem.links.beams.spatial_stress import metric
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid, rigid_functions
-from kedfem.links.section import rectangle
-from kedfem.links.spatial_beam import space_strains
-from kedfem.links.spatial_stress import metric
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import Material

@@ -14,12 +14,12 @@ from kedfem.dynamics.joints.places import part_seat, seat_of
 from kedfem.dynamics.model import elastic_model
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_links
-from kedfem.links.candidates import surfaces
-from kedfem.links.choosing import as_choice, chosen_surface, distance, fits
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid_functions
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.candidates import surfaces
+from kedfem.links.surfaces.choosing import as_choice, chosen_surface, distance, fits
 from kedfem.mesh import SolidMesh
 from kedfem.motion.linkage import linkage
 from kedfem.motion.redrawn import STILL, Shift, redrawn

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kedfem.links.part_candidates import offers
+from kedfem.links.surfaces.part_candidates import offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import HEX8, Face
 from kedfem.tables import mesh_tables

@@ -11,8 +11,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError, SceneError
-from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.part_candidates import face_kind
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, methods, part_mesh
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.elements.bounds import valid_everywhere

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from kedfem.links.part_candidates import axis_in_words, offers
+from kedfem.links.surfaces.part_candidates import axis_in_words, offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import CadFace

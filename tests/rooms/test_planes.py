@@ -15,7 +15,7 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
-from kedfem.links.coupling_surfaces import joint_seat
+from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.picture import write_picture

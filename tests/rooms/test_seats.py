@@ -13,13 +13,13 @@ from numpy.testing import assert_allclose
 from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_link, bare_links
-from kedfem.links.candidates import candidates
-from kedfem.links.coupling_surfaces import CouplingSurface, face_seat, joint_seat, surface_weights
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid_functions
-from kedfem.links.round_surfaces import rounds
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.candidates import candidates
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_seat, joint_seat, surface_weights
+from kedfem.links.surfaces.round_surfaces import rounds
 from kedfem.mesh import SolidMesh
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.transient import Snapshot
-from kedfem.links.beam_axis import smooth_axis, straight_axis
+from kedfem.links.beams.beam_axis import smooth_axis, straight_axis
+from kedfem.links.beams.section import rectangle, tube
+from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
-from kedfem.links.section import rectangle, tube
-from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material, scene_from, spatial_beams
 from tests.linkages import joint, moved_scene, rssr
 from tests.runs import quick

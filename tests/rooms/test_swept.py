@@ -11,8 +11,8 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from kedfem.links.part_candidates import face_kind
 from kedfem.links.solid import solid_basis, solid_link
+from kedfem.links.surfaces.part_candidates import face_kind
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model

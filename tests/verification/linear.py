@@ -7,8 +7,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.stepping.literal import shared_nodes
-from kedfem.links.coupling_surfaces import face_seat, port_weights
 from kedfem.links.record import Link
+from kedfem.links.surfaces.coupling_surfaces import face_seat, port_weights
 
 
 def held(*sets: tuple[np.ndarray, str], d: int = 3) -> np.ndarray:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kedfem.links.coupling_surfaces import face_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.surface import surface
+from kedfem.links.surfaces.coupling_surfaces import face_seat
+from kedfem.links.surfaces.surface import surface
 from kedfem.scene import Material, scene_from
 
 from .cases import Row, case

@@ -7,9 +7,9 @@ from scipy.sparse.linalg import spsolve
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.transient import snapshots, steps_of
-from kedfem.links.coupling_surfaces import face_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
+from kedfem.links.surfaces.coupling_surfaces import face_seat
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import Material, Scene, scene_from

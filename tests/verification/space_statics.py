@@ -1,4 +1,4 @@
-"""Beams in space under dead loads, bent far: elements of `links.metric` against closed forms and exact rods.
+"""Beams in space under dead loads, bent far: elements of `links.beams.metric` against closed forms and exact rods.
 
 `Rod` solves their balance by Newton, tangents by differences; `exact_rod` the differential equations of a Cosserat rod
 by collocation, which shares nothing with the elements.
@@ -10,11 +10,11 @@ import numpy as np
 from scipy.integrate import solve_bvp
 from scipy.linalg import eigvalsh
 
-from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
-from kedfem.links.metric import beam_element, pulled_back, strains_of
+from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
+from kedfem.links.beams.metric import beam_element, pulled_back, strains_of
+from kedfem.links.beams.section import Section, rectangle
+from kedfem.links.beams.spatial_beam import functions, rigidities
 from kedfem.links.record import BeamElement
-from kedfem.links.section import Section, rectangle
-from kedfem.links.spatial_beam import functions, rigidities
 from kedfem.scene import Material
 
 from .cases import Row, case

@@ -6,10 +6,10 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from kedfem.links.beam_axis import Axis, smooth_axis, straight_axis
+from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
+from kedfem.links.beams.section import Section, rectangle, tube
+from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.links.section import Section, rectangle, tube
-from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.scene import Material
 
 from .cases import Row, case

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from kedfem.links.beam import beam_link
-from kedfem.links.coupling_surfaces import face_seat, surface_weights
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.section import rectangle
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
-from kedfem.links.section import rectangle
+from kedfem.links.surfaces.coupling_surfaces import face_seat, surface_weights
 from kedfem.scene import Material
 
 from .cases import Row, case

@@ -10,15 +10,15 @@ import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping.transient import steps_of, transient
-from kedfem.links.beam import beam_link
-from kedfem.links.beam_axis import straight_axis
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.beam_axis import straight_axis
+from kedfem.links.beams.section import Section, rectangle, tube
+from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.bodies import flywheel_tensor, with_body
-from kedfem.links.coupling_surfaces import joint_seat
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
-from kedfem.links.section import Section, rectangle, tube
-from kedfem.links.spatial_beam import spatial_beam_link
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.scene import Material, Scene, scene_from, time_grid
 
 from .cases import Row, case

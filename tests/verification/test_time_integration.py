@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.links.beam import beam_link
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.section import rectangle
 from kedfem.links.record import Link, mass_times
-from kedfem.links.section import rectangle
 from kedfem.scene import Material
 
 from .histories import Moving, Run, grounded, history, pinned_beam

@@ -3,9 +3,9 @@
 import numpy as np
 import scipy.linalg
 
-from kedfem.links.beam import beam_link
+from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.section import Section, rectangle
 from kedfem.links.record import Link
-from kedfem.links.section import Section, rectangle
 from kedfem.scene import Material
 
 from .cases import Row, case

@@ -153,7 +153,7 @@ def mesh(
     ] = None,
 ) -> None:
     """Mesh one part from CAD: what joints can sit on, a mesh file, a picture, its quality."""
-    from kedfem.links.part_candidates import offers
+    from kedfem.links.surfaces.part_candidates import offers
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
     from kedfem.output.vtu import write_mesh

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.stepping.state import Nodal
-from kedfem.links.metric import pulled_back, strains_of
+from kedfem.links.beams.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential
 

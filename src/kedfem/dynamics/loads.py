@@ -13,7 +13,9 @@ from jaxtyping import Float
 
 from kedfem.dynamics.joints.places import on_part, seat_of
 from kedfem.errors import MeshError, SceneError
-from kedfem.links.coupling_surfaces import (
+from kedfem.links.record import Link, as_rows
+from kedfem.links.recovery import point_rows
+from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
     face_normals,
     face_seat,
@@ -23,8 +25,6 @@ from kedfem.links.coupling_surfaces import (
     seat_couples,
     surface_weights,
 )
-from kedfem.links.record import Link, as_rows
-from kedfem.links.recovery import point_rows
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,

@@ -19,7 +19,12 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
-from kedfem.links.coupling_surfaces import (
+from kedfem.links.record import Link
+from kedfem.links.recovery import PointRows, point_rows
+from kedfem.links.reduced import on_functions, reduced, rigid
+from kedfem.links.segments import Segments
+from kedfem.links.stored import can_be_stored, restored, stored
+from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
     holds,
     is_flat,
@@ -27,11 +32,6 @@ from kedfem.links.coupling_surfaces import (
     port_weights,
     rigid_seat,
 )
-from kedfem.links.record import Link
-from kedfem.links.recovery import PointRows, point_rows
-from kedfem.links.reduced import on_functions, reduced, rigid
-from kedfem.links.segments import Segments
-from kedfem.links.stored import can_be_stored, restored, stored
 from kedfem.motion.linkage import Linkage, joint_axis, unit
 from kedfem.motion.path import Path
 from kedfem.scene import (

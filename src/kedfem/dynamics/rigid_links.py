@@ -7,9 +7,9 @@ from jaxtyping import Float
 
 from kedfem.errors import SceneError
 from kedfem.links.bodies import with_body
-from kedfem.links.coupling_surfaces import rigid_seat
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, rigid, rigid_functions, wave_frequency
+from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid
 
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6

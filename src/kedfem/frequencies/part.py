@@ -21,11 +21,11 @@ from kedfem.dynamics.modes.link_modes import (
 )
 from kedfem.errors import MeshError, SceneError
 from kedfem.frequencies.linkage import frequencies_folder
-from kedfem.links.candidates import surfaces
-from kedfem.links.choosing import chosen_surface
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.candidates import surfaces
+from kedfem.links.surfaces.choosing import chosen_surface
 from kedfem.mesh import part_mesh
 from kedfem.motion.linkage import joint_axis
 from kedfem.output.frames import link_field

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.links.coupling_surfaces import CouplingSurface, face_normal, is_flat
 from kedfem.links.record import Link, Mass, mass_constants, read_only
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, is_flat
 
 
 def euler_tensor(inertia: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:

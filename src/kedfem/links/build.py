@@ -6,13 +6,12 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
-from kedfem.links.beam import beam_link, line_axes, spaced
-from kedfem.links.beam_axis import Axis, directions, smooth_axis, straight_axis
-from kedfem.links.choosing import with_chosen_faces
-from kedfem.links.coupling_surfaces import joint_seat
+from kedfem.links.beams.beam import beam_link, line_axes, spaced
+from kedfem.links.beams.beam_axis import Axis, directions, smooth_axis, straight_axis
+from kedfem.links.beams.section import scene_section
+from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.section import scene_section
 from kedfem.links.segments import (
     Interval,
     Segments,
@@ -23,7 +22,8 @@ from kedfem.links.segments import (
     space_segments,
 )
 from kedfem.links.solid import solid_link
-from kedfem.links.spatial_beam import spatial_beam_link
+from kedfem.links.surfaces.choosing import with_chosen_faces
+from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.mesh import link_mesh, plane_mesh
 from kedfem.scene import (
     Bar,

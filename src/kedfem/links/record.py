@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.links.section import Section
+from kedfem.links.beams.section import Section
 from kedfem.mesh.elements.hexahedra import Face
 
 Matrix: TypeAlias = Any  # sp.csr_array, or np.ndarray of a reduced link
@@ -37,7 +37,7 @@ class BeamPoint:
 
 @dataclass(frozen=True, slots=True)
 class BeamElement:
-    """An element of a beam in space with E Gauss points, m nodes, K gradient functions and s strains: `links.metric`.
+    """An element in space with E Gauss points, m nodes, K gradient functions and s strains: `links.beams.metric`.
 
     tangents : (E, n) x' at the Gauss points from the position; gradients : (K, n) the g_k of all nodes from it
     node, drawn : (K,) whose they are, (K, 3) as drawn; directors : (m, 2, 3) n1, n2 as drawn

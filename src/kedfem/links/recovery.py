@@ -13,16 +13,16 @@ import skfem
 from jaxtyping import Float, Int
 
 from kedfem.errors import SceneError
-from kedfem.links.beam import line_pairs, shape_functions
-from kedfem.links.beam_recovery import beam_fibre, fibre_row, nearest_on_beam
-from kedfem.links.record import Link
-from kedfem.links.spatial_recovery import (
+from kedfem.links.beams.beam import line_pairs, shape_functions
+from kedfem.links.beams.beam_recovery import beam_fibre, fibre_row, nearest_on_beam
+from kedfem.links.beams.spatial_recovery import (
     beam_strains,
     drawn,
     nearest_on_axis,
     section_stress,
     section_value,
 )
+from kedfem.links.record import Link
 from kedfem.mesh.elements.simplices import barycentric
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx

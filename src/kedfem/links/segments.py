@@ -14,14 +14,14 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.links.beam import beam_link, shape_functions, strain_rows, tangent_fit
-from kedfem.links.beam_axis import Axis
-from kedfem.links.coupling_surfaces import facet_seat, joint_seat, port_weights
-from kedfem.links.metric import beam_element
+from kedfem.links.beams.beam import beam_link, shape_functions, strain_rows, tangent_fit
+from kedfem.links.beams.beam_axis import Axis
+from kedfem.links.beams.metric import beam_element
+from kedfem.links.beams.spatial_beam import rigidities, spatial_beam_link
 from kedfem.links.plane import plane_link
 from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.solid import solid_link
-from kedfem.links.spatial_beam import rigidities, spatial_beam_link
+from kedfem.links.surfaces.coupling_surfaces import facet_seat, joint_seat, port_weights
 from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import Material

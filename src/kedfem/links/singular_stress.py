@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.links.record import Link
-from kedfem.links.surface import boundary, neighbours, surface
+from kedfem.links.surfaces.surface import boundary, neighbours, surface
 
 SHARP = np.cos(
     np.radians(30)

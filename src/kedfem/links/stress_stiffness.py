@@ -12,12 +12,12 @@ import scipy.sparse as sp
 import skfem
 from jaxtyping import Float
 
-from kedfem.links.beam import assembled, strain_rows
+from kedfem.links.beams.beam import assembled, strain_rows
+from kedfem.links.beams.spatial_recovery import section_of
+from kedfem.links.beams.spatial_stress import spatial_stress_stiffness
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import STRAIGHT
 from kedfem.links.solid import Pattern, pattern
-from kedfem.links.spatial_recovery import section_of
-from kedfem.links.spatial_stress import spatial_stress_stiffness
 
 StressStiffness = Callable[[Float[np.ndarray, "n d"]], Matrix]
 ELEMENTS = 256  # taken together

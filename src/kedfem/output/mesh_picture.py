@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.links.part_candidates import Offer
+from kedfem.links.surfaces.part_candidates import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.elements.hexahedra import QUAD9, shape_functions

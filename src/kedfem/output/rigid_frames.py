@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link
-from kedfem.links.spatial_recovery import drawn
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage

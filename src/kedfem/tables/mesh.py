@@ -7,7 +7,7 @@ from jaxtyping import Float
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.links.part_candidates import Offer, axis_in_words
+from kedfem.links.surfaces.part_candidates import Offer, axis_in_words
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.places import in_mm
 from kedfem.output.words import with_prefix

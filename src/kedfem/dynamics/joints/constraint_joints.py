@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.errors import MeshError
-from kedfem.links.coupling_surfaces import CouplingSurface
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import unit
 from kedfem.motion.newton import cross_matrix

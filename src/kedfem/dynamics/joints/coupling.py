@@ -23,8 +23,8 @@ from kedfem.dynamics.joints.constraint_ports import (
 )
 from kedfem.dynamics.joints.places import part_seat, slider_axis
 from kedfem.errors import MeshError
-from kedfem.links.coupling_surfaces import CouplingSurface, holds, is_flat, port_weights
 from kedfem.links.record import Link
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, holds, is_flat, port_weights
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import joint_axis
 from kedfem.scene import Joint, Scene

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from kedfem.dynamics.joints.places import part_seat
 from kedfem.links.record import Link
-from kedfem.links.rigid_coupling import with_stiff_seat
+from kedfem.links.surfaces.rigid_coupling import with_stiff_seat
 from kedfem.scene import Scene
 
 

@@ -20,10 +20,10 @@ from kedfem.dynamics.model import with_scene_body
 from kedfem.dynamics.modes.frozen import FIRST, NEAR, RIGID_MOTIONS, Modes
 from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.links.build import bare_link
-from kedfem.links.coupling_surfaces import port_weights, seat_couples
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes, wave_frequency
-from kedfem.links.rigid_coupling import surface_gram
+from kedfem.links.surfaces.coupling_surfaces import port_weights, seat_couples
+from kedfem.links.surfaces.rigid_coupling import surface_gram
 from kedfem.scene import Scene
 
 NONE = 1e-9  # of the largest row: what a link in a plane or a flat face cannot do

@@ -15,7 +15,7 @@ from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.session import gmsh_model
 
-# of a cylinder's full turn: a joint finds no less of it by itself (links/round_surfaces.py); keyways are less
+# of a cylinder's full turn: a joint finds no less of it by itself (links/surfaces/round_surfaces.py); keyways are less
 CLOSED = 0.75
 BALL = 0.2  # of a ball's area: the rounded corner between three walls has an eighth
 

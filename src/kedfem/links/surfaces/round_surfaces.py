@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.links.record import Link
-from kedfem.links.surface import (
+from kedfem.links.surfaces.surface import (
     CYLINDER_TOLERANCE,
     PLANE_TOLERANCE,
     boundary,

@@ -11,10 +11,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.coupling_surfaces import CouplingSurface
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced
-from kedfem.links.surface import surface
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
+from kedfem.links.surfaces.surface import surface
 
 #: κ in E per radius of the seat. The shape's error falls with 1/STIFF, rounding grows with it: here a bore deforms by
 #: 5e-4 of what an averaged one does, deflections are within 2e-4 of those about rigid pins (docs/ports.md).

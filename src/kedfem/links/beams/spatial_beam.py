@@ -9,10 +9,17 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import assembled, cell_type, line_axes, parent_nodes, parent_weights, shape_functions
-from kedfem.links.beam_axis import Axis
+from kedfem.links.beams.beam import (
+    assembled,
+    cell_type,
+    line_axes,
+    parent_nodes,
+    parent_weights,
+    shape_functions,
+)
+from kedfem.links.beams.beam_axis import Axis
+from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
-from kedfem.links.section import Section
 from kedfem.scene import Material
 
 HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does

@@ -9,15 +9,15 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.links.beam import assembled, parent_nodes, parent_weights, shape_functions
-from kedfem.links.record import Link
-from kedfem.links.spatial_beam import (
+from kedfem.links.beams.beam import assembled, parent_nodes, parent_weights, shape_functions
+from kedfem.links.beams.spatial_beam import (
     HUB_STIFFNESS,
     hub_functions,
     section_strains,
     space_strains,
 )
-from kedfem.links.spatial_recovery import section_of
+from kedfem.links.beams.spatial_recovery import section_of
+from kedfem.links.record import Link
 
 T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 

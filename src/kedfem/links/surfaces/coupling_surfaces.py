@@ -8,10 +8,10 @@ from jaxtyping import Float, Int
 from scipy.linalg import qr
 
 from kedfem.errors import MeshError
-from kedfem.links.facet_selection import named_facets, picked
-from kedfem.links.missing import in_its_plane, not_touching
 from kedfem.links.record import Link
-from kedfem.links.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface
+from kedfem.links.surfaces.facet_selection import named_facets, picked
+from kedfem.links.surfaces.missing import in_its_plane, not_touching
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface
 
 
 @dataclass(frozen=True, slots=True)

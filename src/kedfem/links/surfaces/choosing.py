@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
-from kedfem.links.candidates import Candidate, surfaces
-from kedfem.links.missing import MOST, length, shown
 from kedfem.links.record import Link, LinkFace
-from kedfem.links.surface import PLANE_TOLERANCE
+from kedfem.links.surfaces.candidates import Candidate, surfaces
+from kedfem.links.surfaces.missing import MOST, length, shown
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import ChosenFace, Scene
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.links.beam import line_axes, line_cells, spaced
+from kedfem.links.beams.beam import line_axes, line_cells, spaced
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.links.facet_selection import picked
 from kedfem.links.record import Link, LinkFace
-from kedfem.links.round_surfaces import CLOSED
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells
-from kedfem.links.surface import flat_face, surface
+from kedfem.links.surfaces.facet_selection import picked
+from kedfem.links.surfaces.round_surfaces import CLOSED
+from kedfem.links.surfaces.surface import flat_face, surface
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face
 

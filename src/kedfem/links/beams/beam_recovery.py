@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import parent_nodes, shape_functions, strain_rows
+from kedfem.links.beams.beam import parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 
 THROUGH = 4  # Gauss points of a probe at least

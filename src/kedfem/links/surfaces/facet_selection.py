@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.links.candidates import round_candidates
-from kedfem.links.missing import ambiguous, in_its_plane, not_touching
 from kedfem.links.record import Link, read_only
-from kedfem.links.round_surfaces import Round, ball, rounds, seated
-from kedfem.links.surface import CYLINDER_TOLERANCE, flat_face
+from kedfem.links.surfaces.candidates import round_candidates
+from kedfem.links.surfaces.missing import ambiguous, in_its_plane, not_touching
+from kedfem.links.surfaces.round_surfaces import Round, ball, rounds, seated
+from kedfem.links.surfaces.surface import CYLINDER_TOLERANCE, flat_face
 
 Facets = Int[np.ndarray, " f"]
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import parent_weights, shape_functions
+from kedfem.links.beams.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
 
 # of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle

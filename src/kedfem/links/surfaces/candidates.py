@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.links.record import Link, LinkFace
-from kedfem.links.round_surfaces import CLOSED
-from kedfem.links.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface
+from kedfem.links.surfaces.round_surfaces import CLOSED
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface
 
 FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
 FEWEST = 3  # facets that a cylinder or a ball is told from

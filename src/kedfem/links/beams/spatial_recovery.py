@@ -4,10 +4,10 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beam import line_pairs, parent_nodes, shape_functions
+from kedfem.links.beams.beam import line_pairs, parent_nodes, shape_functions
+from kedfem.links.beams.section import Section, outline, torsion_stress
+from kedfem.links.beams.spatial_beam import space_strains
 from kedfem.links.record import Link
-from kedfem.links.section import Section, outline, torsion_stress
-from kedfem.links.spatial_beam import space_strains
 
 
 def element_frame(link: Link, element: int) -> Float[np.ndarray, "m 3 3"]:

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, Mass, mass_constants, read_only
-from kedfem.links.section import Section
 from kedfem.scene import Material
 
 CELL_TYPES = {2: "line", 3: "line3"}

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.links.candidates import Candidate, candidates
 from kedfem.links.record import Link
-from kedfem.links.round_surfaces import Round
+from kedfem.links.surfaces.candidates import Candidate, candidates
+from kedfem.links.surfaces.round_surfaces import Round
 
 MOST = 8  # candidates in a message
 SMALL = 0.1  # [m]: shorter lengths are told in millimetres

@@ -1,0 +1,1 @@
+"""Beams: planar and in space, their axes and sections, stresses and stress stiffness."""
