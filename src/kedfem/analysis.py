@@ -27,6 +27,7 @@ from kedfem.dynamics.stepping.transient import Steps, eased_warning, period_map
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
+from kedfem.motion.counted_turns import require_counted
 from kedfem.output.derived import (
     MESH,
     WORST,
@@ -154,7 +155,7 @@ def _analysed(
     )
     every = [*ready.model.links, *(carried.link for carried in ready.model.carried)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
-    notices += [] if without_vibration(scene) else _about_steps(ready, clock)
+    notices += _about_steps(ready, clock)
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
@@ -214,7 +215,10 @@ def _drawn(
 
 
 def _about_steps(ready: Prepared, clock: "Clock") -> list[str]:
-    """Warnings of steps that are too long for what moves and for what loads do."""
+    """Warnings of steps that are too long for what moves and for what loads do; refused if turns cannot be counted."""
+    require_counted(ready.scene, ready.linkage, ready.path)
+    if without_vibration(ready.scene):
+        return []
     resolved = resolution_warnings(clock.timed("frequencies", lambda: resolution(ready)))
     return [*stability_warning(ready.scene), *resolved, *coarse_steps(ready.scene)]
 

@@ -17,6 +17,7 @@ from kedfem.errors import MeshError, MotionError
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
+from kedfem.motion.counted_turns import require_counted
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -84,6 +85,7 @@ def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
     clock = Clock(watch)
     scene, assembly = assembled(scene)
     linked, along = clock.timed("motion", lambda: moving(scene))
+    require_counted(scene, linked, along)
     links = clock.timed("masses", lambda: rigid_links(scene))
     masses = inertias_of_links(scene, linked, links)
     forces = rigid_forces(scene, linked, masses, along)

@@ -15,7 +15,8 @@ from kedfem.results import read_results
 from kedfem.scene import scene_from, time_grid
 from tests.cells import Cell, scene_of
 from tests.laws.test_limits import AXES
-from tests.moving import beam_in_space, channels, inverted, ran, turning
+from tests.moving import bar, beam_in_space, channels, inverted, ran, turning
+from tests.spatial_joints import rigid_in_space
 
 Raw = dict[str, Any]
 G, E, D, RHO = 9.81, 2e11, 0.02, 7850.0
@@ -131,6 +132,46 @@ def test_a_rod_on_a_spring_turns_until_moments_balance(axis: str) -> None:
     bends = F * np.cos(theta) * L**2 / (3 * E * INERTIA)
     assert np.arctan2(end @ np.cross(n, d), end @ d) == pytest.approx(theta + bends, abs=2e-6)
     assert bends > 10 * 2e-6
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_rigid_rod_on_a_spring_does_not_deflect(axis: str) -> None:
+    """k θ = F L cos θ, and its end goes by L sin θ; a structure has no step that could make it softer."""
+    n, d = AXES[axis], across(AXES[axis])
+    k, F, theta = 500.0, 3.0, 0.0
+    for _ in range(60):
+        theta = F * L * np.cos(theta) / k
+    got = values({
+        "links": {"rod": rigid_in_space(np.zeros(3), L * d)},
+        "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}},
+        "springs": {"k": {"kind": "torsion", "joint": "A", "stiffness": k}},
+        "loads": {"F": {"kind": "force", "link": "rod", "at": (L * d).tolist(), "vector": (F * np.cross(n, d)).tolist()}},
+        "analysis": {"kind": "static"},
+        "output": {"probes": {"end": {"link": "rod", "at": (L * d).tolist(), "quantity": "travel"}}},
+    })  # fmt: skip
+    assert_allclose(got["springs/k/angle"][-1], theta, rtol=1e-7)
+    assert got["probes/end/travel"][-1] @ np.cross(n, d) == pytest.approx(L * np.sin(theta), rel=2e-6)
+
+
+@pytest.mark.parametrize("kind", ["static", "quasi-static"])
+def test_rigid_links_are_as_rigid_in_positions_far_apart(kind: str) -> None:
+    """Of a beam with a rigid rod at its end: both frames agree where loads are small, minutes between positions too."""
+
+    def end(frames: str, speed: float) -> np.ndarray:
+        links = {"arm": bar("beam", [0, 0], [0.2, 0], 1), "rod": bar("rigid", [0.2, 0], [0.4, 0])}
+        at = {"link": "rod", "at": [0.4, 0]}
+        return values({
+            "links": links, "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]},
+                                       "W": {"kind": "weld", "links": ["arm", "rod"], "at": [0.2, 0]}},
+            "loads": {"F": {"kind": "force", **at, "vector": [0, 50]}},
+            "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}},
+            "analysis": {"kind": kind, "revolutions": 2 / 72, "frames": frames},
+            "output": {"probes": {"end": {**at, "quantity": "displacement", "frame": "world"}}},
+        })["probes/end/displacement"]  # fmt: skip
+
+    wanted = end("rigid-body", 1e-3)
+    for speed in (1e-3, 0.1):
+        assert_allclose(end("co-rotational", speed), wanted, atol=1e-3 * np.abs(wanted).max())
 
 
 KINDS = [

@@ -10,7 +10,7 @@ from kedfem.links.bodies import with_body
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, rigid, rigid_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_seat
-from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid
+from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid, without_vibration
 
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
 # ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
@@ -24,7 +24,8 @@ MOUNTED = (
 def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
     """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
 
-    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error.
+    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error;
+    positions without vibration have no such error, however far apart they are.
     Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
 
     Parameters
@@ -40,7 +41,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
-        followed = link.fit is not None
+        followed = link.fit is not None and not without_vibration(scene)
         out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
     return out
 

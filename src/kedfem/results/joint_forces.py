@@ -115,7 +115,8 @@ Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
 
 def _row_joints_of(scene: Scene, model: Model, carried: PrescribedBody) -> list[str]:
     """Joints of a carried link enforced by constraint equations."""
-    return [row.name for row in model.rows if carried.link.name in scene.joints[row.name].links]
+    joints = scene.joints
+    return [x.name for x in model.rows if x.name in joints and carried.link.name in joints[x.name].links]
 
 
 def _hub_wrench(
@@ -146,9 +147,31 @@ def _hub_wrench(
             f, m, point = forces.rows.wrench(name, block)
             sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
             force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
-        return force, moment
+        f, m = _geared(scene, model, carried, forces, block, centre)
+        return force - f, moment - m
 
     return wrench, held
+
+
+def _geared(
+    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces, block: Block, about: Rows
+) -> tuple[Rows, Rows]:
+    """Force and moment about points that gears exert on a carried link: along the coordinates of their joints."""
+    force, moment = np.zeros((2, len(block), 3))
+    rows = {row.name: row for row in model.rows}
+    for gears in scene.gears:
+        row = rows[f"gears.{gears}"]
+        effort = forces.rows.between_gears(gears, block)[:, None]
+        for share, joint in ((1.0, row), *row.plus):
+            i, j = joint.bodies
+            sign = share * ((carried.body == i) - (carried.body == j))
+            along = sign * effort * (block.motion.R[:, j] @ joint.axis)
+            if joint.gap.any():  # a rack's push goes through the point of link i
+                place = block.motion.p[:, i] + block.motion.R[:, i] @ joint.at
+                force, moment = force + along, moment + cross(place - about, along)
+            else:
+                moment = moment + along
+    return force, moment
 
 
 def _on_carried(carried: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:

@@ -178,7 +178,7 @@ def _positions(
             if scene.analysis.kind == "static":
                 state = static(of, motion_at, t, near=state, like=shared)
             else:
-                state = deflection_in_motion(of, motion_at, time=t, like=shared)
+                state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
         except NoBalanceError:
             raise SolveError(_unbalanced(scene, motion)) from None
         if isinstance(solver, CorotationalSteps):

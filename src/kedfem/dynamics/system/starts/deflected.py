@@ -21,7 +21,7 @@ from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, held_body
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
 from kedfem.dynamics.system.starts.start import as_coordinates, begun
 from kedfem.errors import SolveError
@@ -52,14 +52,16 @@ class NoBalanceError(SolveError):
 
 
 def quasi_static(
-    of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0, like: Instant | None = None
-) -> State:
+    of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0,
+    near: State | None = None, like: Instant | None = None,
+) -> State:  # fmt: skip
     """The state at a time with the deflection that its links have as they move on without vibrating.
 
     Parameters
     ----------
     motion_at : rigid-body motion at given times; of a system with a drive over a step from `time` on
     rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
+    near : a state before, from which turns are counted on
     like : another instant, with what does not depend on time
 
     Raises
@@ -67,7 +69,7 @@ def quasi_static(
     NoBalanceError
         If no deflection is found.
     """
-    now = Instant(of, motion_at, time, like)
+    now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     if not now.motion.drives.shape[1]:
         return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
     u, v = _moving(now, motion_at)
@@ -83,7 +85,7 @@ def static(
     Parameters
     ----------
     forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
-    near : a state whose deflection the search begins with; none if not given
+    near : a state whose deflection the search begins with, and from which turns are counted on; none if not given
     like : another instant, with what does not depend on time
 
     Raises
@@ -91,7 +93,7 @@ def static(
     NoBalanceError
         If no balance is found: as of a link that hangs, and is not held.
     """
-    now = Instant(of, motion_at, time, like)
+    now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
     try:
@@ -155,6 +157,7 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
             guess = u[k]
             if again == 0 and k:  # joints are closed in all before, and so in what these go on to
                 guess = AHEAD[k] @ u[:k]
+                now.near = turned(instants[k - 1], instants[k - 1].interface(u[k - 1]))
             z1 = now.interface(v[k]) if again else None
             u[k] = _balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
@@ -313,5 +316,5 @@ class _Held:
     def _momentum(self, k: int, S: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
         """M S u of body k; the mass of dense ones is one."""
         link = self.now.of.system.model.links[k]
-        turned = np.asarray(S[: link.d, : link.d] @ u[own(self.now.of, k)].reshape(link.d, -1)).ravel()
-        return momentum(link, turned) if self.sparse[k] else turned
+        along = np.asarray(S[: link.d, : link.d] @ u[own(self.now.of, k)].reshape(link.d, -1)).ravel()
+        return momentum(link, along) if self.sparse[k] else along

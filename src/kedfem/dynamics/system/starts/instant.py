@@ -67,10 +67,19 @@ class Instant:
     Parameters
     ----------
     like : another of the same system: what does not depend on time is taken from there
+    near : (terms,) angles of all terms to within half a turn, as of a state shortly before; none: near zero
     """
 
-    def __init__(self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None) -> None:
+    def __init__(
+        self,
+        of: Ready,
+        motion_at: Motion,
+        time: float,
+        like: "Instant | None" = None,
+        near: Flat | None = None,
+    ) -> None:
         motion = motion_at(np.array([time]))
+        self.near = near
         self.of, self.time, self.motion = of, time, motion
         along = driving(of, motion)
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
@@ -102,6 +111,8 @@ class Instant:
     def coordinates(self, z: Float[np.ndarray, "3 k"]) -> Float[np.ndarray, "3 r"]:
         """Coordinates of all constraints less what drives ask, with their rates."""
         e = coordinates(self.of.system, self.at, z)
+        if self.near is not None:
+            e[0] += self._whole_turns(z[0])
         for n, each in enumerate(self.of.system.constraints):
             drive = getattr(each.law, "drive", -1)
             if drive >= 0 and not each.linear:
@@ -109,6 +120,16 @@ class Instant:
                 if each.terms[0].kind == ANGLE:
                     e[0, n] -= TURN * np.round(e[0, n] / TURN)
         return e
+
+    def _whole_turns(self, z: Flat) -> Float[np.ndarray, " r"]:
+        """What coordinates gain by the whole turns that their terms have made; none where they are linear in z."""
+        system, out, place = self.of.system, np.zeros(len(self.of.system.constraints)), 0
+        more = turned(self, z) - term_values(system, self.at, z)
+        for n, each in enumerate(system.constraints):
+            for term in each.terms:
+                out[n] += 0.0 if each.linear or term.kind != ANGLE else term.factor * more[place]
+                place += 1
+        return out
 
     def gradients(self, z: Flat) -> Float[np.ndarray, "r k"]:
         """Of all coordinates by z."""
@@ -188,12 +209,12 @@ def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
 
 
 def turned(now: Instant, z: Flat) -> Flat:
-    """Angles of all terms, within half a turn of zero; of drives of what these ask."""
+    """Angles of all terms, within half a turn of what they are near; of drives of what these ask."""
     found = term_values(now.of.system, now.at, z)
-    near, place = np.zeros(len(found)), 0
+    near, place = np.zeros(len(found)) if now.near is None else now.near.copy(), 0
     for each in now.of.system.constraints:
         drive = getattr(each.law, "drive", -1)
-        near[place] = now.motion.drives[0, drive] if drive >= 0 else 0.0
+        near[place] = now.motion.drives[0, drive] if drive >= 0 else near[place]
         place += len(each.terms)
     angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
     return np.asarray(np.where(angles, found + TURN * np.round((near - found) / TURN), 0.0))

@@ -1,0 +1,72 @@
+"""Turns that are counted from one time point to the next: laws over an angle know it only to within half a turn."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.path import Path, place_on
+from kedfem.scene import AngleLimit, Scene, TorsionSpring, corotational, path_parameter, time_grid
+
+MOST = 0.9 * np.pi  # between two time points [rad]: below half a turn, so that elastic motion does not matter
+
+
+def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
+    """Refuse time points between which a joint turns so far that nobody can tell which way, where a law counts turns.
+
+    Raises
+    ------
+    MotionError
+    """
+    if link.drive is None:
+        return
+    counting = sorted(set(_counting(scene)))
+    grid = time_grid(scene)
+    tau = path_parameter(scene, grid.step * np.arange(grid.steps + 1 if counting else 1))[0]
+    faults = []
+    for where, joint in counting:
+        most = float(np.abs(np.diff(turn_of(scene, link, along, joint, tau))).max(initial=0.0))
+        if most > MOST:
+            faults.append(
+                f"{where}: joint {joint!r} must turn by less than {np.degrees(MOST):.0f} deg between time points, so "
+                f"that its turns can be counted, got {np.degrees(most):.4g} deg: take {most / MOST:.2g} times as many"
+            )
+    if faults:
+        raise MotionError("\n".join(faults))
+
+
+def _counting(scene: Scene) -> Iterator[tuple[str, str]]:
+    """What counts turns of joints, by place, and these: laws, and with co-rotational frames gears and threads."""
+    for name, spring in scene.springs.items():
+        if isinstance(spring, TorsionSpring):
+            yield f"springs.{name}", spring.joint
+    for name, motor in scene.motors.items():
+        if motor.torque is not None:
+            yield f"motors.{name}", motor.joint
+    for name, limit in scene.limits.items():
+        if isinstance(limit, AngleLimit):
+            yield f"limits.{name}", limit.joint
+    if corotational(scene):
+        for name, gear in scene.gears.items():
+            yield from (
+                (f"gears.{name}", joint) for joint in gear.joints if scene.joints[joint].kind != "prismatic"
+            )
+        yield from ((f"joints.{name}", name) for name, joint in scene.joints.items() if joint.kind == "screw")
+
+
+def turn_of(
+    scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"]
+) -> Float[np.ndarray, " T"]:
+    """Turn of a joint about its axis at places of the path, counted along it [rad]; its grid is fine enough for that."""
+    joint = scene.joints[name]
+    i, j = (link.bodies.index(each) for each in moving_pair(joint)[:2])
+    b = joint_axis(joint)
+    a = perpendiculars(b)[0]
+    u, x, y = along.R[:, i] @ a, along.R[:, j] @ a, along.R[:, j] @ np.cross(b, a)
+    turn = np.unwrap(np.arctan2((u * y).sum(axis=1), (u * x).sum(axis=1)))
+    k, s, turns = place_on(along, tau)
+    there = np.minimum(k + 1, len(turn) - 1)
+    return np.asarray(turn[k] + s * (turn[there] - turn[k]) + turns * (turn[-1] - turn[0]))
