@@ -35,7 +35,7 @@ def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> 
     if kind == "slot" and plane and set(partners) == {"rigid", "bare"}:
         return "links: must hold a link that the drive does not simply carry along"
     if bare == 2 or (bare and partners[1] == "ground" and kind != "prismatic"):
-        return r"links\.[\w ]+\.shape: is required for a rigid link that is not a slider"
+        return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
     if bare and partners[1] != "ground" and (driven or kind not in SHARED):
         return rf"joints\.J\.links: must join links with a shape by a {kind} joint .* a rigid slider"
     beside = {"plane", "ground", "bare"}

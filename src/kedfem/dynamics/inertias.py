@@ -29,6 +29,7 @@ from kedfem.scene import (
     Scene,
     inertia_tensor,
     load_factor,
+    moving_grounds,
 )
 
 Vector = Float[np.ndarray, "3"]
@@ -147,6 +148,8 @@ def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link])
             _add_body(out, scene, linkage, each)
     bare = [name for name in scene.links if name not in links and slider_axis(scene, name) is None]
     _add_forces(out, scene, linkage, bare)
+    for name, hub in moving_grounds(scene).items():
+        out.add(linkage.bodies.index(name), scene.links[name].mass, np.asarray(scene.joints[hub].at))
     _add_sliders(out, scene, linkage)
     return out
 

@@ -14,6 +14,7 @@ from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis, slide
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.joints.slots import slot_ways
 from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
+from kedfem.dynamics.moving_ground import moving_ground
 from kedfem.dynamics.rigid_links import made_rigid
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import MeshError, SceneError
@@ -42,6 +43,7 @@ from kedfem.scene import (
     RigidBody,
     Scene,
     inertia_tensor,
+    moving_grounds,
     rayleigh,
 )
 from kedfem.scene.capabilities import SLIDERS
@@ -147,13 +149,15 @@ def elastic_model(
         for key, part in zip(keys(name, link), link.parts, strict=True)
     }
     links = with_stiff_ports(scene, links)
+    ground = moving_grounds(scene)
+    links |= {name: moving_ground(scene, name, hub) for name, hub in ground.items()}
     for key, body in scene.bodies.items():
-        if body.link in cut:
+        if body.link in cut or body.link in ground:
             on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     carried = tuple(
-        PrescribedBody(rigid(links.pop(name)), linkage.bodies.index(name), hub, ())
-        for name in list(cut) if (hub := hub_of(scene, name)) is not None
+        PrescribedBody(_prescribed(links.pop(name)), linkage.bodies.index(name), hub, ())
+        for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
         raise SceneError(
@@ -198,10 +202,17 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
     ]
 
 
+def _prescribed(link: Link) -> Link:
+    """A rigid link, or a moving part of the ground, which is one already."""
+    return link if link.rigid else rigid(link)
+
+
 def hub_of(scene: Scene, name: str) -> str | None:
-    """The driven joint by which a link, if it is rigid, turns on the ground with a drive."""
+    """The driven joint by which a link, if it is rigid, turns on the ground with a drive; that of a moving ground."""
     if scene.links[name].fidelity != "rigid":
         return None
+    if name in (ground := moving_grounds(scene)):
+        return ground[name]
     driven = (x for x in scene.driven_joints if name in scene.joints[x].links and not needs_rows(scene, x))
     return next(driven, None)
 

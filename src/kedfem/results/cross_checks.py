@@ -1,8 +1,9 @@
 """Two independent accounts of one effort, compared over a run: elastic against rigid links, drives against energy.
 
-They cost a few sums a step. Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over
-a run has no mean and nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r tell of an
-effort that is missing, or counted twice, not of one that swings.
+They cost a few sums a step; where motions are free, which rigid links hold as drawn, there is nothing to compare.
+Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over a run has no mean and
+nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r tell of an effort that is missing,
+or counted twice, not of one that swings.
 """
 
 from collections.abc import Collection, Sequence
@@ -116,7 +117,9 @@ class CrossChecks:
             _Pair(name, rigid, [list(each.columns).index(x) for x in known[rigid].columns], each.unit)
             for name, each in known.items()
             for rigid in [_rigid_name(name)]
-            if rigid in known and "without what is along" not in known[rigid].description
+            if rigid in known
+            and "without what is along" not in known[rigid].description
+            and not linkage.mobility
         ]
         self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
         self.account = account

@@ -105,9 +105,15 @@ def _hub(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) ->
     told = [all(_small(_loose(model, *x)[which]) for x in others) for which in (0, 1)]
     rows = [known(model, name) for name in _row_joints_of(scene, model, carried)]
     told = [told[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
-    label = f"of joint {carried.hub} on link {carried.link.name} from ground"
+    label = f"of joint {carried.hub} on link {carried.link.name} from {_partner(scene, carried)}"
     channels = enumerate(_force_and_moment(carried.hub, label))
     return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if told[k]]
+
+
+def _partner(scene: Scene, carried: PrescribedBody) -> str:
+    """What a prescribed body's driven joint holds it on: the ground, or a moving part of it."""
+    first, second = scene.joints[carried.hub].links
+    return second if first == carried.link.name else first
 
 
 Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
@@ -131,6 +137,10 @@ def _hub_wrench(
         if link.name in joint.links and elastic and name not in sliding:
             held.append((_holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(_wrench(model, *each, forces), each[2]) for each in held]
+    riders = [
+        (x, *_hub_wrench(scene, model, x, forces)) for x in model.carried if _partner(scene, x) == link.name
+    ]
+    held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
         F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
@@ -143,6 +153,10 @@ def _hub_wrench(
             f, m = other(block)
             force = force + f
             moment = moment + m + cross((R @ (at - hub)), f)
+        for rider, on_rider, _ in riders:
+            f, m = on_rider(block)
+            place = block.motion.p[:, rider.body] + block.motion.R[:, rider.body] @ scene.joints[rider.hub].at
+            force, moment = force + f, moment + m + cross(place - centre, f)
         for name in sliding:
             f, m, point = forces.rows.wrench(name, block)
             sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
@@ -321,23 +335,40 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     if any(row.name == driven for row in model.rows):
         return [_row_drive(scene, model, driven, forces)]
     joint = scene.joints[driven]
+    carried = next((x for x in model.carried if x.hub == driven), None)
+    if carried is not None:
+        return _hub_drive(scene, model, carried, forces)
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
-    channel = Channel(
-        f"drive/{_of_several(scene, driven)}torque",
-        ("torque",),
-        "N m",
-        "world",
-        f"torque of the drive on link {name}",
-    )
-    carried = next((x for x in model.carried if x.link.name == name), None)
-    if carried is None:
-        wrench = _wrench(model, _holder(model, name, driven), driven, at, forces)
-    else:
-        wrench, others = _hub_wrench(scene, model, carried, forces)
-        if not all(_small(_loose(model, *each)[1] @ axis) for each in others):
-            return []
+    wrench = _wrench(model, _holder(model, name, driven), driven, at, forces)
+    channel = _drive_channel(scene, driven, name)
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
+
+
+def _hub_drive(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) -> list[Recorded]:
+    """Torque, of a slide force, of the drive that moves a prescribed body, on the joint's first link, along its axis."""
+    joint, partner = scene.joints[carried.hub], _partner(scene, carried)
+    axis, which = joint_axis(joint), 0 if joint.kind == "prismatic" else 1
+    wrench, others = _hub_wrench(scene, model, carried, forces)
+    if not all(_small(_loose(model, *each)[which] @ axis) for each in others):
+        return []
+    on = next(link for link in joint.links if link != GROUND)
+    sign = 1.0 if on == carried.link.name else -1.0
+    bodies = {x.link.name: x.body for x in model.carried}
+
+    def along(block: Block) -> Rows:
+        direction = block.motion.R[:, bodies.get(partner, 0)] @ axis
+        return np.asarray(sign * (wrench(block)[which] * direction).sum(axis=1, keepdims=True))
+
+    return [Recorded(_drive_channel(scene, carried.hub, on), along)]
+
+
+def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
+    """What the drive of a joint exerts on its first link."""
+    slide = scene.joints[driven].kind == "prismatic"
+    quantity, unit = ("force", "N") if slide else ("torque", "N m")
+    text = f"{quantity} of the drive on link {on}"
+    return Channel(f"drive/{_of_several(scene, driven)}{quantity}", (quantity,), unit, "world", text)
 
 
 def _of_several(scene: Scene, driven: str) -> str:
@@ -362,14 +393,7 @@ def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recor
     on = next(link for link in joint.links if link != GROUND)
     sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
     number = [each.name for each in model.rows].index(driven)
-    quantity, unit = ("force", "N") if slide else ("torque", "N m")
-    channel = Channel(
-        f"drive/{_of_several(scene, driven)}{quantity}",
-        (quantity,),
-        unit,
-        "world",
-        f"{quantity} of the drive on link {on}",
-    )
+    channel = _drive_channel(scene, driven, on)
 
     def along(block: Block) -> Rows:
         if block.exerted is not None:

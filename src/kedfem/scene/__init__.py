@@ -2,7 +2,17 @@
 
 from kedfem.scene.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.damping import Damping, rayleigh
-from kedfem.scene.drives import ConstantSpeed, Cycloidal, Drive, Gear, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.drives import (
+    ConstantSpeed,
+    Cycloidal,
+    Drive,
+    Gear,
+    Harmonic,
+    MotionLaw,
+    Polynomial,
+    Ramp,
+    Table,
+)
 from kedfem.scene.faces import ChosenFace
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import corotational, corotational_links, link_frames
@@ -25,7 +35,7 @@ from kedfem.scene.loads import (
 )
 from kedfem.scene.materials import Material
 from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
-from kedfem.scene.moving_joints import by_constraint_equations
+from kedfem.scene.moving_joints import by_constraint_equations, moving_grounds
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import face_from, link_from, material_from, read_keys, read_scene, scene_from
@@ -60,6 +70,7 @@ __all__ = [
     "ForceCurve",
     "ForceLoad",
     "Gear",
+    "Harmonic",
     "Hole",
     "InitialMotion",
     "Joint",
@@ -112,6 +123,7 @@ __all__ = [
     "link_from",
     "load_factor",
     "material_from",
+    "moving_grounds",
     "part_geometry",
     "path_parameter",
     "rayleigh",
@@ -123,4 +135,4 @@ __all__ = [
     "time_grid",
     "turn_steps",
     "without_vibration",
-]  # fmt: skip
+]

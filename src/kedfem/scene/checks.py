@@ -16,6 +16,7 @@ from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.faults import either, line, place
 from kedfem.scene.files import sketched
 from kedfem.scene.links import DIRECTED, GROUND, SQUARE
+from kedfem.scene.moving_joints import moving_grounds_of
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.wording import shown, unknown_name
 
@@ -86,6 +87,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
     """A rigid link without a shape that is not a slider, or keys of an elastic one."""
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
+    slides = slides or link.name in moving_grounds_of(parts)
     if link.has("shape"):
         if not link.has("material"):
             yield link.fault("material", "is required for a rigid link with a shape, got nothing")
@@ -94,7 +96,10 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
             yield link.fault("mass", f"must be given for a rigid slider only [kg], {got}")
     else:
         if not slides and not sketched.get():
-            wanted = "is required for a rigid link that is not a slider (a prismatic joint to the ground)"
+            wanted = (
+                "is required for a rigid link that is neither a slider (a prismatic joint to the ground) nor a "
+                "moving part of the ground (held by a driven joint alone)"
+            )
             yield link.fault("shape", f"{wanted}, got nothing")
         if sketched.get() and not rides and link.record is not None and link.record.mass:
             got = f"got {link.record.mass:.6g} without a prismatic joint"

@@ -11,6 +11,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Fault, FileName, Record, refuse
+from kedfem.scene.damping import Frequency
 from kedfem.scene.units import Angle, Duration, Length, Number, PositiveTime, Quantity, Time
 
 TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
@@ -98,7 +99,7 @@ class Table(Record):
 
 
 class _Rise(Record):
-    """What laws that rise and return share."""
+    """What laws share that move by an angle or a travel: how far."""
 
     angle: Angle | None
     travel: Length | None
@@ -155,7 +156,23 @@ class Polynomial(_Rise):
     """duration of the dwell after the return, before it all repeats"""
 
 
-MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial, Field(discriminator="kind")]
+class Harmonic(_Rise):
+    """Swings, from the reference position on: φ = φ0 (sin(2π f t + α) − sin α)."""
+
+    kind: Literal["harmonic"] = "harmonic"
+    angle: Angle | None = None
+    """the amplitude φ0"""
+    travel: Length | None = None
+    """the amplitude of a prismatic joint, instead of an angle"""
+    frequency: Frequency
+    """f"""
+    phase: Angle = 0.0
+    """α: 0 begins at full speed, `"-90 deg"` at rest"""
+
+
+MotionLaw = Annotated[
+    ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")
+]
 
 
 ShaftStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.loads import Factor
 
 if TYPE_CHECKING:
@@ -48,6 +48,10 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
             return spline(motion, t)
         case Cycloidal() | Polynomial():
             return rise_dwell(motion, t)
+        case Harmonic(frequency=f):
+            w, a = 2 * np.pi * f, motion.height
+            sine, cosine = np.sin(w * t + motion.phase), np.cos(w * t + motion.phase)
+            return a * (sine - np.sin(motion.phase)), a * w * cosine, -a * w**2 * sine
         case None:
             return np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
 

@@ -89,11 +89,12 @@ class LinkScene(Record):
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
-    """its shape; not for a rigid slider"""
+    """its shape; not for a rigid slider or a moving part of the ground"""
     step: FileName | None = None
     """a CAD file (STEP, IGES or BREP): short for `shape = { kind = "cad", file = … }`"""
     mass: Mass = 0.0
-    """mass of a rigid slider (a rigid link without a shape)"""
+    """mass of a rigid link without a shape: a slider, or a part of the ground that drives alone move (no other joint
+    holds it), which these bear"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Element | None = None

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
 from kedfem.scene.drives import Drive
 from kedfem.scene.links import GROUND, Joint
 from kedfem.scene.parts import Entry, Parts
+
+if TYPE_CHECKING:
+    from kedfem.scene.scene import Scene
 
 SHARED = (
     "revolute",
@@ -32,3 +38,69 @@ def moving_joints(parts: Parts) -> list[Entry]:
     drives = {drive.word("joint"): drive.record for drive in parts.all_drives if drive.record is not None}
     good = [joint for joint in parts.joints.values() if joint.record is not None]
     return [joint for joint in good if by_constraint_equations(joint.record, drives.get(joint.name))]
+
+
+def moving_grounds(scene: Scene) -> dict[str, str]:
+    """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint.
+
+    One that slides on the ground and whose other joints all share points is a slider instead: its mass rides on a link.
+    """
+    shapeless = {
+        name for name, link in scene.links.items() if link.fidelity == "rigid" and link.shape is None
+    }
+    return dict(_moved_by_drives(shapeless, scene.joints, scene.driven_joints)) if shapeless else {}
+
+
+def moving_grounds_of(parts: Parts) -> dict[str, str]:
+    """The same of a scene under validation, as far as its joints and drives are good."""
+    shapeless = {
+        link.name
+        for link in parts.links.values()
+        if link.word("fidelity") == "rigid" and not link.has("shape")
+    }
+    joints = {joint.name: joint.record for joint in parts.joints.values() if joint.record is not None}
+    drives = {
+        str(drive.word("joint")): drive.record for drive in parts.all_drives if drive.record is not None
+    }
+    return dict(_moved_by_drives(shapeless, joints, drives)) if shapeless else {}
+
+
+def _moved_by_drives(
+    shapeless: set[str], joints: Mapping[str, Joint], drives: Mapping[str, Drive]
+) -> Iterator[tuple[str, str]]:
+    """Links that are held by one driven joint, on the ground or on another such link, nearest to the ground first."""
+    known, left = {GROUND}, dict.fromkeys(shapeless)
+    while left:
+        found = [(name, hub) for name in left if (hub := _hub(name, known, shapeless, joints, drives))]
+        if not found:
+            return
+        for name, hub in found:
+            known.add(name)
+            del left[name]
+            yield name, hub
+
+
+def _hub(
+    name: str, known: set[str], shapeless: set[str], joints: Mapping[str, Joint], drives: Mapping[str, Drive]
+) -> str:
+    """The driven joint that moves a link without a shape, "" if other joints hold it or there is none."""
+    own = {key: joint for key, joint in joints.items() if name in joint.links}
+    inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]
+    if len(inner) != 1 or (drive := drives.get(inner[0])) is None:
+        return ""
+    hub = own[inner[0]]
+    if (
+        hub.kind not in ("revolute", "prismatic")
+        or hub.bushing is not None
+        or drive.shaft_stiffness is not None
+    ):
+        return ""
+    if hub.kind == "prismatic" and GROUND in hub.links:
+        others = {
+            key: joint for key, joint in own.items() if key != inner[0] and not shapeless >= set(joint.links)
+        }
+        if others and not any(
+            by_constraint_equations(joint, drives.get(key)) for key, joint in others.items()
+        ):
+            return ""
+    return inner[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kedfem.scene.analysis import WITHOUT_VIBRATION
-from kedfem.scene.drives import ConstantSpeed, Cycloidal, MotionLaw, Polynomial, Ramp
+from kedfem.scene.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp
 from kedfem.scene.laws import drive_angle
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def cycle(motion: MotionLaw | None) -> float | None:
         return 2.0 * math.pi / abs(motion.speed) if motion.speed else None
     if isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is not None:
         return motion.rise + motion.dwell + motion.return_time + motion.dwell_after
-    return None
+    return 1.0 / motion.frequency if isinstance(motion, Harmonic) else None
 
 
 def without_vibration(scene: Scene) -> bool:

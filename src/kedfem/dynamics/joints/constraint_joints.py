@@ -19,7 +19,7 @@ from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import unit
 from kedfem.motion.newton import cross_matrix
-from kedfem.scene import GROUND, Joint, Scene, by_constraint_equations
+from kedfem.scene import GROUND, Joint, Scene, by_constraint_equations, moving_grounds
 
 Ports = Float[np.ndarray, "p 3"]
 
@@ -76,7 +76,10 @@ class ConstraintJoint:
 
 def needs_rows(scene: Scene, name: str) -> bool:
     """Whether a joint is enforced by constraint equations: where shared port points cannot say what it holds."""
-    return by_constraint_equations(scene.joints[name], scene.driven_joints.get(name))
+    driven = scene.driven_joints.get(name)
+    if driven is not None and name in moving_grounds(scene).values():
+        return False
+    return by_constraint_equations(scene.joints[name], driven)
 
 
 def ordered(joint: Joint) -> tuple[str, str]:

@@ -11,14 +11,18 @@ from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.motion.linkage import joint_axis
-from kedfem.scene import GROUND, Scene
+from kedfem.scene import GROUND, Scene, moving_grounds
 
 T = TypeVar("T")
 
 
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
-    if scene.links[name].fidelity != "rigid" or scene.links[name].shape is not None:
+    if (
+        scene.links[name].fidelity != "rigid"
+        or scene.links[name].shape is not None
+        or name in moving_grounds(scene)
+    ):
         return None
     guide = slider_guide(scene, name)
     return joint_axis(scene.joints[guide]) if guide else None

@@ -156,6 +156,11 @@ class Supports:
             for name in (name for name, joint in self.scene.joints.items() if both == set(joint.links)):
                 f, t = self.of_joint(k, name, centre)
                 force, moment = force + f, moment + t
+        for rider in self.of.system.model.carried:
+            if rider is not carried and carried.link.name in self.scene.joints[rider.hub].links:
+                f, t = self.hub(rider)
+                arm = self.place(rider.body, np.asarray(self.scene.joints[rider.hub].at)) - centre
+                force, moment = force + f, moment + t + cross(arm, f)
         return force, moment
 
     def effort(self, name: str) -> Float[np.ndarray, " T"]:
@@ -175,7 +180,13 @@ class Supports:
             centre = self.place(own[0][1], np.asarray(joint.at))
             force, moment = np.sum([self.of_joint(k, name, centre) for k, _ in own], axis=0)
             wrench = (force, moment)
-        return np.asarray(wrench[0 if joint.kind == "prismatic" else 1] @ joint_axis(joint))
+        return np.asarray((wrench[0 if joint.kind == "prismatic" else 1] * self._axis(name)).sum(axis=1))
+
+    def _axis(self, name: str) -> Vectors:
+        """Direction of a joint in its second link, which may be a moving part of the ground."""
+        bodies = {x.link.name: x.body for x in self.of.system.model.carried}
+        turned = bodies.get(self.scene.joints[name].links[1], 0)
+        return np.asarray(self.motion.R[:, turned] @ joint_axis(self.scene.joints[name]))
 
 
 def supports(of: Ready, scene: Scene, history: History, motion: RigidMotion) -> Supports:

@@ -1,0 +1,38 @@
+"""Moving parts of the ground: rigid links without a shape that drives alone move, as links of no mass for the model."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kedfem.links.bodies import with_body
+from kedfem.links.surfaces.coupling_surfaces import rigid_seat
+from kedfem.links.record import Link
+from kedfem.links.reduced import rigid
+from kedfem.links.solid import solid_link
+from kedfem.mesh import link_mesh
+from kedfem.scene import Bar, LinkScene, Material, Scene
+
+EDGE = 0.02  # of the cube that is drawn for one, of the extent of all joints; nothing is computed from it
+ANY = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.0)
+
+
+def moving_ground(scene: Scene, name: str, hub: str) -> Link:
+    """The record of a moving part of the ground: a cube at its driven joint, of its own mass there and no other.
+
+    Parameters
+    ----------
+    hub : the driven joint
+    """
+    at = np.asarray(scene.joints[hub].at, float)
+    edge = EDGE * (float(np.ptp([joint.at for joint in scene.joints.values()], axis=0).max()) or 1.0)
+    x, y, z = at.tolist()
+    ends = ((x - edge / 2, y, z), (x + edge / 2, y, z))
+    cube = LinkScene(fidelity="rigid", material="any", shape=Bar(between=ends, width=edge, thickness=edge))
+    link = rigid(solid_link(name, link_mesh(name, cube, Path()), ANY, np.eye(3)))
+    none = np.zeros((link.n, link.n))
+    massless = replace(
+        link, mass=(none,) * 3, m1=np.zeros_like(link.m1), mX=np.zeros_like(link.mX), volume=np.zeros(link.n)
+    )
+    mass = scene.links[name].mass
+    return with_body(massless, rigid_seat(massless, at), mass, at, np.zeros((3, 3))) if mass else massless
