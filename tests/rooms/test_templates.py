@@ -1,16 +1,19 @@
 """What `kedfem new` writes, run, beside statics by hand: virtual work, weights and levers."""
 
+import itertools
 import tomllib
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.analysis import analyse
 from kedfem.results import Results
 from kedfem.scene import scene_from
+from kedfem.scene.units import si_number
 
 G = 9.81
 STEEL, ALUMINIUM = 7850.0, 2700.0  # kg/m³, of the materials that scenes know by name
@@ -92,3 +95,143 @@ def test_the_drives_of_a_robot_hold_its_weights(tmp_path: Path) -> None:
             value = found.channels[f"drive/{name}/torque"][1][row, 0]
             assert_allclose(abs(value), torque, rtol=tolerance)
         assert abs(found.channels["drive/turn/torque"][1][row, 0]) < 0.05 * about_shoulder
+
+
+def tube(outer: float, wall: float) -> float:
+    """Area [m²]."""
+    return float(np.pi * (outer**2 - (outer - 2 * wall) ** 2) / 4)
+
+
+def test_the_strut_of_a_wishbone_bears_the_wheel_by_its_ratio(tmp_path: Path) -> None:
+    """Virtual work of tyre, strut and weights as the lower arm turns; and both springs follow their laws on the bump."""
+    raw = template("wishbone")
+    points = {k: np.array(v) for k, v in raw["points"].items() if isinstance(v, list)}
+    A, B, C, D, W, T = (points[k] for k in "ABCDWT")
+    S = A + 0.6 * (B - A)
+    found = run(raw, tmp_path, kind="static", initial="rest", end_time=0.05, step=0.025)
+
+    def across(r: np.ndarray) -> np.ndarray:
+        return np.array([-r[1], r[0]])
+
+    beside = D - B
+    turns = np.column_stack(
+        [across(D - C), -across(beside)]
+    )  # of upper arm and upright, per turn of the lower arm
+    upper, upright = np.linalg.solve(turns, across(B - A))
+    wheel = across(B - A) + upright * across(W - B)
+    foot = across(S - A)
+    shortens = foot @ (T - S) / np.linalg.norm(T - S)
+    area, post = (tube(0.04, 0.004), tube(0.028, 0.003)), 0.05 * 0.04
+    sinks = (
+        area[0] * np.linalg.norm(B - A) * (B - A)[0] / 2
+        + area[1] * np.linalg.norm(D - C) * upper * (D - C)[0] / 2
+        + post * np.linalg.norm(W - B) * (across(B - A) + upright * across(W - B) / 2)[1]
+        + post * np.linalg.norm(D - W) * (across(B - A) + upright * across((W + D) / 2 - B))[1]
+    )
+    tyre, strut = (-found.channels[f"springs/{name}/force"][1][:, 0] for name in ("tyre", "strut"))
+    weights = G * (STEEL * sinks + 25 * wheel[1])
+    assert_allclose(strut[0], (tyre[0] * wheel[1] - weights) / shortens, rtol=5e-3)
+    travel = found.channels["probes/wheel/travel"][1]
+    assert_allclose(tyre[-1], 3000 + 2e5 * (0.04 - travel[-1, 1]), rtol=2e-3)  # the road is 40 mm higher
+    length = found.channels["springs/strut/length"][1][:, 0]
+    assert_allclose(strut, 4680 + 4e4 * (np.linalg.norm(T - S) - length), rtol=1e-9)
+
+
+def test_the_cylinders_of_an_excavator_hold_all_beyond_them(tmp_path: Path) -> None:
+    """Q = ∂V/∂θ of the three hinges, and the cylinders' forces by F · ∂l/∂θ = Q."""
+    raw = template("excavator")
+    found = run(raw, tmp_path, kind="static", initial="rest", end_time=2.0, step=2.0)
+    X = {k: np.array(v, float) for k, v in raw["points"].items() if isinstance(v, list)}
+    X["S"] = X["E"] + 0.15 * (X["H"] - X["E"])
+    pairs = (("P", "Q"), ("R", "F"), ("S", "G"))
+    half = [np.linalg.norm(X[b] - X[a]) / 2 for a, b in pairs]
+    barrel, rod = STEEL * tube(0.12, 0.01), STEEL * np.pi * 0.07**2 / 4
+    beams = {"AQKRE": 0.3 * 0.12, "FESH": 0.22 * 0.1, "GHL": 0.1 * 0.08}
+    parts = ((0, "A", "QKREFSHGL"), (1, "E", "FSHGL"), (2, "H", "GL"))
+
+    def placed(theta: np.ndarray) -> dict[str, np.ndarray]:
+        now = dict(X)
+        for k, hinge, beyond in parts:
+            c, s = np.cos(theta[k]), np.sin(theta[k])
+            R = np.array([[c, -s], [s, c]])
+            now |= {name: now[hinge] + R @ (now[name] - now[hinge]) for name in beyond if name != hinge}
+        return now
+
+    def lengths(now: dict[str, np.ndarray]) -> np.ndarray:
+        return np.array([np.linalg.norm(now[b] - now[a]) for a, b in pairs])
+
+    def potential(now: dict[str, np.ndarray]) -> float:
+        V = 1200 * now["L"][1]
+        for line, area in beams.items():
+            for a, b in itertools.pairwise(line):
+                V += STEEL * area * np.linalg.norm(X[b] - X[a]) * (now[a] + now[b])[1] / 2
+        for (a, b), h in zip(pairs, half, strict=True):
+            u = (now[b] - now[a]) / np.linalg.norm(now[b] - now[a])
+            V += barrel * h * (now[a] + u * h / 2)[1] + rod * h * (now[b] - u * h / 2)[1]
+        return float(G * V)
+
+    d = 1e-6 * np.eye(3)
+    Q = np.array([potential(placed(x)) - potential(placed(-x)) for x in d]) / 2e-6
+    ratios = np.array([lengths(placed(x)) - lengths(placed(-x)) for x in d]) / 2e-6
+    force = np.linalg.solve(ratios, Q)
+    names = ("boom", "stick", "bucket")
+    values = [found.channels[f"drive/{name}_cylinder/force"][1][0, 0] for name in names]
+    assert_allclose(values, force, rtol=3e-3)  # elastic links bend by so much
+
+
+def test_the_legs_of_a_stewart_platform_bear_weight_and_inertia(tmp_path: Path) -> None:
+    """Σ F l' = V' + M(z) z'': all legs extend alike, from rest, so that the platform heaves."""
+    raw = template("stewart")
+    found = run(raw, tmp_path, end_time=4e-4, step=4e-4)
+    z, below, above = 0.6, 0.5, 0.35
+    turn = np.radians(40)  # between a leg's ends, seen from above
+    foot = np.array([below, 0, 0])
+    head = np.array([above * np.cos(turn), above * np.sin(turn), z])
+    length = np.linalg.norm(head - foot)
+    u, h = (head - foot) / length, length / 2
+    up = np.array([0, 0, 1.0])
+    rises = u[2]  # dl/dz
+    swings = (up - u * rises) / length  # du/dz
+    barrel, rod = STEEL * tube(0.05, 0.005) * h, STEEL * np.pi * 0.025**2 / 4 * h
+    corners = [np.radians(a) for a in (-50, 50, 70, 170, 190, 290)]
+    ring = np.abs(np.diff(np.exp(1j * np.array(corners)))).sum() * above * 0.04 * 0.02 * ALUMINIUM
+    mass = 200 + ring
+    slope = G * (mass + 6 * (barrel * (swings * h / 2)[2] + rod * (up - swings * h / 2)[2]))
+    inner, outer = swings * h, up - swings * h  # velocities of barrel's and rod's ends in the middle, per z'
+    M = mass + 6 * (barrel / 3 * inner @ inner + rod / 3 * (up @ up + up @ outer + outer @ outer))
+    acceleration = 0.03 * (2 * np.pi) ** 2 / rises
+    forces = [found.channels[f"drive/leg_{k}/force"][1][0, 0] for k in range(1, 7)]
+    assert_allclose(np.sum(forces) * rises, slope + M * acceleration, rtol=1e-3)
+
+
+def test_a_valve_opens_by_the_ratio_of_its_rocker(tmp_path: Path) -> None:
+    """F = i (F0 + k i s) with i = 4/3: closed, and 7 mm lifted."""
+    found = run(template("valve_train"), tmp_path, kind="static", initial="rest", end_time=0.004, step=0.004)
+    ratio, lift = 4 / 3, np.array([0, 0.007])
+    expected = ratio * (250 + 3e4 * ratio * lift)
+    assert_allclose(
+        found.channels["drive/rigid_force"][1][:, 0], expected, rtol=5e-3
+    )  # the rocker's arms turn
+    assert_allclose(found.channels["drive/force"][1][:, 0], expected, rtol=1e-2)
+    stem = found.channels["probes/stem_stress/stress"][1][:, 0]
+    assert_allclose(stem, -expected / ratio / (np.pi * 0.003**2), rtol=1e-2)
+
+
+def test_a_panel_ends_on_its_stop_under_what_is_left_of_its_spring(tmp_path: Path) -> None:
+    """k (150° − φ) = K (φ − 90°), and the outer panel straight on: by 2 φ against the inner one."""
+    found = run(template("panel"), tmp_path, step=0.05)
+    k, stop = 0.7, 100.0
+    phi = (k * np.radians(150) + stop * np.radians(90)) / (k + stop)
+    assert_allclose(found.channels["joints/A/angle"][1][-1, 0], -phi, rtol=1e-5)
+    assert_allclose(found.channels["joints/B/angle"][1][-1, 0], 2 * phi, rtol=1e-5)
+    assert_allclose(found.channels["probes/tip/position"][1][-1, 0], 1.6, rtol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["wishbone", "excavator", "valve_train"])
+def test_a_template_starts_as_it_is(kind: str, tmp_path: Path) -> None:
+    """In motion, with its own step and start, for five steps: no warning of its model, and energy is kept."""
+    raw = template(kind)
+    step = si_number(raw["analysis"]["step"], "s")
+    found = run(raw, tmp_path, end_time=5 * step)
+    assert found.status == "complete"
+    assert not [line for line in found.warnings if not line.startswith("estimated error")]

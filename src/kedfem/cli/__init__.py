@@ -20,7 +20,19 @@ from kedfem.processes import end_as_interrupted, interruption_asked
 
 __all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
 
-KINDS = ("four-bar", "slider-crank", "single-arm", "press", "scissor-lift", "robot-arm")
+KINDS = (
+    "four-bar",
+    "slider-crank",
+    "single-arm",
+    "press",
+    "scissor-lift",
+    "excavator",
+    "wishbone",
+    "stewart",
+    "robot-arm",
+    "valve-train",
+    "panel",
+)
 
 app = typer.Typer(
     name="kedfem",
