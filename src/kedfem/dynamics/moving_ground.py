@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from kedfem.links.bodies import with_body
-from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid
 from kedfem.links.solid import solid_link
+from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.mesh import link_mesh
 from kedfem.scene import Bar, LinkScene, Material, Scene
 
