@@ -3,7 +3,8 @@
 import re
 import sys
 from itertools import pairwise
-from pathlib import Path
+from os.path import relpath
+from pathlib import Path, PurePosixPath
 
 from sphinx.application import Sphinx
 from sphinx.util import logging
@@ -49,13 +50,22 @@ html_theme_options = {"navigation_with_keys": True}
 
 
 FETCHED = r"""<(script|img|iframe)[^>]*\ssrc=["'](https?:)?//|<link[^>]*rel=["']stylesheet["'][^>]*["'](https?:)?//"""
-OUTSIDE = {"SECURITY.md": "security.md"}  # pages of the repository's root that the site has under other names
+# what pages link to outside this folder, so that they read on a code host too → the page that the site has for it
+OUTSIDE = {
+    "SECURITY.md": "security",
+    "examples": "gallery/index",
+    "src/kedfem/cli/__init__.py": "reference/command-line",
+    "tests/rooms/bad_scenes.toml": "reference/messages",
+}
+OUTSIDE |= {f"examples/{path.parent.name}/scene.toml": f"gallery/{path.parent.name}" for path in
+            (HERE.parent / "examples").glob("*/scene.toml")}  # fmt: skip
+LINK = re.compile(r"\]\((?:\.\./)*(" + "|".join(map(re.escape, sorted(OUTSIDE, reverse=True))) + r")\)")
 
 
-def _links(_app: Sphinx, _place: object, content: list[str]) -> None:
-    """Links to pages outside this folder lead to those of the site."""
-    for name, page in OUTSIDE.items():
-        content[0] = content[0].replace(f"](../{name})", f"]({page})").replace(f"]({name})", f"]({page})")
+def _links(_app: Sphinx, page: str, content: list[str]) -> None:
+    """Links that leave this folder lead to the pages of the site."""
+    here = PurePosixPath(page).parent
+    content[0] = LINK.sub(lambda found: f"]({relpath(OUTSIDE[found[1]], here)}.md)", content[0])
 
 
 def _fields(_app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
@@ -104,7 +114,7 @@ def setup(app: Sphinx) -> None:
 
     app.connect("config-inited", lambda app, config: write_pages(Path(app.srcdir), Path(app.outdir)))
     app.connect("source-read", _links)
-    app.connect("include-read", lambda app, path, parent, content: _links(app, path, content))
+    app.connect("include-read", lambda app, path, page, content: _links(app, page, content))
     app.connect("build-finished", _offline)
     app.connect("autodoc-process-docstring", _fields, priority=100)
     app.connect("autodoc-process-docstring", _parameters, priority=100)  # before napoleon
