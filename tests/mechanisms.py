@@ -1,20 +1,25 @@
-"""Random mechanisms without a drive: trees of 2 to 12 bodies in space, on the ground or free, some closed to loops.
+"""Random mechanisms: trees of 2 to 12 bodies in space, on the ground or free, without a drive; driven ones of all kinds.
 
-``python -m tests.mechanisms --count 2000`` tries as many.
+``python -m tests.mechanisms --count 2000`` tries as many of the first, with ``--driven rigid-body`` or ``co-rotational``
+of the others (`tests.random_scenes`); ``--first SEED --count 1`` one of them again.
 """
 
 import argparse
 import copy
+import signal
 import sys
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kedfem.errors import SolveError
+from kedfem.accuracy.prepared import moving
+from kedfem.errors import KedfemError, MeshError, MotionError, SolveError
+from kedfem.scene import scene_from
 from tests.cells import apart, as_a_run, run_of
-from tests.moving import beam_in_space, turned
+from tests.moving import beam_in_space, channels, ran, turned
 from tests.partners import joint
+from tests.random_scenes import driven
 from tests.spatial_joints import rigid_in_space
 from tests.systems import Begun, begun, by_oracle, marched, rows
 
@@ -118,18 +123,92 @@ def outcome(seed: int, most: int = 12) -> tuple[str, dict[str, float]]:
     return "fine" if all(x < WITHIN[key] for key, x in found.items()) else "differs", found
 
 
+# -- driven ones ---------------------------------------------------------------------------------------------
+
+STIFFER, LIMIT, SECONDS = 3.0, 1e-3, 60.0
+#: drawn at random, some lock, or have a slot too short, or one that turns too far
+NO_MECHANISM = (MotionError, MeshError)
+
+
+def stiffer(raw: Raw, factor: float) -> Raw:
+    """A scene whose elastic links and bushings are stiffer by a factor; not its springs, which act as they do."""
+    raw = copy.deepcopy(raw)
+    for link in raw["links"].values():
+        link["material"] = "steel" if link["fidelity"] == "rigid" else "elastic"
+    raw["materials"] = {
+        "elastic": {"youngs_modulus": 2.1e11 * factor, "poisson_ratio": 0.3, "density": 7850.0}
+    }
+    for each in raw["joints"].values():
+        if "bushing" in each:
+            each["bushing"] = {key: x * factor for key, x in each["bushing"].items()}
+    return raw
+
+
+def off_rigid(raw: Raw) -> dict[str, float]:
+    """How far forces and moments of joints, and efforts of drives, are from rigid inverse dynamics, of the largest."""
+    got = channels(*ran(raw))
+    pairs = {}
+    for name, elastic in got.items():
+        head, _, what = name.rpartition("/")
+        rigid = got.get(f"{head}/rigid_{what}")
+        if rigid is not None and rigid.shape == elastic.shape:
+            pairs[name] = elastic, rigid
+    arm = 0.15  # m, the length of a link
+    unit = {name: 1.0 if name.endswith("force") else arm for name in pairs}
+    largest = max(
+        (float(np.abs(rigid).max()) / unit[name] for name, (_, rigid) in pairs.items()), default=1.0
+    )
+    return {name: float(np.abs(e - r).max()) / unit[name] / largest for name, (e, r) in pairs.items()}
+
+
+def limit(seed: int, frames: str, most: int = 6) -> tuple[str, dict[str, float]]:
+    """Whether a driven mechanism of nearly rigid links has the forces of rigid ones, and how far it is from that.
+
+    Two independent ways: multipliers of the rigid linkage's equations, and the balance of elastic links.
+    """
+    raw = stiffer(driven(seed, most, frames), STIFFER)
+    try:
+        moving(scene_from(raw))
+        found = off_rigid(raw)
+    except NO_MECHANISM:
+        return "no mechanism", {}
+    except KedfemError as error:
+        return f"refused: {error}", {}
+    return "fine" if all(x < LIMIT for x in found.values()) else "differs", found
+
+
+def bounded(seed: int, given: argparse.Namespace) -> tuple[str, dict[str, float]]:
+    """What becomes of a mechanism within so much processor time."""
+    signal.signal(signal.SIGPROF, _stop)
+    signal.setitimer(signal.ITIMER_PROF, given.seconds)
+    try:
+        return limit(seed, given.driven, min(given.most, 6)) if given.driven else outcome(seed, given.most)
+    except TimeoutError:
+        return "takes too long", {}
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+def _stop(number: int, frame: Any) -> None:
+    raise TimeoutError
+
+
 def main() -> None:
     """Tries mechanisms one after the other."""
     parser = argparse.ArgumentParser(description=__doc__)
     for name, usual in (("count", 200), ("first", 0), ("most", 12)):
         parser.add_argument(f"--{name}", type=int, default=usual)
-    given, count = parser.parse_args(), dict.fromkeys(("fine", "differs", "does not converge"), 0)
+    parser.add_argument("--driven", choices=("rigid-body", "co-rotational"))
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="processor time of one")
+    given = parser.parse_args()
+    count: dict[str, int] = {}
     for seed in range(given.first, given.first + given.count):
-        what, found = outcome(seed, given.most)
-        count[what] += 1
-        raw = mechanism(seed, given.most)
+        what, found = bounded(seed, given)
+        count[what.split(":")[0]] = count.get(what.split(":")[0], 0) + 1
+        raw = driven(seed, min(given.most, 6), given.driven) if given.driven else mechanism(seed, given.most)
         kinds = " ".join(x["kind"] for x in raw["joints"].values())
-        far = ", ".join(f"{key} {x:.1e}" for key, x in found.items())
+        worst = sorted(found.items(), key=lambda x: -x[1])[:4]
+        far = ", ".join(f"{key} {x:.1e}" for key, x in worst)
         sys.stdout.write(f"{seed}: {len(raw['links'])} bodies, {kinds}: {what} {far}\n")
         sys.stdout.flush()
     sys.stdout.write(f"{count}\n")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
-from tests.mechanisms import as_lists, mechanism, outcome
+from tests.mechanisms import as_lists, limit, mechanism, outcome
 from tests.moving import beam_in_space
 from tests.partners import joint
 
@@ -43,6 +43,20 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
     assert_allclose(omega[1:], np.tile(spin["angular_velocity"], (2, 1)), atol=1e-12)
     at_centre = v[1:] + np.cross(omega[1:], linked.centre)
     assert np.abs(at_centre).max() < 1e-12  # m/s: nothing is asked of it
+
+
+CHEAP = ((113, "rigid-body"), (213, "rigid-body"), (1008, "co-rotational"), (1014, "co-rotational"))
+DEAR = ((1, "rigid-body"), (1006, "co-rotational"))  # gears on a rigid hub; gears, a spring and a rigid link
+
+
+@pytest.mark.parametrize(
+    ("seed", "frames"), [*CHEAP, *(pytest.param(*each, marks=pytest.mark.long) for each in DEAR)]
+)
+def test_forces_of_a_driven_mechanism_tend_to_those_of_rigid_links(seed: int, frames: str) -> None:
+    """Two ways: elastic links three times as stiff as steel, in quasi-static positions, and rigid inverse dynamics."""
+    what, found = limit(seed, frames)
+    assert what == "fine", found
+    assert found
 
 
 def test_mechanisms_are_of_two_to_twelve_bodies() -> None:
