@@ -44,15 +44,15 @@ def keep(measured: dict[str, dict[str, float]]) -> None:
 
 
 def picture(name: str) -> None:
-    """The run's picture of the highest stress, for examples that have no picture in docs/pictures yet."""
+    """The run's picture of the highest stress, in place of an older one in docs/pictures."""
     from PIL import Image
 
     made = ROOT / "examples" / name / "scene-results" / "worst.png"
     place = ROOT / "docs" / "pictures" / f"{name}.png"
-    if made.exists() and not place.exists():
+    if made.exists():
         shown = Image.open(made).convert("RGB")
         shown.thumbnail((1200, 900))
-        shown.quantize(128).save(place, optimize=True)
+        shown.quantize(256).save(place, optimize=True)
 
 
 def main(chosen: list[str]) -> None:
