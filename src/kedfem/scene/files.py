@@ -89,7 +89,8 @@ def _with_names(x: Any, where: Where, of: Callable[[Where, str], str]) -> Any:
 
 def is_step_file(where: Where) -> bool:
     """Whether a key is the CAD file of a link, not the step of an analysis."""
-    return len(where) == 3 and where[0] == "links" and where[2] == "step"
+    inner = where[2:] if where and where[0] == "patterns" else where
+    return len(inner) == 3 and inner[0] == "links" and inner[2] == "step"
 
 
 def inside(folder: Path, name: str | Path) -> bool:

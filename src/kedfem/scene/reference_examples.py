@@ -179,6 +179,23 @@ link = "rocker"
 at = "joints.D"
 inertia = "0.08 kg*m^2"
 ''',
+    "[patterns.NAME]": '''
+[patterns.pendulums]
+count = 3
+turn = "120 deg"                        # about z, if nothing else is said
+centre = ["500 mm", 0]
+points = { P = ["600 mm", 0], Q = ["700 mm", 0] }           # of pendulum_1; those of pendulum_2 are turned by 120°
+
+[patterns.pendulums.links.pendulum]
+material = "steel"
+fidelity = "beam"
+shape = { kind = "bar", between = ["P", "Q"], width = "10 mm", thickness = "10 mm" }
+
+[patterns.pendulums.joints.hinge]
+kind = "revolute"
+links = ["ground", "pendulum"]
+at = "P"
+''',
     "[damping]": '''
 [damping]
 ratio = 0.02                            # of critical damping, at both frequencies

@@ -39,6 +39,7 @@ from kedfem.scene.materials import BUILT_IN, Material
 from kedfem.scene.motors import Motor
 from kedfem.scene.parameters import Parameter, ParameterName, with_expressions
 from kedfem.scene.parts import Parts, scene_parts
+from kedfem.scene.patterns import Pattern, in_patterns, steep_faults, with_patterns
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
@@ -103,6 +104,8 @@ class Scene(Record):
     """forces, beside gravity and inertia"""
     bodies: dict[Name, Body] = Field(default_factory=dict)
     """rigid bodies attached to links"""
+    patterns: dict[Name, Pattern] = Field(default_factory=dict)
+    """tables that are repeated, turned about an axis or shifted; what is stored has them written out"""
     damping: Damping = Damping()
     """damping of the elastic motion"""
     analysis: Analysis
@@ -173,6 +176,8 @@ class Scene(Record):
         if not isinstance(raw, Mapping):
             raise SceneError(f"must be a table of keys, got {raw!r}")
         written, (raw, wrong) = raw, with_expressions(raw, cls)
+        repeated, (raw, more, origins) = raw.get("patterns"), with_patterns(raw, cls)
+        wrong = wrong + more
         given, placement = raw, Placement(raw.get("points"), raw.get("joints"))
         points = {name: placement[name] for name in placement if not name.startswith("joints.")}
         if isinstance(links := raw.get("links"), Mapping):
@@ -193,10 +198,12 @@ class Scene(Record):
             except ValidationError as error:
                 scene, faults = None, faults + fault_lines(error, cls, raw)
             faults += cross_faults(scene_parts(raw, gravity_of(raw), scene_folder.get()))
+        if scene is not None and not faults:
+            faults = steep_faults(scene.links, repeated)
         if scene is None or faults:
             places = {each.partition(": ")[0] for each in wrong}
             rest = [each for each in faults[len(wrong) :] if each.partition(": ")[0] not in places]
-            raise SceneError(list(dict.fromkeys([*wrong, *rest])))
+            raise SceneError(list(dict.fromkeys(in_patterns(each, origins) for each in [*wrong, *rest])))
         if (steps := time_grid(scene).steps) > MOST_STEPS:
             raise SceneError(f"analysis: must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")
         scene._doubts, scene._as_given = tuple(bare_numbers(given, cls)), written
