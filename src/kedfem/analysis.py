@@ -25,28 +25,34 @@ from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.transient import Steps, eased_warning, period_map
 from kedfem.dynamics.vibration import Vibration, vibration
+from kedfem.errors import SceneError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
+from kedfem.motion.period import repeats_after
 from kedfem.output.derived import (
     MESH,
     WORST,
+    fatigue_warning,
     fields,
     peak_warning,
     refuse_foreign,
     write_derived,
     write_vibration,
 )
+from kedfem.output.fatigue_files import write_fatigue
 from kedfem.output.stress_files import Extremes, write_envelope, write_top
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.report import require_report, write_report
-from kedfem.results import Channel, Peak, Results, add_notes, claimed, read_results
-from kedfem.results.additions import add_account, add_peaks, mark_doubtful
+from kedfem.results import Channel, Fatigue, Peak, Results, add_notes, claimed, read_results
+from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_doubtful
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.envelope import Envelope, highest, peaks
+from kedfem.results.fatigue import fatigue_of, kept_since
+from kedfem.results.fatigue_strength import require_fatigue
 from kedfem.results.force_elements import measured_actions
 from kedfem.results.hot_spots import hot_spots
 from kedfem.results.indeterminate import undetermined, undetermined_warning
@@ -54,7 +60,7 @@ from kedfem.results.recording import recording
 from kedfem.results.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
-from kedfem.scene import Scene, without_vibration
+from kedfem.scene import Scene, time_grid, without_vibration
 from kedfem.stepping import Watch, Watched, stepped
 
 T = TypeVar("T")
@@ -121,6 +127,8 @@ def analyse(
         require_parquet("output.parquet")
     if scene.output.report:
         require_report("output.report")
+    if scene.fatigue is not None:
+        require_fatigue("fatigue")
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
@@ -142,6 +150,7 @@ def _analysed(
     """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
+    period = stress_period(scene)
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
@@ -159,14 +168,22 @@ def _analysed(
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready), since)
+    watched = Watched(
+        recorded, untold, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period)
+    )
     envelope, seen, step = clock.timed(
         "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
     )
     balance = None if without_vibration(scene) else account.balance
-    notices += balance_warning(balance, scene.analysis.stiffening) if balance else ()
-    notices += [*efforts.warnings(), *undetermined_warning(untold), *watched.passes.warnings()]
-    notices += [*eased_warning(solvers), *keeper.warnings()]
+    unbalanced = balance_warning(balance, scene.analysis.stiffening) if balance else ()
+    notices += [
+        *unbalanced,
+        *efforts.warnings(),
+        *undetermined_warning(untold),
+        *watched.passes.warnings(),
+        *eased_warning(solvers),
+        *keeper.warnings(),
+    ]
     doubts = doubtful(scene, ready.model, recoveries)
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
@@ -174,10 +191,13 @@ def _analysed(
     found = clock.timed(
         "estimates", lambda: budget(ready, seen, reduction, _in_memory(results, solvers), errors)
     )
-    notices += budget_warning(found, asked)
     step = replace(step, errors=found.step or step.errors)
     steady, grows = _growing(ready, solvers)
-    notices += [*_drawn(ready, recoveries, grows, folder), *steady_warning(steady)]
+    notices += [
+        *budget_warning(found, asked),
+        *_drawn(ready, recoveries, grows, folder),
+        *steady_warning(steady),
+    ]
     notes = attributes(found) | step.notes | (balance_notes(balance) if balance else {})
     notes |= steady.notes if steady else {}
     add_notes(folder / "results.h5", notes)
@@ -186,10 +206,11 @@ def _analysed(
     if why := unstable(steady) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
-    notices += peak_warning(peak := highest(results.peaks))
-    _highest_stresses(scene, folder, results.drive, envelope, doubts)
-    if envelope.worst is not None:
-        write_frame(folder / WORST, envelope.worst.t, fields(scene, ready.model, recoveries, envelope.worst))
+    if period:
+        damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, doubts, period))
+        results = replace(results, fatigue=damaged)
+    notices += [*peak_warning(peak := highest(results.peaks)), *fatigue_warning(results.fatigue)]
+    _stress_files(ready, folder, results.drive, envelope, doubts)
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)
     add_account(folder / "results.h5", notices, clock.seconds)
@@ -223,14 +244,45 @@ def _about_steps(ready: Prepared, clock: "Clock") -> list[str]:
     return [*stability_warning(ready.scene), *resolved, *coarse_steps(ready.scene)]
 
 
-def _highest_stresses(
-    scene: Scene, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]
+def _stress_files(
+    ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]
 ) -> None:
-    """The envelope of stresses, and the top ten of each link."""
-    named = drive_heading(drive)
+    """The envelope of stresses, the top ten of each link, and the frame of the highest of all."""
+    scene, named = ready.scene, drive_heading(drive)
     extremes = Extremes(envelope.links(), envelope.when(), doubts, named)
     write_envelope(folder, extremes, scene.output.csv)
     write_top(folder, hot_spots(extremes.found, extremes.when, doubts), named)
+    if (worst := envelope.worst) is not None:
+        write_frame(folder / WORST, worst.t, fields(scene, ready.model, envelope.recoveries, worst))
+
+
+def stress_period(scene: Scene) -> float:
+    """The time after which stresses repeat, where damage is asked for, else 0 [s].
+
+    Raises
+    ------
+    SceneError
+        The motion does not repeat itself, or the analysis is shorter.
+    """
+    if scene.fatigue is None:
+        return 0.0
+    end = time_grid(scene).end
+    if scene.analysis.kind == "steady":
+        return end
+    period = scene.fatigue.period or repeats_after(scene)
+    if end < period * (1 - 1e-9):
+        raise SceneError(f"fatigue: needs a whole period, {period:.6g} s, got an analysis of {end:.6g} s")
+    return period
+
+
+def _damaged(
+    ready: Prepared, folder: FilePath, envelope: Envelope, doubts: list[list[str]], period: float
+) -> Fatigue:
+    """Damage over the last period, in its files and in that of the results."""
+    found, fields = fatigue_of(ready.scene, ready.model, envelope, doubts, period)
+    write_fatigue(folder, found, fields, ready.scene.output.csv)
+    add_fatigue(folder / "results.h5", found)
+    return found
 
 
 def _mesh_field(strained: Strained, file: FilePath) -> None:

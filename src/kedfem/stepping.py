@@ -62,6 +62,7 @@ class Watched:
     """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses.
 
     stresses_since : time [s] before which they do not count as highest
+    kept_since : time [s] from which on their history is kept
     """
 
     recorded: list[Recorded]
@@ -70,6 +71,7 @@ class Watched:
     recoveries: list[StressRecovery]
     passes: SingularPasses
     stresses_since: float = -np.inf
+    kept_since: float = np.inf
 
 
 def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
@@ -85,7 +87,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     wanted = set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM)
     one = AnimationFile(folder / ONE_FILE, drive_heading(drive_channel(scene))) if _one_file(scene) else None
-    envelope = Envelope(model, watched.recoveries, watched.stresses_since)
+    envelope = Envelope(model, watched.recoveries, watched.stresses_since, watched.kept_since)
     seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]

@@ -97,6 +97,7 @@ SCENES: list[Raw] = [
          "initial_speeds": {"B": 1.0}, "initial_motions": {"arm": {**AT, "velocity": [0, 1]}},
          "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
     changed(BASES["free"], {"analysis/kind": "steady"}),
+    changed(BASES["free"], {"fatigue/materials/steel": {"group": "steel", "tensile_strength": 6e8}}),
     changed(BASES["free"], {"analysis/kind": "quasi-static"}),
     slid("prismatic", analysis={**inverted()["analysis"], "kind": "static", "stiffening": True,
          "extrapolation_levels": 2}),

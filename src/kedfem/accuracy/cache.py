@@ -9,7 +9,7 @@ from kedfem.store import contents
 
 def key(scene: Scene) -> str:
     """A digest of everything in a scene that a plan or a reduced model depends on, the contents of its files too."""
-    said = scene.model_dump(mode="json", exclude={"title"})
+    said = scene.model_dump(mode="json", exclude={"title", "fatigue"})
     said["output"] = said["output"]["probes"]
     digest = sha256(json.dumps(said).encode())
     shapes = (link.shape for link in scene.links.values())

@@ -24,6 +24,7 @@ from kedfem.scene import (
 )
 
 WHOLE = 1e-9  # of a period: how near whole multiples must be
+STEADY, FATIGUE = "analysis.kind = 'steady'", "[fatigue]"  # what asks for a period
 SAME = 1e-6  # of a table's range: how near its end must be to its beginning
 
 
@@ -44,8 +45,7 @@ def over_one_period(scene: Scene) -> Scene:
     base = cycle(scene.motion) or scene.analysis.end_time
     if base is None:
         raise SceneError("analysis.end_time: is required [s], the period of the steady motion, got nothing")
-    rigid = linkage(scene)
-    count, time = _periods(scene, rigid, base)
+    count, time = _periods(scene, linkage(scene), base, STEADY)
     stated, turns = scene.analysis.revolutions, turn_steps(scene) is not None
     if stated is not None and abs(stated - count) > WHOLE * count:
         said = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
@@ -58,6 +58,26 @@ def over_one_period(scene: Scene) -> Scene:
         {"revolutions": float(count), "end_time": None} if turns else {"revolutions": None, "end_time": time}
     )
     return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=keys)})
+
+
+def repeats_after(scene: Scene) -> float:
+    """The time after which linkage, drive and loads are where they were, once the drive has sped up [s].
+
+    Raises
+    ------
+    SceneError
+        Where something does not repeat itself, or only the scene can say after which time.
+    """
+    scene = _sped_up(scene)
+    base = cycle(scene.motion)
+    if base is None:
+        got = (
+            "several drives" if len(scene.driven_joints) > 1 else "one that does not go on turning or return"
+        )
+        raise SceneError(
+            f"fatigue.period: is required [s] but with a drive that repeats its motion, got {got}"
+        )
+    return _periods(scene, linkage(scene), base, FATIGUE)[1]
 
 
 def _sped_up(scene: Scene) -> Scene:
@@ -73,15 +93,15 @@ def _sped_up(scene: Scene) -> Scene:
     return scene.model_copy(update={"drive": scene.drive and later(scene.drive), "drives": drives})
 
 
-def _periods(scene: Scene, rigid: Linkage, base: float) -> tuple[int, float]:
+def _periods(scene: Scene, rigid: Linkage, base: float, asked: str) -> tuple[int, float]:
     """How many times the base the period is, and the period [s]."""
-    faults = list(_never(scene))
+    faults = list(_never(scene, asked))
     if faults:
         raise SceneError(faults)
     along = path(rigid, *_range(scene, base))
     reasons: list[str] = []
     for count in range(1, MOST_TURNS + 1):
-        reasons = list(_open(scene, along, count * base))
+        reasons = list(_open(scene, along, count * base, asked))
         if not reasons:
             return count, count * base
         if cycle(scene.motion) is None:
@@ -99,9 +119,9 @@ def _range(scene: Scene, base: float) -> tuple[float, float]:
     return min(0.0, float(tau.min())), max(0.0, float(tau.max()))
 
 
-def _never(scene: Scene) -> Iterator[str]:
+def _never(scene: Scene, asked: str) -> Iterator[str]:
     """What can have no period."""
-    where = "must have a period with analysis.kind = 'steady'"
+    where = f"must have a period with {asked}"
     for name, drive in scene.driven_joints.items():
         if not isinstance(drive.motion, Table) and cycle(drive.motion) is None:
             yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
@@ -113,7 +133,7 @@ def _never(scene: Scene) -> Iterator[str]:
             yield f"motors.{name}: {where}, got a table over time: make it a load"
 
 
-def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
+def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
     """What is not where it was after a time."""
     gone = float(np.ptp(path_parameter(scene, np.array([0.0, time]))[0]))
     laws = {name: drive.motion for name, drive in scene.driven_joints.items()}
@@ -122,9 +142,7 @@ def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
             yield from _open_table(name, motion, time)
     returned = along.periodic and _whole(gone, along.period)
     if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, Table)):
-        yield (
-            f"analysis.kind: 'steady' must be of a linkage that returns, got one that is elsewhere after {time:.6g} s"
-        )
+        yield (f"{asked}: must be of a linkage that returns, got one that is elsewhere after {time:.6g} s")
     for name, factor in factors(scene):
         if is_constant(factor):
             continue
@@ -133,8 +151,7 @@ def _open(scene: Scene, along: Path, time: float) -> Iterator[str]:
         if factor.over == "angle" and gone:
             if factor.period is None:
                 yield (
-                    f"{name}.period: is required with analysis.kind = 'steady' and a drive that goes on "
-                    "turning, got nothing"
+                    f"{name}.period: is required with {asked} and a drive that goes on turning, got nothing"
                 )
             elif not _whole(gone, factor.period):
                 yield (

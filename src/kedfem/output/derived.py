@@ -10,14 +10,16 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.vibration import Vibration
 from kedfem.errors import OutputError, PictureError
 from kedfem.links.recovery import StressRecovery
+from kedfem.output.fatigue_files import FIELD, SPOTS
+from kedfem.output.fatigue_files import POINTS as DAMAGES
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.shapes import GROWING, write_growing
 from kedfem.output.stress_files import ENVELOPE, POINTS, TOP
 from kedfem.output.vtu import LinkField, remove_animation
-from kedfem.output.words import clock, moment, stress_at
-from kedfem.results import Peak, Results, write_csv, write_parquet
+from kedfem.output.words import clock, moment, place_of, stress_at
+from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
 from kedfem.results.reader import foreign
 from kedfem.results.singular_stress import AWAY, reason
 from kedfem.scene import Scene
@@ -25,7 +27,22 @@ from kedfem.scene import Scene
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"
 WORST, PARQUET, ONE_FILE = "worst.vtu", "results.parquet", "animation.vtkhdf"
 REPORT, GROWN = "report.html", f"{GROWING}.png"
-WHOLE = (GROWN, TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP, REPORT)
+WHOLE = (
+    GROWN,
+    TABLE,
+    ONE_FILE,
+    PARQUET,
+    PICTURE,
+    MESH,
+    WORST,
+    ENVELOPE,
+    POINTS,
+    TOP,
+    REPORT,
+    FIELD,
+    SPOTS,
+    DAMAGES,
+)
 """Files of a run that the next one replaces."""
 
 
@@ -36,6 +53,29 @@ def peak_warning(peak: Peak | None) -> tuple[str, ...]:
     said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
     away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
     return (said + away,)
+
+
+def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
+    """Warnings where damage is doubtful, incomplete, or more than is allowed."""
+    if found is None:
+        return ()
+    out = [f"fatigue: {found.doubt}"] if found.doubt else []
+    if found.without:
+        out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
+    left = {name: n for name, n in found.left_out.items() if n}
+    if left:
+        said = ", ".join(f"{n:,} of {name}" for name, n in left.items())
+        out.append(
+            f"fatigue: points of the surface near {AWAY} were left out, {said}: fatigue.near_joints takes them in"
+        )
+    worst = found.worst
+    if worst is not None and worst.utilisation > 1:
+        life = f"{found.hours(worst):.3g} h at a safety factor of 1"
+        where = f"link {worst.link} at {place_of(worst.place)} as drawn"
+        out.append(
+            f"fatigue: {where} is loaded to {worst.utilisation:.3g} times of what it may be; life {life}"
+        )
+    return tuple(out)
 
 
 def fields(

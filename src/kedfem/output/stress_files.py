@@ -58,7 +58,7 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
     OutputError
         A file cannot be written.
     """
-    every = [(each, drawn_points(each)) for each in extremes.found]
+    every = [(each, drawn_points(each.recovery)) for each in extremes.found]
     columns = extremes.columns()
     doubts = np.array([float(bool(x)) for each in extremes.near for x in each])
     parts = [(each.link, points, each.recovery.cells, each.recovery.cell_type) for each, points in every]

@@ -7,8 +7,8 @@ from typing import Any
 
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.layout import PEAKS, TIMING, WARNINGS, opened, seal, write_facts
-from kedfem.results.records import Peak
+from kedfem.results.layout import FATIGUE, PEAKS, TIMING, WARNINGS, opened, seal, write_facts
+from kedfem.results.records import Fatigue, FatigueSpot, Peak
 
 
 def mark_doubtful(path: Path, why: str) -> None:
@@ -46,6 +46,42 @@ def _lay_peak(group: Any, peak: Peak) -> None:
     )  # fmt: skip
     if peak.away is not None:
         _lay_peak(group.create_group("away"), peak.away)
+
+
+def add_fatigue(path: Path, found: Fatigue) -> None:
+    """Store damage, ``fatigue/LINK/RANK``, in a file that is whole.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with _changed(path) as file:
+        group = file.create_group(FATIGUE)
+        write_facts(
+            group,
+            {
+                "period [s]": found.period, "revolutions": found.revolutions, "repeats to": found.repeats,
+                "doubt": found.doubt, "links without data": "\n".join(found.without),
+            },
+        )  # fmt: skip
+        for name, spots in found.spots.items():
+            link = group.create_group(name)
+            write_facts(link, {"strength": found.strengths[name], "points left out": found.left_out[name]})
+            for rank, spot in enumerate(spots, start=1):
+                _lay_spot(link.create_group(str(rank)), spot)
+
+
+def _lay_spot(group: Any, spot: FatigueSpot) -> None:
+    write_facts(
+        group,
+        {
+            "damage in a period": spot.damage, "utilisation": spot.utilisation, "criterion": spot.criterion,
+            "amplitude [Pa]": spot.amplitude, "mean stress [Pa]": spot.mean, "disproportion": spot.disproportion,
+            "support factor": spot.support, "cycles in a period": spot.cycles, "place [m]": spot.place,
+            "node": spot.node, "near": spot.near,
+        },
+    )  # fmt: skip
 
 
 def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:

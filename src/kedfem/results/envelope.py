@@ -43,6 +43,20 @@ class LinkEnvelope:
     step: Int[np.ndarray, "3 p"]
 
 
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """The stress of a link over some time as a product.
+
+    parts : (p, 6, r) stresses of its modes, as of `links.recovery.stress_modes`
+    times : (T,) [s]
+    C : (T, r) coordinates of the modes
+    """
+
+    parts: Float[np.ndarray, "p 6 r"]
+    times: Float[np.ndarray, " T"]
+    C: Float[np.ndarray, "T r"]
+
+
 class Modes:
     """Modes of a link's deformation, found from its steps, and their stresses.
 
@@ -114,6 +128,7 @@ class Envelope:
     model : whose steps they are
     recoveries : per link, then per prescribed rigid link
     since : time [s] before which stresses do not count
+    kept_since : time [s] from which on the coordinates of all modes are kept; none if not given
     worst : the instant of the highest stress so far
     looked, evaluated : stresses at a point and a time that were looked at, and that all modes were summed up for
     """
@@ -121,6 +136,7 @@ class Envelope:
     model: Model
     recoveries: Sequence[StressRecovery]
     since: float = -np.inf
+    kept_since: float = np.inf
     worst: Snapshot | None = None
     looked: int = 0
     evaluated: int = 0
@@ -129,13 +145,17 @@ class Envelope:
     _step: list[Int[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
     _waiting: list[Block] = field(default_factory=list, repr=False)
     _when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list, repr=False)
-    REMEMBERED: ClassVar = ("worst", "looked", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when")
+    _kept: list[list[tuple[int, Float[np.ndarray, "T r"]]]] = field(default_factory=list, repr=False)
+    REMEMBERED: ClassVar = (
+        "worst", "looked", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when", "_kept",
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         for link, recovery in zip(self.model.links, self.recoveries, strict=False):
             self._modes.append(None if link.rigid else Modes(link, recovery))
             self._stress.append(np.full((3, recovery.stressed), -np.inf))
             self._step.append(np.zeros((3, recovery.stressed), np.int64))
+            self._kept.append([])
 
     def add(self, block: Block) -> None:
         """Look at a block, with others that wait or later."""
@@ -159,20 +179,23 @@ class Envelope:
             return
         blocks, self._waiting = self._waiting, []
         before = self._highest()
+        early = int(np.searchsorted(np.concatenate([b.motion.t for b in blocks]), self.kept_since))
         for i, modes in enumerate(self._modes):
             if modes is not None:
                 G = np.concatenate([block.links[i].g.reshape(len(block), -1) for block in blocks])
-                self._look(i, modes, G, blocks[0].step)
+                self._look(i, modes, G, blocks[0].step, early)
         if self._highest() > before or self.worst is None:
             _, step = max(((x[0].max(), k[0][x[0].argmax()]) for x, k in self._stressed()), default=(0.0, 0))
             block = next((b for b in blocks if b.step <= step < b.step + len(b)), blocks[0])
             k = max(0, int(step) - block.step)
             self.worst = block.part(k, k + 1).at(0).copied()
 
-    def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int) -> None:
+    def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int, early: int) -> None:
         from kedfem.results.envelope_kernel import LEVELS, enveloped, residuals_of
 
         C = modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0))))
+        if early < len(C):
+            self._kept[i].append((first + early, C[early:].copy()))
         C, parts, m = leading(C, modes.parts)
         residuals = np.zeros((LEVELS, -(-len(C) // 2), m + 1))
         residuals_of(C, m, residuals)
@@ -206,6 +229,17 @@ class Envelope:
             step = np.take_along_axis(self._step[i].reshape(3, -1, points), chosen, 1)[:, 0]
             out.append(LinkEnvelope(link.name, recovery, stress, step))
         return out
+
+    def kept(self, i: int) -> Kept | None:
+        """The history of a link or segment over the time that is kept; None of one that has no stress."""
+        self.flush()
+        modes, pieces = self._modes[i], self._kept[i]
+        if modes is None or not pieces:
+            return None
+        r = len(modes.basis)
+        steps = np.concatenate([np.arange(first, first + len(C)) for first, C in pieces])
+        C = np.concatenate([np.pad(C, ((0, 0), (0, r - C.shape[1]))) for _, C in pieces])
+        return Kept(modes.parts, self.when()[0, steps], C)
 
     def when(self) -> Float[np.ndarray, "2 T"]:
         """Time [s] and position of the drive at every step that was looked at."""

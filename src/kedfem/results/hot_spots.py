@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.links.recovery import StressRecovery
 from kedfem.results.envelope import VON_MISES, LinkEnvelope, peak_at
 from kedfem.results.records import Peak
 
@@ -40,22 +41,29 @@ def _of(
     parts: list[tuple[LinkEnvelope, Sequence[str]]], when: Float[np.ndarray, "2 T"], most: int
 ) -> list[Peak]:
     """Of one link, in segments or not."""
-    points = np.concatenate([drawn_points(each) for each, _ in parts])
+    points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
     ends = np.cumsum([each.stress.shape[1] for each, _ in parts])
-    left = np.isfinite(stress)
-    apart = APART * float(np.linalg.norm(np.ptp(points, axis=0)))
     out: list[Peak] = []
-    while left.any() and len(out) < most:
-        k = int(np.where(left, stress, -1.0).argmax())
+    for k in places_apart(points, stress, most):
         part = int(np.searchsorted(ends, k, side="right"))
         each, words = parts[part]
         node = k - int(ends[part]) + each.stress.shape[1]
         out.append(peak_at(each, when, node, words))
-        left &= np.linalg.norm(points - points[k], axis=1) > apart
     return out
 
 
-def drawn_points(each: LinkEnvelope) -> Float[np.ndarray, "p 3"]:
-    """Where the points of a link's envelope are, as drawn [m]."""
-    return np.asarray(each.recovery.at_points((each.recovery.link.full or each.recovery.link).X))
+def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p"], most: int) -> list[int]:
+    """Numbers of the points with the highest values, falling, at some distance from those before; nan do not count."""
+    left, found = np.isfinite(values), list[int]()
+    apart = APART * float(np.linalg.norm(np.ptp(points, axis=0)))
+    while left.any() and len(found) < most:
+        k = int(np.where(left, values, -1.0).argmax())
+        found.append(k)
+        left &= np.linalg.norm(points - points[k], axis=1) > apart
+    return found
+
+
+def drawn_points(recovery: StressRecovery) -> Float[np.ndarray, "p 3"]:
+    """Where the points of a link are, as drawn [m]."""
+    return np.asarray(recovery.at_points((recovery.link.full or recovery.link).X))

@@ -18,8 +18,8 @@ FORMAT = 3
 CHUNK_ROWS = 512
 """Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
 
-PEAKS, WARNINGS, TIMING = "peaks", "warnings", "timing"
-ADDED = (PEAKS, WARNINGS, TIMING)
+PEAKS, WARNINGS, TIMING, FATIGUE = "peaks", "warnings", "timing", "fatigue"
+ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)
 """Groups that come after the rows."""
 
 OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"

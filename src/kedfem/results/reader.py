@@ -10,6 +10,7 @@ from jaxtyping import Float
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
 from kedfem.results.layout import (
+    FATIGUE,
     FORMAT,
     PEAKS,
     TIMING,
@@ -21,7 +22,17 @@ from kedfem.results.layout import (
     sealed,
     series,
 )
-from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Peak, Results, Status
+from kedfem.results.records import (
+    ANGLE,
+    TIME,
+    TRAVEL,
+    Channel,
+    Fatigue,
+    FatigueSpot,
+    Peak,
+    Results,
+    Status,
+)
 
 WANTED = "a results file of kedfem"
 
@@ -141,6 +152,7 @@ def _results(file: Any) -> Results:
         warnings=_warnings(file),
         seconds=read_facts(file[TIMING]) if TIMING in file else {},
         links={name: read_facts(group) for name, group in file["notes"].items()},
+        fatigue=_fatigue(file[FATIGUE]) if FATIGUE in file else None,
     )
 
 
@@ -166,6 +178,33 @@ def _peak(group: Any) -> Peak:
         float(said["time [s]"]), float(said["drive [rad or m]"]), said["near"],
         _peak(group["away"]) if "away" in group else None,
     )  # fmt: skip
+
+
+def _fatigue(group: Any) -> Fatigue:
+    said = read_facts(group)
+    every = {name: (link, read_facts(link)) for name, link in group.items()}
+    return Fatigue(
+        float(said["period [s]"]), float(said["revolutions"]), float(said["repeats to"]), said["doubt"],
+        {name: _spots(name, link) for name, (link, _) in every.items()},
+        {name: facts["strength"] for name, (_, facts) in every.items()},
+        {name: int(facts["points left out"]) for name, (_, facts) in every.items()},
+        tuple(said["links without data"].split("\n")) if said["links without data"] else (),
+    )  # fmt: skip
+
+
+def _spots(name: str, link: Any) -> tuple[FatigueSpot, ...]:
+    found = []
+    for rank in sorted(link, key=int):
+        said = read_facts(link[rank])
+        x, y, z = map(float, said["place [m]"])
+        spot = FatigueSpot(
+            name, (x, y, z), int(said["node"]), said["criterion"], float(said["damage in a period"]),
+            float(said["utilisation"]), float(said["amplitude [Pa]"]), float(said["mean stress [Pa]"]),
+            float(said["disproportion"]), float(said["support factor"]), int(said["cycles in a period"]),
+            said["near"],
+        )  # fmt: skip
+        found.append(spot)
+    return tuple(found)
 
 
 def _recorded(name: str, rows: Any, n: int) -> tuple[Channel, Float[np.ndarray, "n c"]]:

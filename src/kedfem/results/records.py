@@ -1,5 +1,6 @@
 """What a results file holds: channels of columns over time and drive angle."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -73,6 +74,90 @@ class Peak:
 
 
 @dataclass(frozen=True, slots=True)
+class FatigueSpot:
+    """A place of a link where damage is highest.
+
+    Parameters
+    ----------
+    link, place, node, near
+        As of :class:`Peak`.
+    criterion
+        ``signed von Mises``, ``normal stress`` or ``Findley``.
+    damage
+        Miner's sum in a period; 1 is failure.
+    utilisation
+        Of the amplitude that is borne for the required life, with the safety factor.
+    amplitude, mean
+        Of the cycle that does most damage [Pa].
+    disproportion
+        What the best proportional history leaves of the stresses, of the highest [-].
+    support
+        The factor by which a stress gradient raises what is borne.
+    cycles
+        In a period.
+    """
+
+    link: str
+    place: tuple[float, float, float]
+    node: int
+    criterion: str
+    damage: float
+    utilisation: float
+    amplitude: float
+    mean: float
+    disproportion: float
+    support: float
+    cycles: int
+    near: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fatigue:
+    """Damage by the stresses of a motion that repeats itself.
+
+    Parameters
+    ----------
+    period, revolutions
+        [s], and turns of the drive in it; 0 of a drive that does not go on turning.
+    repeats
+        By how much stresses differ between the last period and the one before, or its beginning, of each link's highest.
+    doubt
+        Why the numbers are doubtful, else empty.
+    spots
+        Link → places of the highest damage, apart from each other, the highest first.
+    strengths
+        Link → what its material withstands, in words.
+    left_out
+        Link → points of its surface that were not looked at, as they are near corners, point forces or joints.
+    without
+        Elastic links without data.
+    """
+
+    period: float
+    revolutions: float
+    repeats: float
+    doubt: str
+    spots: Mapping[str, tuple[FatigueSpot, ...]]
+    strengths: Mapping[str, str]
+    left_out: Mapping[str, int]
+    without: tuple[str, ...] = ()
+
+    @property
+    def worst(self) -> FatigueSpot | None:
+        """The place with the highest utilisation of all links."""
+        every = [spot for spots in self.spots.values() for spot in spots]
+        return max(every, key=lambda spot: spot.utilisation, default=None)
+
+    def hours(self, spot: FatigueSpot) -> float:
+        """Life at a place [h]; infinite without damage."""
+        return self.period / spot.damage / 3600 if spot.damage else math.inf
+
+    def turns(self, spot: FatigueSpot) -> float:
+        """Life at a place in revolutions of the drive, or in periods of one that does not go on turning."""
+        return (self.revolutions or 1.0) / spot.damage if spot.damage else math.inf
+
+
+@dataclass(frozen=True, slots=True)
 class Results:
     """A results file as it was read.
 
@@ -106,6 +191,8 @@ class Results:
     links
         Link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass [kg]`,
         `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of an elastic run.
+    fatigue
+        Damage, of a whole run of a scene that asks for it.
     """
 
     time: Float[np.ndarray, " n"]
@@ -122,6 +209,7 @@ class Results:
     warnings: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    fatigue: Fatigue | None = None
 
     def to_xarray(self) -> Any:
         """All channels as an xarray.DataTree, which is laid out as the file: `tree["joints/B/force"].sel(xyz="x")`.

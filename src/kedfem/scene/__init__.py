@@ -14,6 +14,7 @@ from kedfem.scene.drives import (
     Table,
 )
 from kedfem.scene.faces import ChosenFace
+from kedfem.scene.fatigue import Fatigue, FatigueData, StrainLife
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import corotational, corotational_links, link_frames
 from kedfem.scene.initial import InitialMotion
@@ -66,6 +67,8 @@ __all__ = [
     "Drive",
     "Extrusion",
     "Factor",
+    "Fatigue",
+    "FatigueData",
     "Flywheel",
     "ForceCurve",
     "ForceLoad",
@@ -101,6 +104,7 @@ __all__ = [
     "Shape",
     "Spring",
     "SpringEnd",
+    "StrainLife",
     "SurfaceLoad",
     "Table",
     "TimeGrid",

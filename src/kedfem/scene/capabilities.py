@@ -187,6 +187,8 @@ REFUSALS = (
     Refusal("damping", {"drive": ("none",), "damping": ("in proportion to mass",)}, "{where}.{key}",
         "be given as beta alone in a scene without a drive, such as beta = {beta} [s]",
         "alpha resists the motion as a whole", "alpha = {alpha} 1/s", "leave alpha out"),
+    Refusal("fatigue", {"drive": ("none",), "period": ("none",)}, "{where}.period", "be given without a drive",
+        "nothing else says after which time stresses repeat", "nothing", "give it [s], or a drive, or leave fatigue out"),
     *(Refusal("loads", {"element": (kind,), "link": ("beam", "slider")}, "{where}.link",
         f"name a solid or a plane link for a {noun}", "a beam and a slider have no faces",
         "{name!r}, which is {noun}", "take loads of kind force or torque")

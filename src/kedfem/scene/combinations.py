@@ -22,7 +22,7 @@ Told = tuple[str, Facts, Mapping[str, str]]
 def combination_faults(parts: Parts) -> Iterator[str]:
     """All combinations of the scene that the table of capabilities refuses."""
     common = common_facts(parts)
-    for told in (joints, drives, gears, elements, analysis, links, loads):
+    for told in (joints, drives, gears, elements, analysis, fatigue, links, loads):
         for of, facts, words in told(parts):
             for refusal in refusals(of, {**common, **facts}):
                 yield refusal.said(words)
@@ -190,6 +190,13 @@ def kinds(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
                 {**facts, "start": key, "drive": "", "rho_inf": ""},
                 {**words, "given": shown(list(given))},
             )
+
+
+def fatigue(parts: Parts) -> Iterator[Told]:
+    """Damage over a period."""
+    if parts.fatigue.where:
+        period = "given" if parts.fatigue.has("period") else "none"
+        yield "fatigue", only(period=period), {"where": place(parts.fatigue.where)}
 
 
 def limited(parts: Parts) -> dict[str, str]:

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from kedfem.scene.analysis import Analysis, Animation, Probe
 from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive, Gear
+from kedfem.scene.fatigue import Fatigue
 from kedfem.scene.faults import line
 from kedfem.scene.links import Joint, LinkScene
 from kedfem.scene.loads import Body, Load
@@ -36,6 +37,7 @@ TYPES: dict[str, Any] = {
     "damping": Damping,
     "analysis": Analysis,
     "animation": Animation,
+    "fatigue": Fatigue,
 }
 
 
@@ -107,6 +109,7 @@ class Parts:
     damping: Entry
     analysis: Entry
     animation: Entry
+    fatigue: Entry
     gravity: tuple[float, ...]
     materials: list[str]
     folder: Path
@@ -163,6 +166,7 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         animation=single(
             "animation", output.get("animation") if isinstance(output, Mapping) else None, "output"
         ),
+        fatigue=single("fatigue", raw.get("fatigue")) if raw.get("fatigue") is not None else NONE,
         gravity=gravity,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
         folder=folder,

@@ -31,7 +31,7 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     probes = _entries("probes", scene.output.probes, "output")
     parts = Parts(
         **known, probes=probes, drive=NONE, drives=_entries("drives", scene.driven_joints), gears={}, damping=NONE,
-        analysis=NONE, animation=NONE, gravity=scene.gravity, materials=[], folder=scene.folder,
+        analysis=NONE, animation=NONE, fatigue=NONE, gravity=scene.gravity, materials=[], folder=scene.folder,
     )  # fmt: skip
     return spatial_names(parts)
 

@@ -29,6 +29,8 @@ from kedfem.scene.checks import (
 from kedfem.scene.combinations import combination_faults
 from kedfem.scene.damping import Damping
 from kedfem.scene.drives import Drive, Gear, MotionLaw
+from kedfem.scene.fatigue import Fatigue
+from kedfem.scene.fatigue_checks import fatigue_faults
 from kedfem.scene.faults import fault_lines
 from kedfem.scene.files import scene_folder, with_factor_tables, with_motion_tables
 from kedfem.scene.frames import default_frames
@@ -110,6 +112,8 @@ class Scene(Record):
     """damping of the elastic motion"""
     analysis: Analysis
     """how long, in which steps"""
+    fatigue: Fatigue | None = None
+    """damage by the stresses of a motion that repeats itself; needs `pip install 'kedfem[fatigue]'`"""
     output: Output = Output()
     """what is written"""
 
@@ -264,6 +268,7 @@ def cross_faults(parts: Parts) -> list[str]:
         limit_faults,
         initial_faults,
         undriven_faults,
+        fatigue_faults,
         combination_faults,
     )
     return [fault for check in checks for fault in check(parts)]

@@ -182,7 +182,8 @@ def _ran(job: Job) -> Row:
             update |= dict.fromkeys(("csv", "parquet", "plots", "picture", "report"), False)
             update["animation"] = None
         output = scene.output.model_copy(update=update)
-        run = analyse(scene.model_copy(update={"output": output}), stresses_since=since, ends=_ends(job))
+        quiet = scene.model_copy(update={"output": output, "fatigue": None})
+        run = analyse(quiet, stresses_since=since, ends=_ends(job))
         results = run.results
     found = extremes(results, since)
     for name, peak in run.peaks.items():

@@ -11,8 +11,8 @@ from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, with_prefix
-from kedfem.report.facts import peak_rows
-from kedfem.results import Peak
+from kedfem.report.facts import FATIGUE_HEAD, fatigue_notes, fatigue_rows, peak_rows
+from kedfem.results import Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.scene import Scene, without_vibration
 from kedfem.tables.plan import chosen_table
@@ -45,8 +45,9 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         spent.add_row(stage, f"{seconds:.2f}")
     errors = [] if done.budget is None else [budget_table(done.budget)]
     stress = [stress_table(scene, done.peaks)] if done.peaks else []
+    damaged = [fatigue_table(done.results.fatigue)] if done.results.fatigue else []
     steady = [] if done.steady is None else [steady_table(done.steady)]
-    return [*before, table, *stress, *steady, *errors, *balance, spent]
+    return [*before, table, *stress, *damaged, *steady, *errors, *balance, spent]
 
 
 def steady_table(found: Steady) -> Table:
@@ -72,6 +73,17 @@ def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
         table.add_column(column, justify="right" if column == "stress" else "left", overflow="fold")
     for row in peak_rows(peaks, partial(moment, scene)):
         table.add_row(*row)
+    return table
+
+
+def fatigue_table(found: Fatigue) -> Table:
+    """Life and utilisation at the place of the highest damage of each link."""
+    table = Table(title="Fatigue, by the last period")
+    for column in FATIGUE_HEAD:
+        table.add_column(column, overflow="fold")
+    for row in fatigue_rows(found, 1):
+        table.add_row(*row)
+    table.caption = Text("\n".join(fatigue_notes(found)))
     return table
 
 

@@ -1,0 +1,93 @@
+"""Points at the surface of a link with the surface's axes there: where cracks begin."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import cKDTree
+
+from kedfem.links.record import Link
+from kedfem.links.recovery import StressRecovery
+from kedfem.links.surface import boundary, surface
+
+SAME = 1e-6  # of a link's size: facets of two segments at the same place are the sides of a cut
+
+
+@dataclass(frozen=True, slots=True)
+class FreeSurface:
+    """Places of stress at the surface.
+
+    places : (k,) their numbers among those of `StressRecovery.stressed`
+    axes : (k, 3, 3) two tangents and the outward normal as rows, in the axes of the stress
+    """
+
+    places: Int[np.ndarray, " k"]
+    axes: Float[np.ndarray, "k 3 3"]
+
+
+def free_surface(recovery: StressRecovery, beside: Sequence[Link] = ()) -> FreeSurface:
+    """Places at a link's surface.
+
+    Of solids the nodes of boundary facets, with the mean normal of these; of plane links all nodes, z being the normal;
+    of beams all places of their sections: the first tangent is the beam's, the second that of the shear by torsion.
+
+    Parameters
+    ----------
+    beside : other segments of the same link, whose cuts with this one are not surface
+    """
+    link = recovery.link
+    if link.kind == "solid":
+        return _of_solid(link, beside)
+    axes = np.tile(np.eye(3), (recovery.stressed, 1, 1))
+    if link.kind == "spatial_beam":
+        axes = _of_sections(recovery.matrices[1], recovery.matrices[2])
+    return FreeSurface(np.arange(recovery.stressed), axes)
+
+
+def _of_solid(link: Link, beside: Sequence[Link]) -> FreeSurface:
+    facets, corners, _ = boundary(link)
+    facets = facets[~_cut(link, corners.mean(axis=1), beside)]
+    of = surface(link, facets)
+    on = (np.abs(of.N) > 0).any(axis=1)  # (f, m)
+    normals = np.zeros((link.n, 3))
+    mean = np.einsum("fq,fqk->fk", of.dA, of.normals)
+    for m in range(of.dofs.shape[1]):
+        np.add.at(normals, of.dofs[on[:, m], m], mean[on[:, m]])
+    places = np.unique(of.dofs[on])
+    return FreeSurface(places, surface_axes(normals[places]))
+
+
+def _cut(link: Link, centres: Float[np.ndarray, "f 3"], beside: Sequence[Link]) -> Bool[np.ndarray, " f"]:
+    """Which boundary facets of a segment are those of another one, too."""
+    cut = np.zeros(len(centres), bool)
+    for other in beside:
+        others = boundary(other)[1].mean(axis=1)
+        cut |= cKDTree(others).query(centres)[0] < SAME * link.size
+    return cut
+
+
+def surface_axes(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """Two tangents and the unit normal, as rows, along normals of any length."""
+    n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    least = np.eye(3)[np.abs(n).argmin(axis=1)]
+    first = np.cross(least, n)
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    return np.stack([first, np.cross(n, first), n], axis=1)
+
+
+def _of_sections(xy: sp.csr_array, zx: sp.csr_array) -> Float[np.ndarray, "k 3 3"]:
+    """The beam's tangent, the direction of the shear by torsion in the section, and the normal to both.
+
+    All of the shear at a place is in proportion to the twist, so that its direction stays.
+    """
+    own = np.asarray(xy.multiply(xy).sum(axis=1)).ravel()
+    both = np.asarray(xy.multiply(zx).sum(axis=1)).ravel()
+    other = np.asarray(zx.multiply(zx).sum(axis=1)).ravel()
+    angle = 0.5 * np.arctan2(2 * both, own - other)
+    out = np.zeros((len(angle), 3, 3))
+    out[:, 0, 0] = 1.0
+    out[:, 1, 1], out[:, 1, 2] = np.cos(angle), np.sin(angle)
+    out[:, 2, 1], out[:, 2, 2] = -np.sin(angle), np.cos(angle)
+    return out

@@ -1,0 +1,143 @@
+"""Damage at the surfaces of links by the stresses of the last period of a motion that repeats itself.
+
+The stress of a link over the period is a product of a few modes' stresses and their coordinates, which the envelope
+keeps; it is made for a few points at a time (`fatigue_look`).
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from kedfem.dynamics.model import Model
+from kedfem.links.recovery import StressRecovery
+from kedfem.results.envelope import Envelope
+from kedfem.results.fatigue_look import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
+from kedfem.results.fatigue_strength import Strength, strength_of, verdict
+from kedfem.results.hot_spots import drawn_points, places_apart
+from kedfem.results.records import Fatigue, FatigueSpot
+from kedfem.scene import Fatigue as Asked
+from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
+
+MOST = 5  # hot spots of a link
+REPEATS = 0.01  # of a link's highest stress: by how much two periods may differ
+
+
+def kept_since(scene: Scene, period: float) -> float:
+    """Time [s] from which on histories are kept, for two periods and a step more; never where nobody asks for damage."""
+    if scene.fatigue is None:
+        return np.inf
+    grid = time_grid(scene)
+    return grid.end - 2 * period - 2 * grid.step
+
+
+def fatigue_of(
+    scene: Scene, model: Model, envelope: Envelope, near: Sequence[Sequence[str]], length: float
+) -> tuple[Fatigue, list[LinkFatigue]]:
+    """Damage at all points of surfaces, and at hot spots by the FKM guideline.
+
+    Parameters
+    ----------
+    envelope : that kept the histories of two periods
+    near : per link or segment what each point is near to, in words
+    length : of a period [s]
+    """
+    asked = scene.fatigue
+    if asked is None:
+        raise TypeError("fatigue: is not asked for")
+    times = envelope.when()[0]
+    some = 1e-3 * float(times[-1] - times[-2])
+    period = Period(length, float(times[-1]), bool(times[-1] - 2 * length > times[0] - some))
+    strengths = link_strengths(scene, asked)
+    looks = {
+        k: Look(_stressed(model, envelope, near, k), strengths[link.name], asked, period)
+        for k, link in enumerate(model.links)
+        if link.name in strengths and not link.rigid
+    }
+    fields = {k: look.field() for k, look in looks.items()}
+    nothing = [_nothing(recovery) for recovery in envelope.recoveries]
+    of = {name: {k: x for k, x in looks.items() if x.name == name} for name in strengths}
+    spots = {name: _spots(each, fields, asked, period) for name, each in of.items()}
+    repeats = max((look.repeats for look in looks.values()), default=0.0)
+    turn = turn_steps(scene)
+    elastic = dict.fromkeys(link.name for link in model.links if not link.rigid)
+    return Fatigue(
+        length, length / (turn * time_grid(scene).step) if turn else 0.0, repeats, _doubt(scene, period, repeats),
+        spots, {name: each.words for name, each in strengths.items()},
+        {name: sum(x.left_out for x in each.values()) for name, each in of.items()},
+        tuple(name for name in elastic if name not in strengths),
+    ), [fields.get(k, nothing[k]) for k in range(len(nothing))]  # fmt: skip
+
+
+def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
+    """Of all links with data, their own or of their material."""
+    out = {}
+    for name, link in scene.links.items():
+        data = asked.links.get(name) or asked.materials.get(link.material or "")
+        if data is not None and link.material is not None and link.fidelity != "rigid":
+            out[name] = strength_of(data, scene.materials[link.material].youngs_modulus)
+    return out
+
+
+def _stressed(model: Model, envelope: Envelope, near: Sequence[Sequence[str]], k: int) -> Stressed:
+    """A link or segment with its history, and the other segments of the same link."""
+    kept, name = envelope.kept(k), model.links[k].name
+    if kept is None:
+        raise TypeError(f"{name}: has no history")
+    beside = [j for j, link in enumerate(model.links) if j != k and link.name == name]
+    return Stressed(envelope.recoveries[k], kept, near[k], [envelope.recoveries[j].link for j in beside])
+
+
+def _doubt(scene: Scene, period: Period, repeats: float) -> str:
+    """Why the numbers are doubtful, in words."""
+    if repeats > REPEATS:
+        what = "the period before" if period.before else "its beginning"
+        return (
+            f"stresses of the last period differ from those of {what} by {100 * repeats:.2g} % of the highest, more than "
+            f"{100 * REPEATS:g} %: the motion has not settled; run more revolutions, or take analysis.kind = 'steady'"
+        )
+    if not (period.before or scene.analysis.kind == "steady" or without_vibration(scene)):
+        return (
+            "the run has one period only, which does not show whether it repeats itself; run two of them or more, or "
+            "take analysis.kind = 'steady'"
+        )
+    return ""
+
+
+def _nothing(recovery: StressRecovery) -> LinkFatigue:
+    return LinkFatigue(recovery, *np.full((6, recovery.points), np.nan))
+
+
+def _spots(
+    looks: Mapping[int, Look], fields: Mapping[int, LinkFatigue], asked: Asked, period: Period
+) -> tuple[FatigueSpot, ...]:
+    """The places of a link with the highest damage, as pyLife judges them."""
+    if not looks:
+        return ()
+    every = [fields[k] for k in looks]
+    points = np.concatenate([drawn_points(each.recovery) for each in every])
+    damage = np.concatenate([each.damage for each in every])
+    ranked = damage if np.nanmax(damage, initial=0.0) > 0 else np.concatenate([x.utilisation for x in every])
+    ends = np.cumsum([len(each.damage) for each in every])
+    judge = partial(_spot, asked=asked, period=period)
+    found = []
+    for k in places_apart(points, ranked, MOST):
+        part = int(np.searchsorted(ends, k, side="right"))
+        found.append(judge(list(looks.values())[part], k - int(ends[part]) + len(every[part].damage)))
+    return tuple(found)
+
+
+def _spot(look: Look, point: int, asked: Asked, period: Period) -> FatigueSpot:
+    place = look.place_of(point)
+    judged = look.judged([place])
+    h = judged.h[0]
+    gradient = 0.0 if look.strength.data.group is None else look.gradient(place, int(np.abs(h).argmax()))
+    periods = np.inf if asked.required_life is None else asked.required_life / period.length
+    strength = look.strength.without_mean() if judged.criterion[0] == FINDLEY else look.strength
+    found = verdict(h, strength, gradient, asked.safety_factor, periods)
+    x, y, z = map(float, drawn_points(look.recovery)[point])
+    return FatigueSpot(
+        look.name, (x, y, z), point, CRITERIA[judged.criterion[0]], found.damage, found.utilisation,
+        float(judged.found[0, 2]), float(judged.found[0, 3]), float(judged.disproportion[0]), found.support,
+        found.cycles, look.near[point],
+    )  # fmt: skip
