@@ -183,7 +183,8 @@ def test_cuts_between_segments_are_no_surface(kind: str) -> None:
 
 
 def test_a_run_that_goes_on_finds_the_same_damage(settled: Run, tmp_path: Path) -> None:
-    from kedfem.dynamics import nominal, transient
+    from kedfem.dynamics import nominal
+    from kedfem.dynamics.stepping import transient
 
     scene = scene_from(swung(initial="quasi-static"), tmp_path)
 

@@ -392,6 +392,8 @@ def _say_where(folder: Path) -> None:
         ("envelope.vtu", "highest stresses over all steps, for ParaView"),
         ("peaks.csv", "top ten of each link"),
         ("worst.png", "picture of the highest stress"),
+        ("fatigue.vtu", "damage and utilisation, for ParaView"),
+        ("fatigue.csv", "life at the worst places of each link"),
         ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
         ("report.html", WRITTEN),
     ):

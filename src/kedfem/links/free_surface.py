@@ -10,8 +10,9 @@ from scipy.spatial import cKDTree
 
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
-from kedfem.links.surface import boundary, surface
+from kedfem.links.surfaces.surface import boundary, surface
 
+ROUNDING = 1e-9  # of a function whose largest value is one
 SAME = 1e-6  # of a link's size: facets of two segments at the same place are the sides of a cut
 
 
@@ -50,7 +51,7 @@ def _of_solid(link: Link, beside: Sequence[Link]) -> FreeSurface:
     facets, corners, _ = boundary(link)
     facets = facets[~_cut(link, corners.mean(axis=1), beside)]
     of = surface(link, facets)
-    on = (np.abs(of.N) > 0).any(axis=1)  # (f, m)
+    on = (np.abs(of.N) > ROUNDING).any(axis=1)  # (f, m) functions of nodes on a facet: others are zero there
     normals = np.zeros((link.n, 3))
     mean = np.einsum("fq,fqk->fk", of.dA, of.normals)
     for m in range(of.dofs.shape[1]):

@@ -11,7 +11,7 @@ from kedfem.output.words import place_of, with_prefix
 from kedfem.results import Fatigue, Peak, Results
 
 Rows = list[tuple[str, ...]]
-ENDLESS = 1e15  # periods: as good as for ever
+ENDLESS = 1e15  # revolutions, hours: as good as for ever
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,9 +166,9 @@ def fatigue_rows(found: Fatigue, most: int) -> Rows:
 
 def life_of(damage: float, found: Fatigue) -> str:
     """Life in turns of the drive, or periods, and hours, by the damage in a period."""
-    if damage * ENDLESS < 1:
-        return "endless"
     turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
+    if damage * ENDLESS < turns:
+        return "endless"
     return f"{turns / damage:.3g} {what}, {found.period / damage / 3600:.3g} h"
 
 

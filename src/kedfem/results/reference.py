@@ -137,6 +137,7 @@ brackets). Energies apart, nothing is summed up over time.
 | `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what the user was told; seconds of each stage; both of a run that came to its end |
 | `/peaks/LINK` | highest von Mises stress over all steps, its place as drawn, time, step and drive; `away` from places where it means little |
+| `/fatigue/LINK/RANK` | of a scene with `[fatigue]`: damage in a period, utilisation, worst cycle, criterion, place of the highest damage of each link, the worst first; period and `doubt` are those of `/fatigue` |
 | `/scene` | the scene that was analysed, as `json` and `toml` |
 
 `peaks.csv` has the ten highest von Mises stresses of each link over all steps, each at least 2 % of the link's size from

@@ -10,8 +10,8 @@ from rich.text import Text
 from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
-from kedfem.output.words import NOTHING, clock, moment, with_prefix
-from kedfem.report.facts import FATIGUE_HEAD, fatigue_notes, fatigue_rows, peak_rows
+from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
+from kedfem.report.facts import ENDLESS, fatigue_notes, peak_rows
 from kedfem.results import Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.scene import Scene, without_vibration
@@ -79,10 +79,15 @@ def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
 def fatigue_table(found: Fatigue) -> Table:
     """Life and utilisation at the place of the highest damage of each link."""
     table = Table(title="Fatigue, by the last period")
-    for column in FATIGUE_HEAD:
-        table.add_column(column, overflow="fold")
-    for row in fatigue_rows(found, 1):
-        table.add_row(*row)
+    turns = "revolutions" if found.revolutions else "periods"
+    for column in ("link", "life, h", turns, "utilisation", "mean ± amplitude", "at, as drawn"):
+        table.add_column(
+            column, overflow="fold", justify="left" if column in {"link", "at, as drawn"} else "right"
+        )
+    for name, (worst, *_) in ((name, spots) for name, spots in found.spots.items() if spots):
+        lives = [f"{x:.3g}" if x < ENDLESS else "endless" for x in (found.hours(worst), found.turns(worst))]
+        cycle = f"{worst.mean / 1e6:.3g} ± {worst.amplitude / 1e6:.3g} MPa"
+        table.add_row(name, *lives, percent(worst.utilisation), cycle, place_of(worst.place))
     table.caption = Text("\n".join(fatigue_notes(found)))
     return table
 
