@@ -1,9 +1,6 @@
 """Mesh files: what each form holds comes through, sets of sides and nodes are faces, several kinds make one mesh."""
 
-import os
 import re
-import signal
-import time
 from pathlib import Path
 
 import meshio
@@ -19,9 +16,10 @@ from kedfem.mesh.elements.hexahedra import HEX20, HEX27
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.files import read
 from kedfem.mesh.files.mixed import EDGES_OF
-from kedfem.mesh.files.raw import RawMesh, read_mesh
+from kedfem.mesh.files.raw import read_mesh
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
+from tests.works import endless, killed
 
 from .test_mesh import volume
 
@@ -235,17 +233,6 @@ def test_a_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     path.write_bytes(path.read_bytes() + b"\n")
     mesh_from_file("mesh", path, 1.0)
     assert len(calls) == 2
-
-
-def endless(_: Path) -> RawMesh:
-    while True:
-        pass
-
-
-def killed(_: Path) -> RawMesh:
-    os.kill(os.getpid(), signal.SIGSEGV)
-    time.sleep(60)
-    raise AssertionError
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import math
 import os
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.scene import LinkScene, Material, link_from, scene_from
+from tests.works import busy, busy_and_counted, busy_in, loud
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
 CUBE = Solid(1, "cube", 1.0, np.zeros(3), np.ones(3), ())
@@ -104,31 +104,6 @@ def sheared(by: float, way: str) -> SolidMesh:
     points = np.array([(x, y, z) for z in (-1, 1) for x, y in corners], dtype=float)
     points[:, :2] = points[:, :2] @ np.array([[1, 0], [by, np.sqrt(1 - by**2)]])
     return SolidMesh(points, np.arange(8)[None], way=way)
-
-
-def busy(seconds: float) -> None:
-    """Keeps a processor at work for so long."""
-    while time.process_time() < seconds:
-        pass
-
-
-def busy_in(process: int) -> int:
-    """The number of the process; never, in that one."""
-    while os.getpid() == process:
-        pass
-    return os.getpid()
-
-
-def busy_and_counted(file: Path) -> None:
-    """One more letter in a file, then never back."""
-    with file.open("a") as tries:
-        tries.write("x")
-    busy(60)
-
-
-def loud() -> int:
-    """Writes where gmsh and OpenCASCADE do: past Python."""
-    return os.write(1, b"BFGS update error2") + os.write(2, b"BFGS update error2")
 
 
 class TestApart:
