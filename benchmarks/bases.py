@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix

@@ -11,7 +11,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link, in_space
-from kedfem.motion.linkage import joint_axis, unit
+from kedfem.motion.joint_equations import joint_axis, unit
 from kedfem.scene import GROUND, Joint, time_grid
 from tests.moving import channels, state
 

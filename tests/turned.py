@@ -8,15 +8,8 @@ import numpy as np
 
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.elements.hexahedra import (
-    HEX8,
-    HEX27,
-    Face,
-    linear,
-    quadratic,
-    serendipity,
-    without_spare_nodes,
-)
+from kedfem.mesh.elements.hexahedra import Face, linear, quadratic, serendipity, without_spare_nodes
+from kedfem.mesh.elements.shape_functions import HEX8, HEX27
 from kedfem.mesh.elements.tetrahedra import tetrahedral
 
 FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}

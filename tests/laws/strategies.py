@@ -15,7 +15,8 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
-from kedfem.mesh.elements.hexahedra import HEX27, extruded, linear, quadratic, rectangle_quads, serendipity
+from kedfem.mesh.elements.hexahedra import extruded, linear, quadratic, rectangle_quads, serendipity
+from kedfem.mesh.elements.shape_functions import HEX27
 from kedfem.mesh.elements.tetrahedra import tetrahedral
 from kedfem.scene import Material
 

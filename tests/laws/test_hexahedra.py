@@ -14,7 +14,7 @@ from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, 
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
 from kedfem.links.surfaces.surface import surface
 from kedfem.mesh import SolidMesh
-from kedfem.mesh.elements.hexahedra import NODES, shape_gradients
+from kedfem.mesh.elements.shape_functions import NODES, shape_gradients
 from kedfem.motion.newton import cross_matrix
 from tests.laws.strategies import (
     FORMS,

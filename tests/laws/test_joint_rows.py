@@ -14,7 +14,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import needs_rows
 from kedfem.dynamics.stepping.literal import LiteralSteps
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND
 from tests.joint_checks import (
     LENGTH,

@@ -22,7 +22,8 @@ from kedfem.links.surfaces.coupling_surfaces import (
     surface_weights,
 )
 from kedfem.mesh import QuadMesh
-from kedfem.mesh.elements.hexahedra import QUAD9, extruded, rectangle_quads, shape_gradients
+from kedfem.mesh.elements.hexahedra import extruded, rectangle_quads
+from kedfem.mesh.elements.shape_functions import QUAD9, shape_gradients
 from kedfem.scene import Material
 from tests.laws.strategies import (
     LAW,

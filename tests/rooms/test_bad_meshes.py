@@ -10,7 +10,7 @@ import pytest
 
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, session
-from kedfem.mesh.elements.hexahedra import HEX8
+from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.mesh.files.raw import RawMesh
 from kedfem.mesh.planar import quads
 from kedfem.mesh.session import gmsh_model

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
-from kedfem.mesh.elements.hexahedra import HEX27, shape_functions, shape_gradients
+from kedfem.mesh.elements.shape_functions import HEX27, shape_functions, shape_gradients
 from kedfem.mesh.layered.cusps import Cusp, cusps
 from kedfem.mesh.layered.fills import Rim
 from kedfem.mesh.layered.layers import layer_directions, layered_mesh

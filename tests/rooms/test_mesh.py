@@ -15,18 +15,9 @@ from scipy.integrate import quad
 
 from kedfem.links.solid import solid_basis
 from kedfem.mesh import Quality, SolidMesh, checked_mesh, link_mesh, mesh_quality
-from kedfem.mesh.elements.hexahedra import (
-    HEX8,
-    HEX20,
-    HEX27,
-    QUAD9,
-    linear,
-    quadratic,
-    serendipity,
-    shape_functions,
-    shape_gradients,
-)
+from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, shape_functions, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, pillowed, quadratic_quads
 from kedfem.mesh.planar.outline import outline_area, profile_outline, smallest_width
 from kedfem.mesh.planar.relaxation import distortion, relaxed

@@ -8,7 +8,8 @@ from rich.console import Console
 
 from kedfem.links.surfaces.part_candidates import offers
 from kedfem.mesh import SolidMesh
-from kedfem.mesh.elements.hexahedra import HEX8, Face
+from kedfem.mesh.elements.hexahedra import Face
+from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.tables import mesh_tables
 
 

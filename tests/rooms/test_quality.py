@@ -8,7 +8,8 @@ from numpy.testing import assert_array_equal
 
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, checked_mesh, mesh_quality
-from kedfem.mesh.elements.hexahedra import HEX8, Face
+from kedfem.mesh.elements.hexahedra import Face
+from kedfem.mesh.elements.shape_functions import HEX8
 
 #: Columns of unit cubes along x, the upper side of each moved along y: scaled Jacobian cos of the angle of shear.
 SHEARS = (0.0, 1.0, 3.0, 20.0)

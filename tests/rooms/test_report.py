@@ -22,8 +22,9 @@ from kedfem.kinematics import kinematics
 from kedfem.output.bars import bars, heights
 from kedfem.output.words import with_prefix
 from kedfem.report import surfaces, write_report
+from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import cursor_places, curve_groups
-from kedfem.report.surfaces import Animated, animated, placement
+from kedfem.report.surfaces import placement
 from kedfem.results import read_results
 from kedfem.scene import scene_from
 from tests.browser import Browser, needs_browser

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha

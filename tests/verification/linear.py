@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.stepping.literal import shared_nodes
 from kedfem.links.record import Link

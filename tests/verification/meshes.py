@@ -8,7 +8,8 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh import QuadMesh, SolidMesh
-from kedfem.mesh.elements.hexahedra import HEX8, HEX27, rectangle_quads, serendipity
+from kedfem.mesh.elements.hexahedra import rectangle_quads, serendipity
+from kedfem.mesh.elements.shape_functions import HEX8, HEX27
 from kedfem.mesh.elements.tetrahedra import tetrahedral
 from kedfem.scene import Material
 

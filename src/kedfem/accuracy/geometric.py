@@ -29,7 +29,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block, LinkHistory
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space

@@ -28,7 +28,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, load_factor
 
 

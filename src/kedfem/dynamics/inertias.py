@@ -17,7 +17,8 @@ from kedfem.dynamics.model import Model
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     ROTARY,

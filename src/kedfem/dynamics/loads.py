@@ -12,18 +12,13 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.places import on_part, seat_of
+from kedfem.dynamics.load_weights import Vector, at_point, face, load_weights, point_weights
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
-from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import (
-    CouplingSurface,
     face_normals,
-    face_seat,
-    is_flat,
     joint_seat,
-    same_face,
     seat_couples,
-    surface_weights,
 )
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
@@ -45,7 +40,6 @@ MISSED = 0.05  # of a load's integral over time; a jump between two steps is les
 FINER, MOST = 16, 400_000  # points in a step, and in all, at which factors over an angle are looked at
 
 Times = Float[np.ndarray, " t"]
-Vector = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,14 +129,14 @@ def _load_patterns(
         case TorqueLoad() if parts:
             return _torque(scene, where, load, parts)
         case PressureLoad() if parts:
-            faces = _face(where, load, parts)
+            faces = face(where, load, parts)
             pushed = {key: face_normals(parts[key], seat) for key, seat in faces.items()}
             return {key: [Pattern(-load.pressure * x, True, factor)] for key, x in pushed.items()}
         case ForceLoad() | BodyLoad() | SurfaceLoad():
             follows, vector = load.frame == "link", np.asarray(load.vector)
             return {
                 key: [Pattern(np.outer(w, as_rows(links[key], vector)), follows, factor)]
-                for key, w in _weights(where, load, parts).items()
+                for key, w in load_weights(where, load, parts).items()
             }
         case _:
             return {}
@@ -167,7 +161,7 @@ def _couples(
     """Forces of unit couples about x, y and z on a link's seat."""
     if link.kind == "beam":
         out = np.zeros((3, link.n, 3))
-        out[2, :, 2] = _point_weights(where, link, at)
+        out[2, :, 2] = point_weights(where, link, at)
         return out
     if load.joint is not None:
         return seat_couples(link, seat_of(scene, load.joint, link), where)
@@ -195,7 +189,7 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
             raise SceneError(
                 f"{where}.link: must name an elastic link, got '{force.link}', which does not deform"
             )
-        key, weights = _at_point(where, force.link, np.asarray(force.at), parts)
+        key, weights = at_point(where, force.link, np.asarray(force.at), parts)
         out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
     return out
 
@@ -204,56 +198,6 @@ def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]
     """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
     return Pattern(forces, False, partial(load_factor, load.factor))
-
-
-def _weights(
-    where: str, load: ForceLoad | BodyLoad | SurfaceLoad, parts: Mapping[str, Link]
-) -> dict[str, Float[np.ndarray, " n"]]:
-    """Which segments of its link a load acts on, and how much of it each function takes."""
-    if not parts:
-        return {}
-    match load:
-        case ForceLoad():
-            return dict([_at_point(where, load.link, np.asarray(load.at), parts)])
-        case BodyLoad():
-            return {key: link.volume for key, link in parts.items()}
-        case SurfaceLoad():
-            return {key: surface_weights(parts[key], seat) for key, seat in _face(where, load, parts).items()}
-
-
-def _at_point(
-    where: str, name: str, at: Vector, parts: Mapping[str, Link]
-) -> tuple[str, Float[np.ndarray, " n"]]:
-    """The segment of a link that a force at a point acts on, and how much of it each function takes."""
-    return on_part(parts, name, at, lambda link: _point_weights(where, link, at))
-
-
-def _point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:
-    rows = point_rows(link, f"{where}.at", at)
-    beside = float(np.linalg.norm(rows.X - at))
-    if link.kind == "beam" and beside > 1e-6 * link.size:
-        raise SceneError(
-            f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
-        )
-    return rows.value
-
-
-def _face(
-    where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]
-) -> dict[str, CouplingSurface]:
-    """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
-    at = np.asarray(load.at)
-    for link in parts.values():
-        if not link.meshed:
-            raise SceneError(
-                f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'"
-            )
-    key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
-    found = {key: seat}
-    for other in parts.keys() - {key} if is_flat(seat) else ():
-        if (same := same_face(parts[other], seat)) is not None:
-            found[other] = same
-    return found
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:

@@ -7,9 +7,10 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, needs_rows
 from kedfem.dynamics.joints.constraint_ports import Ways
-from kedfem.dynamics.joints.coupling import Attachment, SharedCut, joined
+from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis, slider_guide
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.joints.slots import slot_ways
@@ -33,7 +34,8 @@ from kedfem.links.surfaces.coupling_surfaces import (
     port_weights,
     rigid_seat,
 )
-from kedfem.motion.linkage import Linkage, joint_axis, unit
+from kedfem.motion.joint_equations import joint_axis, unit
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import (
     Body,

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Forcing
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix

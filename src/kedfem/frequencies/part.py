@@ -27,7 +27,7 @@ from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import surfaces
 from kedfem.links.surfaces.choosing import chosen_surface
 from kedfem.mesh import part_mesh
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.output.frames import link_field
 from kedfem.output.shapes import Shape, write_shapes
 from kedfem.output.vtu import LinkField

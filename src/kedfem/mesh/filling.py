@@ -9,13 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.mesh.cad.faces import joined_faces
-from kedfem.mesh.cad.model import leave_only
-from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
 from kedfem.mesh.elements.bounds import valid_everywhere
-from kedfem.mesh.elements.hexahedra import SolidMesh, node_numbers
+from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.elements.shape_functions import node_numbers
 from kedfem.mesh.elements.simplices import EDGES, TET10
 from kedfem.mesh.elements.tetrahedra import edge_middles
 from kedfem.mesh.session import gmsh_options, numbered_nodes
@@ -36,8 +35,6 @@ _BAD = 0.03  # scaled Jacobian below which curved elements are optimised, else s
 _FEW = 0.02  # share of bad elements that optimisation can help
 #: gmsh's optimisation of curved elements takes minutes where it finds no way.
 _BRIEF: dict[str, float] = {"Mesh.HighOrderIterMax": 25, "Mesh.HighOrderPassMax": 5}
-_HEALED = (0.03, 0.1, 0.3)  # sizes of edges that are healed away in turn, of the elements' size
-_SAME = 1e-3  # of the volume that this may change
 _BLENDS = (
     0.4,
     0.7,
@@ -123,34 +120,6 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh
             way = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
             return replace(mesh, way=way)
     raise OtherWayError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(said)}")
-
-
-def healed(gmsh: ModuleType, where: str, solid: Solid, size: float) -> Iterator[tuple[Solid, str]]:
-    """The solid of gmsh's model with edges and faces below growing sizes healed away, and what was done in words.
-
-    Parameters
-    ----------
-    size : of the elements [m]; what is healed is much smaller
-
-    Yields
-    ------
-    Solid and words, as long as the volume stays what it was.
-    """
-    tag = solid.tag
-    for share in _HEALED:
-        made = gmsh.model.occ.healShapes([(3, tag)], tolerance=share * size)
-        gmsh.model.occ.synchronize()
-        solids = {tag for dim, tag in made if dim == 3}
-        if len(solids) != 1:
-            return
-        (tag,) = solids
-        leave_only(gmsh, tag)
-        volume = float(gmsh.model.occ.getMass(3, tag))
-        if abs(volume / solid.volume - 1) > _SAME:
-            return
-        faces = cad_faces(gmsh, where, tag, solid.extent, {})
-        words = f"edges and faces below {1e3 * share * size:.2g} mm healed away"
-        yield replace(solid, tag=tag, volume=volume, faces=faces), words
 
 
 def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:

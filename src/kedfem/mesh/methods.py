@@ -17,7 +17,8 @@ from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.tetrahedra import FORMS
-from kedfem.mesh.filling import filled_mesh, healed, subdivided_mesh, tetrahedron_size
+from kedfem.mesh.filling import filled_mesh, subdivided_mesh, tetrahedron_size
+from kedfem.mesh.healing import healed
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.swept.blends import points_in_file, swept_without_blends

@@ -9,7 +9,8 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
-from kedfem.motion.linkage import GROUND, passive_rows, scene_centre, scene_size
+from kedfem.motion.joint_equations import GROUND, scene_centre
+from kedfem.motion.linkage import passive_rows, scene_size
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.period import over_one_period
 from kedfem.motion.redrawn import Shift, redrawn

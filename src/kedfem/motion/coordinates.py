@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.linkage import Linkage, moving_pair, unit
+from kedfem.motion.joint_equations import moving_pair, unit
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Joint, Scene
 

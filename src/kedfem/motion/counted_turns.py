@@ -7,7 +7,8 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, place_on
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, corotational, path_parameter, time_grid
 

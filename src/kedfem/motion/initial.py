@@ -9,14 +9,8 @@ from jaxtyping import Float
 
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import (
-    Linkage,
-    drawn_jacobian,
-    joint_axis,
-    joint_free_rows,
-    moving_pair,
-    resting_poses,
-)
+from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair
+from kedfem.motion.linkage import Linkage, drawn_jacobian, resting_poses
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import features, jacobian

@@ -4,7 +4,7 @@ Where frames follow the links, motions may be left free. Nominally joints that b
 moves the rest; without a drive everything nominally rests.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -13,25 +13,27 @@ from jaxtyping import Float
 from kedfem.errors import MotionError
 from kedfem.motion.blocks import Blocks, blocks
 from kedfem.motion.constraints import (
-    ANGLE,
-    GAP,
     ConstraintEquation,
     Rows,
-    coupled,
-    free_rows,
-    joint_rows,
     stacked,
-    travel_row,
-    turn_row,
 )
 from kedfem.motion.drives import Drives, drives
+from kedfem.motion.joint_equations import (
+    GROUND,
+    coordinate_row,
+    drive_row,
+    gear_row,
+    joint_free_rows,
+    joint_points,
+    rows_of,
+    scene_centre,
+)
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, rank
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
-from kedfem.scene import Joint, Scene, corotational_links
+from kedfem.scene import Scene, corotational_links
 
-GROUND = "ground"
 MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
 
 
@@ -127,7 +129,7 @@ def _drawn(scene: Scene) -> tuple[list[ConstraintEquation], Drives, Drawn]:
     centre, size = scene_centre(scene), scene_size(scene)
     driven = drives(scene, size)
     rows = passive_rows(scene)
-    rows += [_drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
+    rows += [drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
     J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
     return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
@@ -136,8 +138,8 @@ def _drawn(scene: Scene) -> tuple[list[ConstraintEquation], Drives, Drawn]:
 def passive_rows(scene: Scene) -> list[ConstraintEquation]:
     """Rows of joints and couplings, without the drives'."""
     bodies, centre = (GROUND, *scene.links), scene_centre(scene)
-    rows = [row for name in scene.joints for row in _rows_of(scene, name, bodies, centre)]
-    return rows + [_gear_row(scene, name, bodies) for name in scene.gears]
+    rows = [row for name in scene.joints for row in rows_of(scene, name, bodies, centre)]
+    return rows + [gear_row(scene, name, bodies) for name in scene.gears]
 
 
 def drawn_linkage(scene: Scene) -> Drawn:
@@ -153,7 +155,7 @@ def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
         scene.joints.items(), key=lambda each: GROUND in each[1].links
     ):  # bearings stay, if they can
         for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
-            rows = _rows_of(scene, name, bodies, drawn.centre, kind)
+            rows = rows_of(scene, name, bodies, drawn.centre, kind)
             out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
     return out
 
@@ -163,109 +165,10 @@ def resting_poses(times: int, bodies: int) -> Poses:
     return np.tile(np.eye(3), (times, bodies, 1, 1)), np.zeros((times, bodies, 3))
 
 
-def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
-    """Places of all joints [m]."""
-    return np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
-
-
-def scene_centre(scene: Scene) -> Float[np.ndarray, "3"]:
-    """The middle of all joints [m]; the origin where there are none."""
-    points = joint_points(scene)
-    return np.asarray(points.mean(axis=0)) if len(points) else np.zeros(3)
-
-
 def scene_size(scene: Scene) -> float:
     """Characteristic length [m]: the longest side of the box of all joints."""
     points = joint_points(scene)
     return (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
-
-
-def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
-    """A direction made a unit vector."""
-    return np.asarray(np.asarray(axis) / np.linalg.norm(axis))
-
-
-def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
-    """Unit vector of a joint that has an axis: the scene gives one to hinges and asks sliding joints for theirs."""
-    return unit(joint.axis or (0.0, 0.0, 1.0))
-
-
-def _rows_of(
-    scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray, kind: str | None = None
-) -> list[ConstraintEquation]:
-    """Rows of a joint, of its own kind or another."""
-    joint = scene.joints[name]
-    axis: np.ndarray | tuple[np.ndarray, np.ndarray] | None = None if joint.axis is None else unit(joint.axis)
-    i, j = _pair(joint, bodies)
-    if joint.axes is not None:
-        one, other = (unit(each) for each in joint.axes)
-        axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
-    rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
-    if joint.open:
-        rows = [_reaching(row, joint, bodies, centre) for row in rows]
-    if joint.lead is not None:
-        travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
-        rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
-    return rows
-
-
-def _reaching(
-    row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray
-) -> ConstraintEquation:
-    """A row of a joint whose links are drawn apart: gaps are between their own points."""
-    if row.kind != GAP:
-        return row
-    one, other = (np.asarray(joint.on(bodies[body])) - centre for body in (row.i, row.j))
-    return replace(row, a=one, a_j=other)
-
-
-def moving_pair(joint: Joint) -> tuple[str, str]:
-    """The link of a joint that its turn and travel are of, and the other: the first that is not the ground."""
-    one, other = joint.links
-    return (other, one) if one == GROUND else (one, other)
-
-
-def coordinate_row(
-    scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None
-) -> ConstraintEquation:
-    """Turn or travel of a joint; if not said which, the turn of all but slides."""
-    joint = scene.joints[name]
-    i, j = (bodies.index(link) for link in moving_pair(joint))
-    if joint.kind != "prismatic" if turns is None else turns:
-        return turn_row(name, i, j, joint_axis(joint))
-    return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), joint_axis(joint))
-
-
-def _gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
-    """Gears: coordinate of the second joint less ratio · that of the first; the greater coefficient is one."""
-    gear, where = scene.gears[name], f"gears.{name}"
-    first, second = (replace(coordinate_row(scene, each, bodies), joint=where) for each in gear.joints)
-    if second.kind == ANGLE and abs(gear.transmission) > 1:
-        return coupled(first, (-1 / gear.transmission, second))
-    return coupled(second, (-gear.transmission, first))
-
-
-def _drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> ConstraintEquation:
-    """The drive of a joint: its turn or travel has the drive's value."""
-    return replace(coordinate_row(scene, name, bodies), drive=number)
-
-
-def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
-    """Rows of what a joint leaves free."""
-    joint = scene.joints[name]
-    axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
-    return free_rows(joint.kind, name, *_pair(joint, bodies), point, axis)
-
-
-def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
-    """Numbers of a joint's bodies; the ground, where there is one, comes second: directions are fixed in it.
-
-    Of a slot the link with the pin comes first: directions are fixed in the link with the line.
-    """
-    if joint.kind == "slot":
-        return bodies.index(joint.links[0]), bodies.index(joint.links[1])
-    i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
-    return i, j
 
 
 def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.motion.linkage import moving_pair
+from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.newton import rotation
 from kedfem.scene import (
     DIRECTED,

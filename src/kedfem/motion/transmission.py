@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import GROUND, Linkage, unit
+from kedfem.motion.joint_equations import GROUND, unit
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
 

@@ -9,7 +9,7 @@ from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, turned_stress, von_mises
-from kedfem.mesh.elements.hexahedra import HEX8
+from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.output.vtu import LinkField
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]

@@ -14,6 +14,7 @@ from kedfem.errors import KedfemError, OutputError
 from kedfem.loads import loads_of, summaries
 from kedfem.output.derived import PICTURE, REPORT
 from kedfem.output.words import with_prefix
+from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import Curve, cursor_places, curve_groups, polar_curves
 from kedfem.report.facts import (
     Table,
@@ -27,7 +28,6 @@ from kedfem.report.facts import (
     notes_table,
     peaks_table,
 )
-from kedfem.report.surfaces import Animated, animated
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
 from kedfem.results.extras import of_extra

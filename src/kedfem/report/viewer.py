@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.rendering import picture_axes, sight
-from kedfem.report.surfaces import Animated, Placement, Surface, bounds, extent
+from kedfem.report.animated import Animated, bounds, extent
+from kedfem.report.surfaces import Placement, Surface
 from kedfem.results.extras import of_extra
 
 EXTRA = "report"

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block, LinkHistory
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh

@@ -14,7 +14,8 @@ from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.audit import Account
 from kedfem.results.records import Channel

@@ -8,14 +8,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ordered
-from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.results.constraint_forces import ConstraintForces, known, of_joint
 from kedfem.results.force_elements import Measured
 from kedfem.results.recorded import Recorded, Rows

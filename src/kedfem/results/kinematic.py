@@ -9,7 +9,8 @@ from jaxtyping import Float
 from kedfem.dynamics.inertias import Inertias
 from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
-from kedfem.motion.linkage import GROUND, Linkage
+from kedfem.motion.joint_equations import GROUND
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions

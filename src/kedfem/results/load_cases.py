@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkMoment, Snapshot
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_vectors
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.cholesky import Cholesky

@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import Linkage, joint_axis, moving_pair
+from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.records import Results
 from kedfem.scene import Joint, Scene

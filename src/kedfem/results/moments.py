@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.record import Link, Matrix
 from kedfem.motion.constraints import cross

@@ -12,7 +12,8 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.motion.constraints import cross
-from kedfem.motion.linkage import Linkage, moving_pair
+from kedfem.motion.joint_equations import moving_pair
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion

@@ -17,7 +17,7 @@ from kedfem.links.record import Link
 from kedfem.links.stations import Stations
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.linkage import unit
+from kedfem.motion.joint_equations import unit
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import GROUND, Joint, Scene, by_constraint_equations, moving_grounds
 

@@ -24,7 +24,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_seat
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_matrices import JointRows
-from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.joints.ports import port_rotation, port_values
 from kedfem.dynamics.matrices.interface import RowState, Tie
 from kedfem.dynamics.stepping.state import LinkState, NodalOf

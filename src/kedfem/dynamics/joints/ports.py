@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Nodal
 
 Rotation = Float[np.ndarray, "d d"]

@@ -4,7 +4,8 @@ import numpy as np
 
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.joints.constraint_matrices import seen_from
-from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene

@@ -9,7 +9,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.links.record import Link
 

@@ -12,7 +12,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, port_values
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.interface import Tie, solved

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.substructure import Substructure, coupled, factored
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.start import Instant

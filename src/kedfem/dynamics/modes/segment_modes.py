@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.modes.reduction import Basis, energy_product, orthonormal

@@ -14,8 +14,8 @@ import scipy.sparse.linalg
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Forcing, LinkHistory, history
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_matrices import JointRows
-from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, port_vectors
 from kedfem.dynamics.matrices.interface import RowState, Tie, after_step, step_tie
 from kedfem.dynamics.matrices.substructure import mass_matrix

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.first_rows import FirstRows, interface_values
 from kedfem.dynamics.joints.ports import Rotation
 from kedfem.dynamics.matrices.interface import Tie

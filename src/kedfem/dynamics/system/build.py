@@ -43,7 +43,8 @@ from kedfem.dynamics.system.record import (
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
-from kedfem.motion.linkage import Linkage, joint_axis
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import (
     AngleLimit,

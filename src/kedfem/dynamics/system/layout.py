@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.dense import SMALL, component_first, coordinates, dense_part, work_on
 from kedfem.dynamics.matrices.substructure import effective_coefficients
 from kedfem.dynamics.matrices.substructure import factored as condensed

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.elements.hexahedra import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
+from kedfem.mesh.elements.shape_functions import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
 from kedfem.mesh.elements.simplices import TET_SIDES, TRI6
 
 

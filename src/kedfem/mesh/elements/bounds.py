@@ -12,7 +12,7 @@ from math import comb, factorial, prod
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.mesh.elements.hexahedra import HEX8, HEX20, NODES, QUAD9, shape_gradients
+from kedfem.mesh.elements.shape_functions import HEX8, HEX20, NODES, QUAD9, shape_gradients
 from kedfem.mesh.elements.simplices import EDGES, TET10
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache

@@ -7,16 +7,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.sides import SIDE_NODES, owned_sides
-from kedfem.mesh.elements.hexahedra import (
-    HEX8,
-    HEX27,
-    SolidMesh,
-    linear,
-    node_numbers,
-    quadratic,
-    serendipity,
-    without_spare_nodes,
-)
+from kedfem.mesh.elements.hexahedra import SolidMesh, linear, quadratic, serendipity, without_spare_nodes
+from kedfem.mesh.elements.shape_functions import HEX8, HEX27, node_numbers
 from kedfem.mesh.elements.simplices import EDGES, TET10
 
 #: Of two corners of a hexahedron the node of hex27 between them.

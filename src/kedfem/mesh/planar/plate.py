@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.mesh.elements.hexahedra import QUAD9, rectangle_quads
+from kedfem.mesh.elements.hexahedra import rectangle_quads
+from kedfem.mesh.elements.shape_functions import QUAD9
 from kedfem.mesh.planar.areas import Quads
 
 _STEEPEST = np.pi / 8  # most that an element turns along an arc

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.elements.hexahedra import QUAD9, shape_gradients
+from kedfem.mesh.elements.shape_functions import QUAD9, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, Quads, quadratic_quads
 
 _GRADIENTS = shape_gradients(QUAD9, QUAD9.astype(float))

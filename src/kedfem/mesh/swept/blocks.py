@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
-from kedfem.mesh.elements.hexahedra import HEX27, SolidMesh, node_numbers, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality
+from kedfem.mesh.elements.shape_functions import HEX27, node_numbers
 from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron

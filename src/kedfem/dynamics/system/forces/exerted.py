@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Exerted
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
-from kedfem.dynamics.joints.coupling import Attachment
 from kedfem.dynamics.system.ends import end_of, same_end
 from kedfem.dynamics.system.forces.supports import Supports, Vectors
 from kedfem.dynamics.system.record import Constraint, Driven, End, Spring

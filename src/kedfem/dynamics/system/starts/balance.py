@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, splu
 
-from kedfem.dynamics.joints.coupling import Attachment
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
 from kedfem.dynamics.system.march import Ready

@@ -1,0 +1,44 @@
+"""What the interface knows of a joint on one link, and of joints that cut a shared point."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True, slots=True)
+class Attachment:
+    """One link's share in the joints.
+
+    nodes, weights : (b,) and (p, b): scalar port weights W of the nodes that carry any
+    components : d of the link
+    points : (p, 3) port points, reference position [m]
+    joints : (p,) name of each port's joint
+    keep : (q,) which of the flattened (p, d) components are held; closed under the link's rotation; independent:
+        what other ports of the link imply is left out
+    B : (q, k) held components, in world axes, from the interface unknowns z
+    shares : per link j (dp, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
+    from_rows : (dp, m): the same from the forces that rows of joints exert on their links' ports, world axes; m all
+        components of all these ports, and empty where λ alone tells the forces
+    loose : (dp, r) port forces of this link, world axes, that neither tells: statically indeterminate
+    """
+
+    nodes: Int[np.ndarray, " b"]
+    weights: Float[np.ndarray, "p b"]
+    components: int
+    points: Float[np.ndarray, "p 3"]
+    joints: tuple[str, ...]
+    keep: Int[np.ndarray, " q"]
+    B: Float[np.ndarray, "q k"]
+    shares: tuple[Float[np.ndarray, "m _"], ...] = ()
+    from_rows: Float[np.ndarray, "m _"] = field(default_factory=lambda: np.zeros((0, 0)))
+    loose: Float[np.ndarray, "m r"] = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+@dataclass(frozen=True, slots=True)
+class SharedCut:
+    """Where two segments of a link meet: their keys, the points of the cut (k, 3) and each one's weights (k, n)."""
+
+    keys: tuple[str, str]
+    points: Float[np.ndarray, "k 3"]
+    weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]

@@ -1,0 +1,111 @@
+"""Port points of a joint on a link: where they lie about its place, and what is told where they cannot."""
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MeshError
+from kedfem.links.record import Link
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, holds, is_flat
+from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.scene import Joint, Scene
+
+
+def port_points(
+    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface], links: dict[str, Link]
+) -> Float[np.ndarray, "p 3"]:
+    """Points of a joint that its links share: 1 spherical, 2 revolute; in a plane 1 for both.
+
+    Where turning is held too, points off these in all directions that the coupling surfaces know: were a bore held along
+    one direction only, its eye would be soft or stiff as that happens to lie.
+
+    Raises
+    ------
+    MeshError
+        If a flat coupling surface cannot hold a point outside its plane.
+    """
+    at = np.asarray(joint.at)
+    if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
+        return at[None, :]
+    if links[next(iter(seats))].planar:
+        return _plane_points(scene, name, joint, seats)
+    seat = next(iter(seats.values()))
+    driven = name in scene.driven_joints
+    if joint.kind == "revolute":
+        axis = joint_axis(joint)
+        half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
+        centre = at + np.mean([(s.origin - at) @ axis for s in seats.values()]) * axis
+        across = _widest_across(seat, axis)
+        directions = [axis, across] if driven else [axis]
+        points = [centre + half * axis, centre - half * axis]
+        points += _points_off(centre, seats, [across, np.cross(axis, across)]) if driven else []
+    else:
+        seat = next((s for s in seats.values() if is_flat(s)), seat)
+        e1, e2 = seat.directions[:2]
+        directions = [e1, e2]
+        points = [seat.origin + seat.spread[0] * e1 * c + seat.spread[1] * e2 * s
+                  for c, s in ((1, 0), (-0.5, 0.9), (-0.5, -0.9))]  # fmt: skip
+        points += _points_off(seat.origin, seats, [seat.directions[2]])
+    for link, s in seats.items():
+        if not all(holds(s, d) for d in directions):
+            raise MeshError(f"joints.{name}: {_unheld(links[link], joint.kind)}")
+    return np.array(points)
+
+
+def _unheld(link: Link, kind: str) -> str:
+    """What to do about a coupling surface that does not hold a joint's points."""
+    if link.kind == "spatial_beam":
+        return (
+            f"must sit at an end or a corner of beam '{link.name}', or need its section only, got a joint that "
+            "needs the direction of its axis too: give the beam a point there"
+        )
+    if kind == "weld":
+        return (
+            f"must weld faces that lie in one plane, or sit on a bore of link '{link.name}', "
+            "got a flat face at an angle to the other link's: cut the two so that they meet in a plane"
+        )
+    return (
+        f"must sit on a bore of link '{link.name}', or on a flat face that contains its axis, "
+        "got a flat face across the axis: give the link a bore about the joint's axis"
+    )
+
+
+def _plane_points(
+    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface]
+) -> Float[np.ndarray, "p 3"]:
+    """The joint's point and, where turning is held, others: along a slide, else along the narrowest coupling surface, and
+    across."""
+    at = np.asarray(joint.at)
+    if joint.kind == "revolute" and name not in scene.driven_joints:
+        return at[None, :]
+    narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
+    along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
+    for link, seat in seats.items():
+        if not holds(seat, along):
+            raise MeshError(
+                f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
+                f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
+            )
+    return np.array([at, *_points_off(at, seats, [along, np.cross([0.0, 0.0, 1.0], along)])])
+
+
+def _points_off(
+    centre: Float[np.ndarray, "3"],
+    seats: dict[str, CouplingSurface],
+    directions: list[Float[np.ndarray, "3"]],
+) -> list[Float[np.ndarray, "3"]]:
+    """A point off the centre in each direction that all coupling surfaces know, as far as the first coupling surface is
+    wide there."""
+    known = [d for d in directions if all(holds(seat, d) for seat in seats.values())]
+    first = next(iter(seats.values()))
+    return [centre + 2 * _spread_along(first, d) * d for d in known]
+
+
+def _spread_along(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> float:
+    return float(np.linalg.norm((seat.directions @ axis) * seat.spread))
+
+
+def _widest_across(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    candidates = [np.asarray(d - (d @ axis) * axis) for d in seat.directions]
+    widest = max(candidates, key=lambda d: _spread_along(seat, d))
+    return widest / np.linalg.norm(widest) if np.linalg.norm(widest) > 1e-9 else perpendiculars(axis)[0]

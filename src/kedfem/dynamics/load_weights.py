@@ -1,0 +1,77 @@
+"""Where a load acts on a link, as weights of its nodes."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.places import on_part
+from kedfem.errors import SceneError
+from kedfem.links.record import Link
+from kedfem.links.recovery import point_rows
+from kedfem.links.surfaces.coupling_surfaces import (
+    CouplingSurface,
+    face_seat,
+    is_flat,
+    same_face,
+    surface_weights,
+)
+from kedfem.scene import (
+    BodyLoad,
+    ForceLoad,
+    PressureLoad,
+    SurfaceLoad,
+)
+
+Vector = Float[np.ndarray, "3"]
+
+
+def load_weights(
+    where: str, load: ForceLoad | BodyLoad | SurfaceLoad, parts: Mapping[str, Link]
+) -> dict[str, Float[np.ndarray, " n"]]:
+    """Which segments of its link a load acts on, and how much of it each function takes."""
+    if not parts:
+        return {}
+    match load:
+        case ForceLoad():
+            return dict([at_point(where, load.link, np.asarray(load.at), parts)])
+        case BodyLoad():
+            return {key: link.volume for key, link in parts.items()}
+        case SurfaceLoad():
+            return {key: surface_weights(parts[key], seat) for key, seat in face(where, load, parts).items()}
+
+
+def at_point(
+    where: str, name: str, at: Vector, parts: Mapping[str, Link]
+) -> tuple[str, Float[np.ndarray, " n"]]:
+    """The segment of a link that a force at a point acts on, and how much of it each function takes."""
+    return on_part(parts, name, at, lambda link: point_weights(where, link, at))
+
+
+def point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:
+    """Of a force at a point of a link; beams take it on their axis alone."""
+    rows = point_rows(link, f"{where}.at", at)
+    beside = float(np.linalg.norm(rows.X - at))
+    if link.kind == "beam" and beside > 1e-6 * link.size:
+        raise SceneError(
+            f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
+        )
+    return rows.value
+
+
+def face(
+    where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]
+) -> dict[str, CouplingSurface]:
+    """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
+    at = np.asarray(load.at)
+    for link in parts.values():
+        if not link.meshed:
+            raise SceneError(
+                f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'"
+            )
+    key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
+    found = {key: seat}
+    for other in parts.keys() - {key} if is_flat(seat) else ():
+        if (same := same_face(parts[other], seat)) is not None:
+            found[other] = same
+    return found

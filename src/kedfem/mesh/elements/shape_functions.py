@@ -1,0 +1,99 @@
+"""Shape functions of quadrilaterals, hexahedra and tetrahedra, and where their nodes are."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.mesh.elements.simplices import TET10, TRI6, simplex_functions, simplex_gradients
+
+_SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+_SIDES = ((0, -1), (1, 0), (0, 1), (-1, 0))
+
+#: Nodes of quad9 in reference coordinates, VTK order: corners, sides, centre.
+QUAD9: Int[np.ndarray, "9 2"] = np.array([*_SQUARE, *_SIDES, (0, 0)])
+
+#: Nodes of hex27 in reference coordinates, VTK order: corners; edges below, above, upright; faces; centre.
+HEX27: Int[np.ndarray, "27 3"] = np.array(
+    [(*corner, z) for z in (-1, 1) for corner in _SQUARE]
+    + [(*side, z) for z in (-1, 1) for side in _SIDES]
+    + [(*corner, 0) for corner in _SQUARE]
+    + [(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1), (0, 0, 0)]
+)
+#: Nodes of the serendipity hex20 and of hex8: the same order without faces and centre, and the corners alone.
+HEX20: Int[np.ndarray, "20 3"] = HEX27[:20]
+HEX8: Int[np.ndarray, "8 3"] = HEX27[:8]
+
+
+Places = Float[np.ndarray, "_ d"] | Int[np.ndarray, "_ d"]
+
+#: Reference coordinates of the nodes of an element that has so many.
+NODES: dict[int, Places] = {len(nodes): nodes for nodes in (QUAD9, HEX8, TET10, HEX20, HEX27)}
+
+
+def node_numbers(nodes: Places, at: Places) -> list[int]:
+    """Which of an element's nodes are at some reference coordinates."""
+    return [int(np.flatnonzero((nodes == place).all(axis=1))[0]) for place in at]
+
+
+def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k"]:
+    """N_a of an element: tensor-product Lagrange, serendipity for HEX20, quadratic on a simplex.
+
+    Parameters
+    ----------
+    nodes : (k, d)
+        Reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6).
+    at : (q, d) [-]
+        Where the values are wanted, reference coordinates.
+
+    Returns
+    -------
+    (q, k) [-]
+        One value per place and function.
+    """
+    x = np.asarray(at, dtype=float)
+    if len(nodes) in {len(TET10), len(TRI6)}:
+        return simplex_functions(x)
+    product = np.prod([line for line, _ in _factors(nodes, x)], axis=0)
+    return np.asarray(product * _brackets(nodes, x)[0])
+
+
+def shape_gradients(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k d"]:
+    """∂N_a/∂ξ_j of the functions of :func:`shape_functions`.
+
+    Returns
+    -------
+    (q, k, d) [-]
+        One gradient per place and shape function.
+    """
+    x = np.asarray(at, dtype=float)
+    if len(nodes) in {len(TET10), len(TRI6)}:
+        return simplex_gradients(x)
+    bracket, slope = _brackets(nodes, x)
+    factors = _factors(nodes, x)
+    product = np.prod([line for line, _ in factors], axis=0)
+    axes = range(nodes.shape[1])
+    columns = [np.prod([factors[i][int(i == j)] for i in axes], axis=0) for j in axes]
+    return np.asarray(np.stack(columns, axis=-1) * bracket[..., None] + product[..., None] * slope)
+
+
+def _factors(
+    nodes: Places, x: Float[np.ndarray, "q d"]
+) -> list[tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k"]]]:
+    """Of each direction the factor of every N_a, and its derivative."""
+    linear_ends = (1 - x) / 2, (1 + x) / 2
+    if len(nodes) == len(HEX20) or not (nodes == 0).any():
+        line = np.stack([linear_ends[0], 1 - x**2, linear_ends[1]])
+        slope = np.stack([0 * x - 0.5, -2 * x, 0 * x + 0.5])
+    else:
+        line = np.stack([x * (x - 1) / 2, 1 - x**2, x * (x + 1) / 2])
+        slope = np.stack([x - 0.5, -2 * x, x + 0.5])
+    return [(line[nodes[:, i] + 1, :, i].T, slope[nodes[:, i] + 1, :, i].T) for i in range(nodes.shape[1])]
+
+
+def _brackets(
+    nodes: Places, x: Float[np.ndarray, "q d"]
+) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
+    """What makes a serendipity corner vanish at the middles of its edges, (Σ ξ_j ξ_aj − 2), and its gradient."""
+    corner = (nodes != 0).all(axis=1) & (len(nodes) == len(HEX20))
+    bracket = np.where(corner, x @ nodes.T - 2.0, 1.0)
+    slope = 1.0 * nodes * corner[:, None]
+    return bracket, np.broadcast_to(slope, (len(x), *slope.shape))

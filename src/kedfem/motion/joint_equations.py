@@ -1,0 +1,119 @@
+"""Constraint equations of a scene's joints, gears and drives."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.motion.constraints import (
+    ANGLE,
+    GAP,
+    ConstraintEquation,
+    coupled,
+    free_rows,
+    joint_rows,
+    travel_row,
+    turn_row,
+)
+from kedfem.scene import Joint, Scene
+
+GROUND = "ground"
+
+
+def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
+    """Places of all joints [m]."""
+    return np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
+
+
+def scene_centre(scene: Scene) -> Float[np.ndarray, "3"]:
+    """The middle of all joints [m]; the origin where there are none."""
+    points = joint_points(scene)
+    return np.asarray(points.mean(axis=0)) if len(points) else np.zeros(3)
+
+
+def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
+    """A direction made a unit vector."""
+    return np.asarray(np.asarray(axis) / np.linalg.norm(axis))
+
+
+def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
+    """Unit vector of a joint that has an axis: the scene gives one to hinges and asks sliding joints for theirs."""
+    return unit(joint.axis or (0.0, 0.0, 1.0))
+
+
+def rows_of(
+    scene: Scene, name: str, bodies: tuple[str, ...], centre: np.ndarray, kind: str | None = None
+) -> list[ConstraintEquation]:
+    """Rows of a joint, of its own kind or another."""
+    joint = scene.joints[name]
+    axis: np.ndarray | tuple[np.ndarray, np.ndarray] | None = None if joint.axis is None else unit(joint.axis)
+    i, j = _pair(joint, bodies)
+    if joint.axes is not None:
+        one, other = (unit(each) for each in joint.axes)
+        axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
+    rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
+    if joint.open:
+        rows = [_reaching(row, joint, bodies, centre) for row in rows]
+    if joint.lead is not None:
+        travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
+        rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
+    return rows
+
+
+def _reaching(
+    row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray
+) -> ConstraintEquation:
+    """A row of a joint whose links are drawn apart: gaps are between their own points."""
+    if row.kind != GAP:
+        return row
+    one, other = (np.asarray(joint.on(bodies[body])) - centre for body in (row.i, row.j))
+    return replace(row, a=one, a_j=other)
+
+
+def moving_pair(joint: Joint) -> tuple[str, str]:
+    """The link of a joint that its turn and travel are of, and the other: the first that is not the ground."""
+    one, other = joint.links
+    return (other, one) if one == GROUND else (one, other)
+
+
+def coordinate_row(
+    scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None
+) -> ConstraintEquation:
+    """Turn or travel of a joint; if not said which, the turn of all but slides."""
+    joint = scene.joints[name]
+    i, j = (bodies.index(link) for link in moving_pair(joint))
+    if joint.kind != "prismatic" if turns is None else turns:
+        return turn_row(name, i, j, joint_axis(joint))
+    return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), joint_axis(joint))
+
+
+def gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
+    """Gears: coordinate of the second joint less ratio · that of the first; the greater coefficient is one."""
+    gear, where = scene.gears[name], f"gears.{name}"
+    first, second = (replace(coordinate_row(scene, each, bodies), joint=where) for each in gear.joints)
+    if second.kind == ANGLE and abs(gear.transmission) > 1:
+        return coupled(first, (-1 / gear.transmission, second))
+    return coupled(second, (-gear.transmission, first))
+
+
+def drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> ConstraintEquation:
+    """The drive of a joint: its turn or travel has the drive's value."""
+    return replace(coordinate_row(scene, name, bodies), drive=number)
+
+
+def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
+    """Rows of what a joint leaves free."""
+    joint = scene.joints[name]
+    axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
+    return free_rows(joint.kind, name, *_pair(joint, bodies), point, axis)
+
+
+def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:
+    """Numbers of a joint's bodies; the ground, where there is one, comes second: directions are fixed in it.
+
+    Of a slot the link with the pin comes first: directions are fixed in the link with the line.
+    """
+    if joint.kind == "slot":
+        return bodies.index(joint.links[0]), bodies.index(joint.links[1])
+    i, j = sorted((bodies.index(link) for link in joint.links), reverse=True)
+    return i, j
