@@ -10,7 +10,7 @@ from kedfem.dynamics.joints.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
-from kedfem.motion.linkage import joint_axis
+from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND, Scene, moving_grounds
 
 T = TypeVar("T")
