@@ -14,9 +14,9 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.transient import block_length, started
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.period_map import PeriodMap
 from kedfem.dynamics.system.periodic import Periodic, periodic
-from kedfem.dynamics.system.states import State
 from kedfem.motion.period import over_one_period
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from, time_grid

@@ -17,8 +17,8 @@ from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.transient import started, steps_of, transient
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import march
-from kedfem.dynamics.system.states import State
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.recovery import point_rows

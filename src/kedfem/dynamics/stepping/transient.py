@@ -18,6 +18,7 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.start import Deflected, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.stepping.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening, stiffening
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
 from kedfem.dynamics.system.period_map import PeriodMap
@@ -26,7 +27,6 @@ from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.start import from_links
-from kedfem.dynamics.system.states import State
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Complex
 
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.krylov import Watch, Watched, arnoldi, combined, scale_of
 from kedfem.dynamics.system.multipliers import multipliers
 from kedfem.dynamics.system.period_map import CARRIED, PeriodMap
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.dynamics.system.starts.instant import TURN, Flat
-from kedfem.dynamics.system.states import State
 from kedfem.errors import SolveError
 
 CLOSED = 1e-9  # what a period may leave of the size of a state

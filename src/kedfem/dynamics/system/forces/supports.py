@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import PrescribedBody
+from kedfem.dynamics.system.arrays import History
 from kedfem.dynamics.system.ends import corners, end_of, line_weights, same_end
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import (
@@ -30,7 +31,6 @@ from kedfem.dynamics.system.record import (
     Term,
 )
 from kedfem.dynamics.system.starts.instant import renumbered
-from kedfem.dynamics.system.states import History
 from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis

@@ -15,6 +15,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.matrices.dense import work_on
+from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
 from kedfem.dynamics.system.sparse import SparsePart, momentum
@@ -23,7 +24,6 @@ from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, held
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
 from kedfem.dynamics.system.starts.start import as_coordinates, begun
-from kedfem.dynamics.system.states import State
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 
