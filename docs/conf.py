@@ -27,7 +27,7 @@ myst_enable_extensions = ["colon_fence", "deflist"]
 suppress_warnings = ["myst.header"]  # a page's figures may begin below a table
 smartquotes_action = "D"  # dashes alone: a prime is a derivative
 nb_execution_mode = "cache"
-nb_execution_timeout = 120
+nb_execution_timeout = 600  # the first run compiles
 nb_execution_raise_on_error = True
 
 # names of other packages are no targets here: nothing is fetched while building

@@ -141,7 +141,7 @@ def test_the_notebook_runs_and_shows_its_bar(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.delenv("MPLBACKEND", raising=False)  # notebooks have one of their own
     book = nbformat.read(DOCS / "how-to" / "notebook.ipynb", 4)
     assert all(not cell.get("outputs") for cell in book.cells), "commit it without outputs"
-    NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    NotebookClient(book, timeout=600, kernel_name="python3").execute()
     shown = [output for cell in book.cells for output in cell.get("outputs", [])]
     kinds = [kind for output in shown for kind in output.get("data", {})]
     assert "image/png" in kinds
