@@ -14,6 +14,7 @@ from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
+from kedfem.accuracy.shared_modes import ALONE, Neighbours
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
 from kedfem.accuracy.stability import stability_warning
@@ -24,6 +25,7 @@ from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.transient import Steps, eased_warning, period_map
+from kedfem.dynamics.system.period_map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.errors import SceneError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -77,6 +79,7 @@ class Run:
     sizes : plain sizes of the scene, for a look at its units
     step : what is known of its step's error
     steady : what is known of a steady motion
+    begun : the state with which that begins
     """
 
     folder: FilePath
@@ -92,6 +95,7 @@ class Run:
     sizes: Sizes | None = None
     step: StepEstimate | None = None
     steady: Steady | None = None
+    begun: Carried | None = None
 
     @property
     def peaks(self) -> Mapping[str, Peak]:
@@ -105,7 +109,7 @@ def analyse(
     resumes: bool = False,
     every: float = EVERY,
     stresses_since: float = -inf,
-    ends: Sequence[Scene] = (),
+    beside: Neighbours = ALONE,
 ) -> Run:
     """Run a scene and write its results.
 
@@ -116,7 +120,7 @@ def analyse(
     resumes : whether to go on from the last state that an earlier run of the same scene stored
     every : seconds between stored states
     stresses_since : time [s] before which stresses do not count as highest
-    ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
+    beside : what it takes over from runs of scenes that differ little
 
     Raises
     ------
@@ -132,7 +136,7 @@ def analyse(
     with claimed(scene.results_folder) as folder:
         refuse_foreign(folder)
         keeper = Keeper.of(scene, folder, resumes, every)
-        run = _analysed(scene, folder, watch, keeper, stresses_since, ends)
+        run = _analysed(scene, folder, watch, keeper, stresses_since, beside)
         remove_state(folder)
         return _reported(run, watch) if scene.output.report else run
 
@@ -145,7 +149,7 @@ def _reported(run: Run, watch: Watch) -> Run:
 
 
 def _analysed(
-    scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float, ends: Sequence[Scene] = ()
+    scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float, beside: Neighbours = ALONE
 ) -> Run:
     """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
     clock = Clock(watch)
@@ -154,10 +158,10 @@ def _analysed(
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
-    ready, reduction = prepared(scene, clock.stage, ends)
+    ready, reduction = prepared(scene, clock.stage, beside.ends)
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly)]
-    solvers = clock.timed("factor", lambda: level_steps(scene, ready.model), factor_words(ready.model))
+    solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed(
         "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
@@ -216,7 +220,16 @@ def _analysed(
     add_account(folder / "results.h5", notices, clock.seconds)
     results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
     return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
-               balance, found, plain, step, steady)  # fmt: skip
+               balance, found, plain, step, steady, steady_state(solvers))  # fmt: skip
+
+
+def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
+    """Those of all levels in time; a steady motion is looked for where that of a neighbour was."""
+    solvers = level_steps(ready.scene, ready.model)
+    for each in solvers:
+        if not isinstance(each, LiteralSteps):
+            each.search = replace(each.search, near=beside.near)
+    return solvers
 
 
 def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:

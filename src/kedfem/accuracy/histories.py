@@ -13,7 +13,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.transient import Steps
-from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.period_map import Carried, carried
 from kedfem.dynamics.system.periodic import Periodic, Search
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
@@ -40,14 +40,14 @@ class Histories:
     channels: Mapping[str, tuple[Channel, Float[np.ndarray, "T c"]]]
     kept: tuple[Snapshot, ...] = ()
     size: float = 0.0
-    begun: State | None = None
+    begun: Carried | None = None
 
 
 def histories(
     ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None,
     look: Callable[[Block], None] = lambda block: None,
     follow: Callable[[Block, dict[str, Float[np.ndarray, "T c"]]], None] = lambda block, values: None,
-    near: State | None = None,
+    near: Carried | None = None,
 ) -> Histories:  # fmt: skip
     """Run a prepared scene and keep its channels.
 
@@ -81,10 +81,10 @@ def histories(
     return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model), steady_state(solvers))
 
 
-def steady_state(solvers: Sequence[Steps]) -> State | None:
+def steady_state(solvers: Sequence[Steps]) -> Carried | None:
     """The state with which a steady motion begins, that of the finest steps; None of another motion."""
     found = getattr(solvers[-1], "steady", None)
-    return found.state if isinstance(found, Periodic) else None
+    return carried(found.state) if isinstance(found, Periodic) else None
 
 
 def extent(model: Model) -> float:

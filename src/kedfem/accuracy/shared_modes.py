@@ -1,16 +1,32 @@
 """Scenes that differ in the speed of their drive and in damping alone, and whose links have the same modes."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from kedfem.accuracy.cache import key
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.period_map import Carried
 from kedfem.scene import ConstantSpeed, Ramp, Scene, corotational_links, rayleigh
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """What a run takes over from runs of scenes that differ little.
+
+    ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
+    near : the state with which the steady motion of one of them begins, to look for this one's from there
+    """
+
+    ends: Sequence[Scene] = ()
+    near: Carried | None = None
+
+
+ALONE = Neighbours()
 _LAST: dict[str, Any] = {}
 """The last reduction that scenes of this process share."""
 

@@ -39,6 +39,13 @@ def sweep(
             help="Find edges of unstable bands along the first key to this relative width, as 0.001.",
         ),
     ] = None,
+    follow: Annotated[
+        bool,
+        typer.Option(
+            "--follow",
+            help="Look for each steady motion where that of the point before was found, in the order of the first key.",
+        ),
+    ] = False,
     folder: Annotated[
         Path | None, typer.Option(help="Where all goes; default: SCENE-sweep beside the scene.")
     ] = None,
@@ -54,7 +61,9 @@ def sweep(
 
     raw, _ = read_keys(scene, within=within)
     base = Base(raw, scene.parent, scene.stem)
-    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep, edges)
+    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep, edges, follow)
+    if follow and samples is not None:
+        raise SceneError("--follow: must be without --samples, whose points have no order along a key")
     if cluster is not None and workers is not None:
         raise SceneError(
             "--workers: cannot be combined with --cluster, whose workers are as many as there are"

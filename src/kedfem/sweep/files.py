@@ -5,9 +5,11 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path as FilePath
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
+from kedfem.dynamics.system.period_map import Carried
 from kedfem.results import replacing
 from kedfem.results.layout import opened
 from kedfem.results.table import DIGITS, text_file
@@ -16,7 +18,7 @@ from kedfem.sweep.axes import Axis
 from kedfem.sweep.extremes import MAGNITUDE
 from kedfem.sweep.points import Row
 
-ROWS = "rows"
+ROWS, STATES = "rows", "states"
 KINDS = ("max", "min", "rms", "when")
 FORMAT = 1
 
@@ -28,6 +30,27 @@ def kept_row(folder: FilePath, identity: str) -> Row | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return None if row.status == "failed" else row
+
+
+def kept_state(folder: FilePath, identity: str) -> Carried | None:
+    """The state with which the steady motion of a finished point begins; None if there is none."""
+    try:
+        with np.load(folder / STATES / f"{identity}.npz", allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (OSError, ValueError, KeyError, BadZipFile):
+        return None
+
+
+def keep_state(folder: FilePath, identity: str, state: Carried) -> None:
+    """Put the state with which a steady motion begins on the disk, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        It cannot be written.
+    """
+    with replacing(folder / STATES / f"{identity}.npz") as part, part.open("wb") as file:
+        np.savez(file, **state)
 
 
 def keep_row(folder: FilePath, identity: str, row: Row) -> None:

@@ -12,8 +12,10 @@ from time import perf_counter
 from typing import Any
 
 from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.shared_modes import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
+from kedfem.dynamics.system.period_map import Carried
 from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled
 from kedfem.resume import origin
@@ -26,7 +28,7 @@ from kedfem.sweep.keys import with_values
 
 SETTLED = 0.01  # what the last two turns may differ by
 STRESS = "stress/{}/peak"
-GROWTH = "steady/growth"
+GROWTH, MARCHES = "steady/growth", "steady/marches"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,8 @@ class Job:
     last : turns whose extremes count
     folder : where the run's files stay; None if they do not
     ends : values of the points with which its reduced links are shared; none: it has its own
+    follows : whether its steady motion is looked for where that of the point before is, and its own is handed on
+    near : the state with which that begins; none: there is no point before, or it failed
     """
 
     base: Base
@@ -70,6 +74,8 @@ class Job:
     last: float
     folder: FilePath | None = None
     ends: tuple[Mapping[Where, Value], ...] = ()
+    follows: bool = False
+    near: Carried | None = None
 
     def scene(self) -> Scene:
         """The scene of this point.
@@ -105,6 +111,7 @@ class Row:
     change : between the last two turns, relative; nan if there were none
     seconds : that the run took
     extremes : name of a column → unit, (maximum, minimum, root of the mean square, time [s] of the largest magnitude)
+    begun : the state with which its steady motion begins, if the next point is to follow it; not part of its text
     """
 
     status: str
@@ -112,6 +119,7 @@ class Row:
     change: float = math.nan
     seconds: float = 0.0
     extremes: Mapping[str, tuple[str, Extreme]] = field(default_factory=dict)
+    begun: Carried | None = field(default=None, compare=False, repr=False)
 
     @property
     def settled(self) -> str:
@@ -120,7 +128,9 @@ class Row:
 
     def text(self) -> str:
         """As JSON."""
-        return json.dumps(asdict(self))
+        said = asdict(replace(self, begun=None))
+        del said["begun"]
+        return json.dumps(said)
 
     @classmethod
     def read(cls, text: str) -> "Row":
@@ -169,7 +179,7 @@ def finished(job: Job) -> Row:
         row = Row("failed", str(error))
     except Exception as error:  # noqa: BLE001 - a defect at one point must not cost the others
         row = Row("failed", f"internal error: {type(error).__name__}: {error}")
-    return Row(row.status, row.message, row.change, perf_counter() - began, row.extremes)
+    return replace(row, seconds=perf_counter() - began)
 
 
 def _ran(job: Job) -> Row:
@@ -183,7 +193,7 @@ def _ran(job: Job) -> Row:
             update["animation"] = None
         output = scene.output.model_copy(update=update)
         quiet = scene.model_copy(update={"output": output, "fatigue": None})
-        run = analyse(quiet, stresses_since=since, ends=_ends(job))
+        run = analyse(quiet, stresses_since=since, beside=Neighbours(_ends(job), job.near))
         results = run.results
     found = extremes(results, since)
     for name, peak in run.peaks.items():
@@ -192,7 +202,9 @@ def _ran(job: Job) -> Row:
     if run.steady is not None:
         if run.steady.growth is not None:
             found[GROWTH] = ("1", (run.steady.growth, math.nan, math.nan, math.nan))
-        return Row(results.status, results.reason, run.steady.residual, extremes=found)
+        begun = run.begun if job.follows else None
+        found[MARCHES] = ("1", (float(run.steady.marches), math.nan, math.nan, math.nan))
+        return Row(results.status, results.reason, run.steady.residual, extremes=found, begun=begun)
     settled = change(results, turn * time_grid(scene).step) if turn else math.nan
     return Row(results.status, results.reason, settled, extremes=found)
 

@@ -17,6 +17,7 @@ from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges
 from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
+from kedfem.sweep.following import Following, refuse_without_order
 from kedfem.sweep.keys import with_values
 from kedfem.sweep.plot import write_plot
 from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
@@ -37,6 +38,7 @@ class Asked:
     quick : plain defaults for what the scene leaves open, instead of a plan
     keep : whether the files of each run stay
     edges : relative width to which edges of unstable bands are found along the first key; none: they are not looked for
+    follow : whether steady motions are looked for where that of the point before along the first key was found
     """
 
     last: float = 1.0
@@ -44,6 +46,7 @@ class Asked:
     quick: bool = False
     keep: bool = False
     edges: float | None = None
+    follow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,17 +97,20 @@ def sweep(
     scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
     if asked.edges is not None:
         refuse_without_growth(scene, axes[0], asked.edges)
+    if asked.follow:
+        refuse_without_order(scene, asked.edges is not None)
     with claimed(folder or sweep_folder(base)) as target:
         chosen, planned = _planned(base, axes, watch)
         jobs = [Job(base, values, chosen, asked.last) for values in _points(axes)]
-        point = _Points(base, chosen, asked, target, Ends.among(jobs))
+        following = Following.along(axes) if asked.follow else Following()
+        point = _Points(base, chosen, asked, target, Ends.among(jobs), following)
         rows: dict[int, Row] = {}
         axes, found, pool = list(axes), list[Edge](), executor
         try:
             while True:
                 waiting = point.waiting(axes, rows)
                 pool = pool or _pool(asked.workers, len(waiting))
-                _run(waiting, rows, target, watch, pool)
+                _run(waiting, rows, point, watch, pool)
                 if asked.edges is None:
                     break
                 found = list(edges(axes, rows))
@@ -139,6 +145,7 @@ class _Points:
     asked: Asked
     target: FilePath
     ends: Ends
+    following: Following
     before: int = 0
 
     def waiting(self, axes: Sequence[Axis], rows: dict[int, Row]) -> dict[int, tuple[str, Job]]:
@@ -150,7 +157,7 @@ class _Points:
             job = Job(self.base, values, self.chosen, self.asked.last)
             try:
                 job = replace(job, ends=() if self.asked.keep else self.ends.of(job))
-                name = job.identity()
+                name = self.following.named(k, job.identity())
             except SceneError as error:
                 rows[k] = Row("failed", str(error))
                 continue
@@ -196,22 +203,24 @@ def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, in
 def _run(
     waiting: Mapping[int, tuple[str, Job]],
     rows: dict[int, Row],
-    target: FilePath,
+    point: _Points,
     watch: Watch,
     pool: Executor,
 ) -> None:
-    """Rows of points that wait, in whatever order they are finished."""
-    queue, total = iter(waiting.items()), len(rows) + len(waiting)
+    """Rows of points that wait, in whatever order they are finished; none before the one that it follows."""
+    left, total, target = dict(waiting), len(rows) + len(waiting), point.target
     pending: dict[Future[Row], int] = {}
     most = AHEAD * (getattr(pool, "_max_workers", 0) or os.cpu_count() or 1)
     try:
         watch("points", len(rows), total)
         while True:
-            for k, (_, job) in islice(queue, most - len(pending)):
-                pending[pool.submit(finished, job)] = k
+            due = (k for k in left if point.following.due(k, rows))
+            for k in list(islice(due, most - len(pending))):
+                _, job = left.pop(k)
+                pending[pool.submit(finished, point.following.started(k, job, target))] = k
             if not pending:
                 break
-            _keep(wait(pending, return_when=FIRST_COMPLETED).done, pending, waiting, rows, target)
+            _keep(wait(pending, return_when=FIRST_COMPLETED).done, pending, waiting, rows, point)
             watch("points", len(rows), total)
     except BrokenExecutor as error:
         raise OutputError(
@@ -219,25 +228,25 @@ def _run(
             f"memory perhaps; {len(rows)} of {total} points are kept: start again to go on, with fewer --workers"
         ) from error
     except BaseException:
-        _keep({each for each in pending if each.done()}, pending, waiting, rows, target)
+        _keep({each for each in pending if each.done()}, pending, waiting, rows, point)
         raise
 
 
 def _keep(
     done: set[Future[Row]], pending: dict[Future[Row], int], waiting: Mapping[int, tuple[str, Job]],
-    rows: dict[int, Row], target: FilePath,
+    rows: dict[int, Row], point: _Points,
 ) -> None:  # fmt: skip
     """Rows of points that are done go to the disk."""
     for each in done:
         k = pending.pop(each)
         try:
-            rows[k] = each.result()
+            rows[k] = point.following.kept(k, each.result(), point.target)
         except BrokenExecutor:
             raise
         except Exception as error:  # noqa: BLE001 - as libraries of clusters have them
             rows[k] = Row("failed", f"its worker was lost: {type(error).__name__}: {error}")
             continue
-        keep_row(target, waiting[k][0], rows[k])
+        keep_row(point.target, waiting[k][0], rows[k])
 
 
 def _end(pool: Executor, kill: bool) -> None:

@@ -9,7 +9,8 @@ than linear functions is found anew (`possible`): strains, how far points have t
 keep what these are off by for ever.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -29,6 +30,15 @@ BLOW, SHORTEST = 0.05, 8.0  # of the period, and steps at least: what a blow las
 SWUNG = ("a", "port_force", "bearing", "multiplier")  # in which steps alternate, by ρ∞ less from step to step
 HIDDEN = 1e-4  # of the energy: what these count
 ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole turns
+
+
+Carried = Mapping[str, Any]
+"""Arrays of a state by name, those that a vector is made of."""
+
+
+def carried(state: State) -> Carried:
+    """What a vector of a state is made of."""
+    return {name: getattr(state, name).copy() for name in CARRIED}
 
 
 class PeriodMap:

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Complex
 
-from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.arrays import State, copied
 from kedfem.dynamics.system.krylov import Watch, Watched, arnoldi, combined, scale_of
 from kedfem.dynamics.system.multipliers import multipliers
-from kedfem.dynamics.system.period_map import CARRIED, PeriodMap
+from kedfem.dynamics.system.period_map import CARRIED, Carried, PeriodMap
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.errors import SolveError
@@ -37,15 +37,15 @@ class Search:
     closed : what a period may leave of its size
     """
 
-    near: State | None = None
+    near: Carried | None = None
     closed: float = CLOSED
 
     def start(self, usual: State) -> State:
         """The state to begin with."""
         near = self.near
-        if near is None or any(getattr(near, x).shape != getattr(usual, x).shape for x in CARRIED):
+        if near is None or any(near[x].shape != getattr(usual, x).shape for x in CARRIED):
             return usual
-        return near
+        return copied(usual)._replace(**{name: np.array(near[name]) for name in CARRIED})
 
 
 @dataclass(frozen=True, slots=True)

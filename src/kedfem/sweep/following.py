@@ -1,0 +1,89 @@
+"""Points that follow one another: a steady motion is looked for where that of the point before was found.
+
+Points follow along the first key in the order of its values, as long as the others are the same. Of motions that are not
+linear several may be steady at one speed; which is found then depends on from where the sweep comes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path as FilePath
+
+from kedfem.errors import SceneError
+from kedfem.scene import Scene
+from kedfem.sweep.axes import Axis, Value
+from kedfem.sweep.files import keep_state, kept_state
+from kedfem.sweep.points import Job, Row
+
+
+def refuse_without_order(scene: Scene, edges: bool) -> None:
+    """Refuse to follow where there is nothing to follow, or no order.
+
+    Raises
+    ------
+    SceneError
+    """
+    if scene.analysis.kind != "steady":
+        raise SceneError(
+            "--follow: must be combined with analysis.kind = 'steady', whose motion is looked for near that of the point "
+            f"before, got kind = {scene.analysis.kind!r}"
+        )
+    if edges:
+        raise SceneError("--follow: must be without --edges, whose points lie between others")
+
+
+@dataclass
+class Following:
+    """Which point each one follows, and what their rows are called: that depends on all that were followed before.
+
+    before : number of a point → that of the one which it follows; None of the first ones
+    """
+
+    before: Mapping[int, int | None] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict)
+
+    @classmethod
+    def along(cls, axes: Sequence[Axis]) -> "Following":
+        """Along the first key."""
+        last: dict[tuple[Value, ...], int] = {}
+        before: dict[int, int | None] = {}
+        for k in range(len(axes[0].values)):
+            line = tuple(axis.values[k] for axis in axes[1:])
+            before[k] = last.get(line)
+            last[line] = k
+        return cls(before)
+
+    def named(self, k: int, own: str) -> str:
+        """The name of a point's row; `own` where points do not follow one another."""
+        if k not in self.before:
+            return own
+        last = self.before[k]
+        self.names[k] = sha256(
+            f"{own} after {'' if last is None else self.names.get(last, '')}".encode()
+        ).hexdigest()
+        return self.names[k]
+
+    def due(self, k: int, rows: Mapping[int, Row]) -> bool:
+        """Whether the point before is done."""
+        last = self.before.get(k)
+        return last is None or last in rows
+
+    def started(self, k: int, job: Job, target: FilePath) -> Job:
+        """A point as it is run, with the state that it begins near."""
+        if k not in self.before:
+            return job
+        last = self.before[k]
+        near = None if last is None else kept_state(target, self.names.get(last, ""))
+        return replace(job, follows=True, near=near)
+
+    def kept(self, k: int, row: Row, target: FilePath) -> Row:
+        """A row without the state that it hands on, which goes to the disk.
+
+        Raises
+        ------
+        OutputError
+            It cannot be written.
+        """
+        if row.begun is not None and k in self.names:
+            keep_state(target, self.names[k], row.begun)
+        return replace(row, begun=None)
