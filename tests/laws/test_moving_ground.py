@@ -19,7 +19,13 @@ M, K, C, G = 2.0, 2000.0, 8.0, 9.81  # of the block, its spring and damper; free
 GROUND_MASS = 3.0
 ALONG = np.array([0.05, 0, 0])
 QUIET = {"plots": False, "picture": False, "animation": False}
-EVERY = pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
+EVERY = pytest.mark.parametrize(
+    "axis",
+    [
+        pytest.param(axis, id=name, marks=[pytest.mark.long] if name in "yz" else [])
+        for name, axis in AXES.items()
+    ],
+)
 
 
 def run(raw: Raw, folder: Path, **probes: Raw) -> Results:
