@@ -110,12 +110,6 @@ REFUSALS = (
     Refusal("springs", {"element": ("along",), "joint": others(*SLID)}, "{where}.joint",
         "name a prismatic or cylindrical joint", "no other joint has one travel",
         "{name!r}, which is {kind}", "take a spring between two points"),
-    *(Refusal(of, {"element": (element,), "joint": SLID, "slide": ("between links",), "frames": ("rigid-body",)},
-        "{where}.joint", 'name a slide on the ground, or be combined with frames = "co-rotational"',
-        "with rigid-body ones its force would keep the direction in the reference position while the slide turns",
-        "{name!r}",
-        'take frames = "co-rotational"') for of, element in
-        (("motors", "force"), ("springs", "along"), ("limits", "travel limit"))),
     Refusal("limits", {"element": ("angle limit",), "joint": others(*TURNED)}, "{where}.joint",
         "name a revolute or cylindrical or screw joint for an angle", "no other joint has one rotation",
         "{name!r}, which is {kind}", "take a limit of a hinge beside it"),

@@ -9,7 +9,6 @@ from kedfem.scene.checks import NOUNS, fidelity, link_names
 from kedfem.scene.damping import rayleigh
 from kedfem.scene.faults import place
 from kedfem.scene.frames import default_frames
-from kedfem.scene.links import GROUND
 from kedfem.scene.moving_joints import moving_joints
 from kedfem.scene.parts import Entry, Parts
 from kedfem.scene.planes import rigid_in_space
@@ -90,9 +89,8 @@ def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, 
     joint = parts.joints.get(name or "")
     if joint is None:
         return {}, {}
-    kind, between = str(joint.word("kind")), GROUND not in link_names(joint)
-    facts = {"joint": kind, "slide": "between links" if between else "on the ground"}
-    return facts, {"name": joint.name, "kind": kind}
+    kind = str(joint.word("kind"))
+    return {"joint": kind}, {"name": joint.name, "kind": kind}
 
 
 def drives(parts: Parts) -> Iterator[Told]:

@@ -73,8 +73,7 @@ class Motor(Record):
     """
 
     joint: str
-    """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force; between links that
-    both move a force needs co-rotational frames"""
+    """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
     force: ForceOver | None = None

@@ -74,8 +74,7 @@ class LineSpring(_Elastic):
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
     joint: str | None = None
-    """a prismatic or cylindrical joint that it lies along, instead of two ends; between links that both move it needs
-    co-rotational frames"""
+    """a prismatic or cylindrical joint that it lies along, instead of two ends"""
     stiffness: Stiffness = 0.0
     """k"""
     damping: Damper = 0.0

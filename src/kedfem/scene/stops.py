@@ -51,7 +51,7 @@ class TravelLimit(_Range):
 
     kind: Literal["travel"] = "travel"
     joint: str
-    """a prismatic or cylindrical joint that no drive moves; between links that both move it needs co-rotational frames"""
+    """a prismatic or cylindrical joint that no drive moves"""
     lower: Length | None = None
     """least travel that is free; no stop there if not given"""
     upper: Length | None = None
