@@ -220,3 +220,14 @@ def test_a_required_life_uses_what_it_needs() -> None:
     assert_allclose(verdict(h, curve, 0.0, 1.0, 1e4).utilisation, 1.5 / 100**0.2, rtol=1e-12)
     assert_allclose(verdict(h, curve, 0.0, 1.0, 1e9).utilisation, 1.5, rtol=1e-12)
     assert verdict(0.99e8 * np.cos(PHASE), curve, 0.0, 1.0, np.inf).damage == 0.0
+
+
+@pytest.mark.parametrize("mean", [-3, -1.0000001, -1, -0.5, 0, 1, 2, 5])
+def test_a_utilisation_is_that_of_the_amplitude_with_mean_0(mean: float) -> None:
+    """Pulsating compression, R = −∞, too."""
+    curve, h = (
+        strength_of(FatigueData(group="steel", tensile_strength=9e8), 2e11),
+        1e8 * (mean + np.cos(PHASE)),
+    )
+    equal = damage(h[None] / 1e8, M=curve.M)[0, 1] * 1e8
+    assert_allclose(verdict(h, curve, 0.0, 1.5, np.inf).utilisation, 1.5 * equal / curve.endurance, rtol=3e-6)

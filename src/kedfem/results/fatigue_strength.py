@@ -21,6 +21,7 @@ BEYOND_ALUMINIUM, LAST_ALUMINIUM = 15.0, 1e8  # slope beyond, up to the enduranc
 LIVES = np.logspace(0, 12, 121)  # cycles of strain-life data in a table
 ENDLESS = 1e-12  # of the endurance stress: where an amplitude does no damage on any curve
 POLISHED = 1e-6  # m, Rz
+NEAR = 1e-6  # of an amplitude: mean stresses of pulsating compression
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +139,9 @@ def material_factors(
     import pandas as pd
     from pylife.strength.fkm_linear import fkm_linear_factors as fkm
 
-    group = GROUPS[str(data.group)]
+    group, (amplitude, mean) = GROUPS[str(data.group)], cycle
+    if abs(mean + amplitude) <= NEAR * amplitude:  # R = −∞, which pyLife takes for tension
+        mean = -(1 + 2 * NEAR) * amplitude
     settings = pd.Series(
         {
             "fkm_chapter": "chap4", "MatGroupFKM": group, "MatGroupFKM_Temp": "None", "Profile": "Rod",
@@ -149,7 +152,7 @@ def material_factors(
         "Rm": 1e-6 * (data.tensile_strength or 0.0), "Rz": 1e6 * data.roughness, "S_Type": "normal",
         "Temperature": 20.0, "HardProc": "None", "GJL_Mat": "None", "Kf_method": "Table",
         "Finish": "None" if data.roughness > POLISHED else "polished", "G0": 1e-3 * gradient,
-        "amplitude": 1e-6 * cycle[0], "meanstress": 1e-6 * cycle[1],
+        "amplitude": 1e-6 * amplitude, "meanstress": 1e-6 * mean,
     }  # fmt: skip
     found = fkm.calc_input_parameters_material(settings, pd.DataFrame([row]))
     if data.mean_stress_sensitivity is not None:
