@@ -17,13 +17,15 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from kedfem.analysis import analyse
-from kedfem.errors import OutputError
+from kedfem.cli.reporting import _written
+from kedfem.errors import OutputError, SceneError
 from kedfem.kinematics import kinematics
 from kedfem.output.bars import bars, heights
 from kedfem.output.words import with_prefix
 from kedfem.report import surfaces, write_report
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import cursor_places, curve_groups
+from kedfem.report.facts import loads_tables, notes_table, steady_table
 from kedfem.report.surfaces import placement
 from kedfem.results import read_results
 from kedfem.scene import scene_from
@@ -209,6 +211,36 @@ def test_the_cursor_is_at_the_drive(solid: Path) -> None:
     for left, right, top, bottom in (curve.box for curve in every if curve.box):
         assert 0 < left < right < 1
         assert 0 < top < bottom < 1
+
+
+def test_rounding_in_load_tables_is_told_as_such() -> None:
+    """As on the terminal: beside 2 kN a force of 1e-8 N is none, a moment is measured by moments."""
+    row = {"peak [N]": 2e3, "axial [N]": 1e-8, "moment [N m]": 1e-8}
+    (table,) = loads_tables({"A": row}, {})
+    assert table.rows == [("A", "2 kN", "≈ 0", "10 nN m")]
+
+
+def test_a_steady_motion_has_its_table() -> None:
+    notes: dict[str, str | float] = {
+        "steady period [s]": 0.02, "steady revolutions": 1.0, "steady marches": 11.0, "steady residual": 2e-9,
+        "steady growth in a period": 1.25, "unknowns": 7.0,
+    }  # fmt: skip
+    (table,) = steady_table(notes)
+    assert [row[1] for row in table.rows] == ["20 ms", "1", "125 %", "2.0e-09", "11"]
+    assert [row[0] for row in notes_table(notes).rows] == ["unknowns"]
+    notes.pop("steady growth in a period")
+    assert steady_table(notes)[0].rows[2][1] == "not found out"
+    assert steady_table({"unknowns": 7.0}) == []
+
+
+def test_a_scene_from_elsewhere_is_refused_if_asked(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    scene = tmp_path / "in" / "scene.toml"
+    scene.write_text('include = "../other.toml"', encoding="utf-8")
+    with pytest.raises(SceneError, match=r"include: must be within the scene's folder \(--within\)"):
+        _written(scene, None, within=True)
+    with pytest.raises(SceneError, match="--within: must be combined with a scene"):
+        _written(tmp_path / "in", None, within=True)
 
 
 def told(folder: Path) -> str:

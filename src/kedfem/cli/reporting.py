@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from kedfem.cli.options import Within
 from kedfem.cli.screen import err, out, progress
-from kedfem.errors import OutputError
+from kedfem.errors import OutputError, SceneError
 
 Given = Annotated[
     Path, typer.Argument(metavar="SCENE|RESULTS", help="A scene, results.h5, or the folder that has it.")
@@ -20,28 +21,31 @@ def report(
         Path | None,
         typer.Option(metavar="FILE", help="Where it goes; default: report.html beside the results."),
     ] = None,
+    within: Within = False,
 ) -> None:
     """One page about a run for any browser, without network: motion in three dimensions, curves, loads, warnings.
 
     Of a scene without results the analysis is run first.
     """
-    out.print(f"{_written(given, file)}  {WRITTEN}", markup=False, soft_wrap=True)
+    out.print(f"{_written(given, file, within)}  {WRITTEN}", markup=False, soft_wrap=True)
 
 
-def view(given: Given) -> None:
+def view(given: Given, within: Within = False) -> None:
     """Write the same page, and open it."""
-    path = _written(given, None)
+    path = _written(given, None, within)
     out.print(f"{path}  {WRITTEN}", markup=False, soft_wrap=True)
     if typer.launch(path.resolve().as_uri()) != 0:
         err.print("warning: no browser could be opened here; open the page by hand", style="yellow")
 
 
-def _written(given: Path, file: Path | None) -> Path:
+def _written(given: Path, file: Path | None, within: bool) -> Path:
     """The page of results that are there, or of a scene that is run now."""
     from kedfem.report import require_report, write_report
 
     require_report("kedfem report")
-    folder = _of_scene(given) if given.suffix == ".toml" else given
+    if within and given.suffix != ".toml":
+        raise SceneError("--within: must be combined with a scene, got results, which are read alone")
+    folder = _of_scene(given, within) if given.suffix == ".toml" else given
     with progress() as watch:
         watch("report", 0, 0)
         done = write_report(folder, file)
@@ -50,7 +54,7 @@ def _written(given: Path, file: Path | None) -> Path:
     return done.path
 
 
-def _of_scene(file: Path) -> Path:
+def _of_scene(file: Path, within: bool) -> Path:
     """The results of a scene, found now where there are none.
 
     Raises
@@ -62,7 +66,7 @@ def _of_scene(file: Path) -> Path:
     from kedfem.results import read_results
     from kedfem.scene import read_scene
 
-    scene = read_scene(file)
+    scene = read_scene(file, within=within)
     results = scene.results_folder / "results.h5"
     if not results.exists():
         with progress() as watch:

@@ -1,6 +1,6 @@
 """Numbers in words."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -9,6 +9,19 @@ from kedfem.scene import Scene
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
 UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def number_in(row: Mapping[str, float], name: str) -> str:
+    """A number of a row with its unit, which is in its name; what is rounding beside others of that unit is about zero.
+
+    >>> number_in({"force [N]": 2e3, "moment [N m]": 3.0, "axial [N]": 1e-8}, "axial [N]")
+    '≈ 0'
+    """
+    x, unit = row.get(name, np.nan), name.rpartition(" [")[2]
+    largest = max(
+        (abs(value) for other, value in row.items() if other.rpartition(" [")[2] == unit), default=0.0
+    )
+    return "≈ 0" if abs(x) < NOTHING * largest else with_prefix(x, unit.removesuffix("]"))
 
 
 def with_prefix(value: float, unit: str) -> str:

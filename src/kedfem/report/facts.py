@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
-from kedfem.output.words import place_of, with_prefix
+from kedfem.output.words import number_in, place_of, with_prefix
 from kedfem.results import Fatigue, Peak, Results
 
 Rows = list[tuple[str, ...]]
+STEADY = "steady "
+"""What notes of a steady motion begin with."""
 ENDLESS = 1e15  # revolutions, hours: as good as for ever
 
 
@@ -211,14 +213,8 @@ def _numbers(title: str, what: str, told: Mapping[str, Mapping[str, float]], not
     """A line for each name; columns that no line has are left out."""
     every = dict.fromkeys(key for numbers in told.values() for key in numbers)
     keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in told.values())]
-    rows: Rows = [
-        (name, *(with_prefix(x.get(key, np.nan), _unit(key)) for key in keys)) for name, x in told.items()
-    ]
+    rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in told.items()]
     return Table(title, (what, *(key.rpartition(" [")[0] for key in keys)), rows, note)
-
-
-def _unit(key: str) -> str:
-    return key.rpartition("[")[2].removesuffix("]")
 
 
 def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
@@ -245,9 +241,28 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
     return [Table("Estimated error", ("from", *kinds), rows, note)]
 
 
+def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
+    """A motion that repeats itself: its period, and what a period leaves of vibrations about it."""
+    if f"{STEADY}period [s]" not in notes:
+        return []
+    period, turns, marches, residual = (
+        float(notes[STEADY + key]) for key in ("period [s]", "revolutions", "marches", "residual")
+    )
+    growth = notes.get(f"{STEADY}growth in a period")
+    left = "not found out" if growth is None else f"{100 * float(growth):.4g} %"
+    rows: Rows = [
+        ("period", with_prefix(period, "s")),
+        ("revolutions of the drive in it", f"{turns:g}" if turns else "–"),
+        ("vibration that is left after a period, at worst", left),
+        ("what a period changes of its state", f"{residual:.1e}"),
+        ("periods marched to find it", f"{marches:g}"),
+    ]
+    return [Table("Steady motion", (), rows, "More than 100 % left: unstable, the vibration grows.")]
+
+
 def notes_table(notes: Mapping[str, str | float]) -> Table:
     """All else that the run said of itself."""
-    told = (OF_SOURCE, TOGETHER, UNKNOWN)
+    told = (OF_SOURCE, TOGETHER, UNKNOWN, STEADY)
     plain = {key: x for key, x in notes.items() if not key.startswith(told)}
     return named_table("What the run said of itself", plain.items())
 

@@ -27,6 +27,7 @@ from kedfem.report.facts import (
     named_table,
     notes_table,
     peaks_table,
+    steady_table,
 )
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
@@ -114,7 +115,7 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
         "modelled": [links_table(scene, results), joints_table(scene)],
         "loads": loads,
         "groups": curve_groups(results) | ({"Bearing loads": polars} if polars else {}),
-        "trust": [*budget_table(results.notes), notes_table(results.notes)],
+        "trust": [*steady_table(results.notes), *budget_table(results.notes), notes_table(results.notes)],
         "seconds": [named_table("Seconds", results.seconds.items())] if results.seconds else [],
         "scene": results.scene_toml or json.dumps(scene, indent=1),
     }

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
-from kedfem.output.words import NOTHING, with_prefix
+from kedfem.output.words import NOTHING, number_in, with_prefix
 
 SHORT = {
     "drive at peak": "at", "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
@@ -59,11 +59,5 @@ def _table(title: str, what: str, every: Mapping[str, Mapping[str, float]]) -> T
         label = name.rpartition(" [")[0]
         table.add_column(SHORT.get(label, label), justify="right", overflow="fold")
     for key, row in every.items():
-        table.add_row(key, *(_number(row, name) for name in names))
+        table.add_row(key, *(number_in(row, name) for name in names))
     return table
-
-
-def _number(row: Mapping[str, float], name: str) -> str:
-    x, unit = row.get(name, np.nan), name.rpartition(" [")[2]
-    largest = max((abs(value) for other, value in row.items() if other.endswith(unit)), default=0.0)
-    return "≈ 0" if abs(x) < NOTHING * largest else with_prefix(x, unit.removesuffix("]"))
