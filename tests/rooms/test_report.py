@@ -22,6 +22,7 @@ from kedfem.errors import OutputError, SceneError
 from kedfem.kinematics import kinematics
 from kedfem.output.bars import bars, heights
 from kedfem.output.words import with_prefix
+from kedfem.report import animated as over_frames
 from kedfem.report import surfaces, write_report
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import cursor_places, curve_groups
@@ -145,13 +146,13 @@ def test_beams_are_drawn_with_their_sections_where_frames_have_them(lines: Path)
 
 def test_large_models_are_thinned_and_say_so(solid: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(surfaces, "NODES", 60)
-    monkeypatch.setattr(surfaces, "FRAMES", 3)
+    monkeypatch.setattr(over_frames, "FRAMES", 3)
     found = shown(solid)
     assert [text.partition(" of ")[0] for text in found.thinned[1:]] == ["3"]
     assert "nodes on the links' surfaces are drawn" in found.thinned[0]
     assert len(found.surfaces[0].points[0]) <= 80
-    low, high = surfaces.bounds(found.surfaces, np.eye(3))
-    assert_allclose(high - low, surfaces.bounds(found.surfaces[:1], np.eye(3))[1] - low, rtol=1e-12)
+    low, high = over_frames.bounds(found.surfaces, np.eye(3))
+    assert_allclose(high - low, over_frames.bounds(found.surfaces[:1], np.eye(3))[1] - low, rtol=1e-12)
 
 
 def test_the_page_tells_the_run(solid: Path) -> None:

@@ -15,7 +15,9 @@ from kedfem.errors import OutputError
 from kedfem.output.derived import STEM, WORST
 from kedfem.output.rendering import view
 from kedfem.output.stress_files import ENVELOPE
-from kedfem.report.surfaces import FRAMES, Surface, sources_of
+from kedfem.report.surfaces import Surface, sources_of
+
+FRAMES = 120
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from kedfem.output.bars import LINES, THINNEST, heights, rims
 from kedfem.output.rendering import LIFT, QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 
-FRAMES, NODES = 120, 20_000
+NODES = 20_000
 """Most frames, and most nodes on the surfaces of all links: what a browser draws at once."""
 
 HIGHEST = f"{KINDS[0]} stress [Pa]"
