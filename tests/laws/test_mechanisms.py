@@ -45,7 +45,13 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
     assert np.abs(at_centre).max() < 1e-12  # m/s: nothing is asked of it
 
 
-CHEAP = ((113, "rigid-body"), (213, "rigid-body"), (1008, "co-rotational"), (1014, "co-rotational"))
+CHEAP = (
+    (113, "rigid-body"),
+    (213, "rigid-body"),
+    (1008, "co-rotational"),
+    (1014, "co-rotational"),
+    (1031, "co-rotational"),
+)
 DEAR = ((1, "rigid-body"), (1006, "co-rotational"))  # gears on a rigid hub; gears, a spring and a rigid link
 
 

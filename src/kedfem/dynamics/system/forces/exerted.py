@@ -100,12 +100,7 @@ def _on_ports(forces: Supports, joints: Sequence[ConstraintJoint]) -> Float[np.n
     """Forces on the interface points of joints by constraint equations, side by side, if joint forces need them."""
     if not any(joint.from_rows.any() for joint in forces.of.system.model.joints):
         return np.zeros((len(forces.z), 0))
-    out = [np.zeros((len(forces.z), 0))]
-    for joint in joints:
-        for side in (*joint.sides, *(side for _, other in joint.plus for side in other.sides)):
-            if side is not None and side.shared:
-                out.append(forces.on_end(joint.name, end_of(side, joint)).reshape(len(forces.z), -1))
-    return np.concatenate(out, axis=1)
+    return forces.on_interface(joints)
 
 
 def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> dict[int, Rows]:

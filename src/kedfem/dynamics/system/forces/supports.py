@@ -4,11 +4,13 @@ A multiplier is a force along its coordinate: on an end i it is the force m ∂e
 that the drive carries has no unknowns; all that acts on it, and P − M R0'', its hub must balance.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import PrescribedBody
 from kedfem.dynamics.system.arrays import History
@@ -104,7 +106,7 @@ class Supports:
             if share.any():
                 every += self.history.port_force[:, bodies.port_at[j] : bodies.port_at[j + 1]] @ share.T
         if ports.from_rows.any():
-            every += self._on_interface() @ ports.from_rows.T
+            every += self.on_interface(self.of.system.model.rows) @ ports.from_rows.T
         force, moment = np.zeros((2, *about.shape))
         for port, (X, name) in enumerate(zip(ports.points, ports.joints, strict=True)):
             if name == joint:
@@ -117,15 +119,23 @@ class Supports:
                     moment[:, 2] += here[:, 2]
         return force, moment
 
-    def _on_interface(self) -> Float[np.ndarray, "T m"]:
-        """What all constraints and laws exert on interface points of their own, side by side as `coupling` has them."""
-        out = []
-        for row in self.of.system.model.rows:
+    def on_interface(self, rows: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
+        """What rows of the model exert on interface points of their own, side by side as `coupling` has them.
+
+        Both joints of gears may have one end: what is exerted there is told once.
+        """
+        out = [np.zeros((len(self.z), 0))]
+        for row in rows:
+            told: list[End] = []
             for joint in (row, *(other for _, other in row.plus)):
                 for side in joint.sides:
                     if side is not None and side.shared:
                         ends = corners(side) if row.name.startswith("rigid.") else [end_of(side, joint)]
-                        out += [self.on_end(row.name, end).reshape(len(self.z), -1) for end in ends]
+                        for end in ends:
+                            again = any(same_end(end, other) for other in told)
+                            on = self.on_end(row.name, end)
+                            out.append((0.0 * on if again else on).reshape(len(self.z), -1))
+                        told += ends
         return np.concatenate(out, axis=1)
 
     def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
