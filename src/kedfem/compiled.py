@@ -2,9 +2,9 @@
 
 numba compiles a function again when its own file has changed, but not when one that it calls in another file has, nor a
 constant there. So what it compiled is kept in a folder named after all `*kernel.py` files together, what they import of
-kedfem, and this file with its options: in the user's cache folder, so that a read-only installation compiles once too, or
-beside the package where that cannot be used. Numba takes a while to load: imported by kernels, and where users are told
-that it compiles.
+kedfem, the records that they are given, and this file with its options: in the user's cache folder, so that a read-only
+installation compiles once too, or beside the package where that cannot be used. Numba takes a while to load: imported by
+kernels, and where users are told that it compiles.
 """
 
 import atexit
@@ -23,13 +23,16 @@ from kedfem.digests import drop_changed, note
 from kedfem.folders import KERNELS, compiled_folder
 
 ROOT = Path(__file__).parent
+RECORDS = ("dynamics/system/arrays.py", "dynamics/metric.py")
+"""Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
 
 
 def kernel_folder(root: Path) -> Path:
     """The folder of what was compiled of all kernels under a folder."""
     digest = sha256()
     kernels = set(root.rglob("*kernel.py"))
-    for file in sorted(kernels | {each for kernel in kernels for each in _imported(kernel, root)}):
+    records = {file for name in RECORDS if (file := root / name).is_file()}
+    for file in sorted(kernels | records | {each for kernel in kernels for each in _imported(kernel, root)}):
         digest.update(file.read_bytes())
     return (compiled_folder() or root / "__pycache__" / KERNELS) / digest.hexdigest()[:16]
 

@@ -1,6 +1,7 @@
 """Compiled loops are kept for one state of all kernels together."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -68,6 +69,24 @@ def test_the_kinds_of_force_elements_and_the_options_of_the_compiler_are_in_it()
 
     files = _imported(ROOT / "dynamics" / "force_elements_kernel.py", ROOT)
     assert {ROOT / "dynamics" / "force_element.py", ROOT / "compiled.py"} <= files
+
+
+def test_all_records_that_kernels_are_given_are_in_it() -> None:
+    """A class that moved was an AttributeError on every cache that had been made before."""
+    files = compiled.ROOT.rglob("*.py")
+    records = {
+        file for file in files if re.search(r"^class \w+\(NamedTuple\)", file.read_text(), re.MULTILINE)
+    }
+    assert records == {compiled.ROOT / name for name in compiled.RECORDS}
+
+
+def test_a_change_of_these_records_begins_a_new_folder(tmp_path: Path) -> None:
+    record = tmp_path / compiled.RECORDS[0]
+    record.parent.mkdir(parents=True)
+    record.write_text("x = 1\n")
+    first = compiled.kernel_folder(tmp_path)
+    record.write_text("x = 2\n")
+    assert compiled.kernel_folder(tmp_path) != first
 
 
 @pytest.mark.skipif("NUMBA_CACHE_DIR" in os.environ, reason="the user has chosen a folder")
