@@ -1,6 +1,6 @@
-"""An elastic link as matrices for other programs: mass, stiffness, modes, and what its ports mean."""
+"""For other programs: an elastic link as matrices (mass, stiffness, modes, ports), the links' rigid motion as a table."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -8,15 +8,20 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.reduction import prepared
+from kedfem.accuracy.variants import moved
 from kedfem.dynamics.joints.places import seat_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
+from kedfem.dynamics.nominal import all_motions
 from kedfem.errors import MeshError, OutputError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights, seat_couples
-from kedfem.motion.assembly import assembled
+from kedfem.motion.assembly import assembled, assembly_warning
+from kedfem.motion.counted_turns import require_counted
+from kedfem.output.motion_file import write_motion
 from kedfem.results import replacing
 from kedfem.results.files import reason
 from kedfem.results.modelled import element_words
@@ -94,6 +99,23 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
     return _exported(scene, name, link)
 
 
+def export_motion(scene: Scene, path: Path) -> tuple[int, tuple[str, ...]]:
+    """Write the rigid-body motion of all links at all time points as comma-separated values; rows, warnings.
+
+    Raises
+    ------
+    KedfemError
+        The file does not end in .csv or cannot be written, the scene has no drive, or the mechanism cannot move so far.
+    """
+    require_ending(path, (".csv",))
+    scene, assembly = assembled(moved(scene))
+    linked, along = moving(scene)
+    require_counted(scene, linked, along)
+    count = write_motion(path, scene, linked, (motion for _, motion in all_motions(scene, linked, along)))
+    free = (f"free motions ({linked.mobility}) are held as drawn",) if linked.mobility else ()
+    return count, (*assembly_warning(assembly), *free)
+
+
 def _exported(scene: Scene, name: str, link: Link) -> ExportedLink:
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     k = link.unknowns
@@ -168,15 +190,15 @@ def write_link(link: ExportedLink, path: Path) -> None:
             savemat(file, data | {"ports": np.array(link.ports, object)}, do_compression=True)
 
 
-def require_ending(path: Path) -> None:
+def require_ending(path: Path, endings: Sequence[str] = ENDINGS) -> None:
     """A file of a kind that is known.
 
     Raises
     ------
     OutputError
     """
-    if path.suffix not in ENDINGS:
-        raise OutputError(f"{path}: must end in .npz or .mat, got '{path.suffix}'")
+    if path.suffix not in endings:
+        raise OutputError(f"{path}: must end in {' or '.join(endings)}, got '{path.suffix}'")
 
 
 def read_link(path: Path) -> ExportedLink:

@@ -8,19 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
-from kedfem.accuracy.variants import with_analysis
+from kedfem.accuracy.variants import moved
 from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.joints.places import slider_axis
-from kedfem.dynamics.nominal import motions
-from kedfem.errors import MeshError, MotionError
+from kedfem.dynamics.nominal import all_motions
+from kedfem.errors import MeshError
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.motion.transmission import LEAST
 from kedfem.output.derived import PLOTS, STEM, TABLE
 from kedfem.output.plots import write_plots
@@ -31,7 +30,7 @@ from kedfem.results.additions import add_account
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
 from kedfem.results.rigid import RigidForces, rigid_forces
-from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, path_parameter, time_grid
+from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, time_grid
 from kedfem.stepping import Watch, frame_steps
 
 
@@ -67,15 +66,7 @@ def kinematics(
     KedfemError
         With a message for the user.
     """
-    if scene.driven is None:
-        raise MotionError(
-            "drive: is required for kinematics, got none: without one the linkage rests as drawn "
-            "(kedfem run moves it by its forces)"
-        )
-    if scene.analysis.kind == "static":  # in which the mechanism would stand still
-        grid = time_grid(scene)
-        scene = with_analysis(scene, kind="transient", end_time=grid.end, step=grid.step,
-                              revolutions=None, steps_per_revolution=None)  # fmt: skip
+    scene = moved(scene)
     with claimed(folder or kinematics_folder(scene)) as target:
         return _moved(scene, target, watch)
 
@@ -151,18 +142,11 @@ def _stepped(
     ) as writer:
         if not wanted:
             remove_animation(folder, STEM)
-        for first, motion in _blocks(scene, linked, along):
+        for first, motion in all_motions(scene, linked, along):
             rows = recorded.rows(motion) | forces.rows(motion, first)
             writer.append(motion.t, motion.phi, rows)
             for k in sorted(wanted & set(range(first, first + len(motion.t)))):
                 frames.add(float(motion.t[k - first]), rigid_fields(seen, motion, k - first))
-
-
-def _blocks(scene: Scene, linked: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
-    """The rigid motion at all time points, with the number of the first of each block."""
-    start = np.zeros(1)
-    yield 0, rigid_motion(linked, along, start, path_parameter(scene, start))
-    yield from motions(scene, linked, along)
 
 
 def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from kedfem.errors import MotionError
 from kedfem.scene import (
     Bar,
     Cad,
@@ -32,6 +33,26 @@ def with_links(scene: Scene, links: Mapping[str, LinkScene]) -> Scene:
 def with_analysis(scene: Scene, **keys: Any) -> Scene:
     """The scene with some keys of its analysis replaced."""
     return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=keys)})
+
+
+def moved(scene: Scene) -> Scene:
+    """The scene whose drive moves its links as rigid bodies over time: a static analysis would stand still.
+
+    Raises
+    ------
+    MotionError
+        It has no drive.
+    """
+    if scene.driven is None:
+        raise MotionError(
+            "drive: is required for kinematics, got none: without one the linkage rests as drawn "
+            "(kedfem run moves it by its forces)"
+        )
+    if scene.analysis.kind != "static":
+        return scene
+    grid = time_grid(scene)
+    return with_analysis(scene, kind="transient", end_time=grid.end, step=grid.step,
+                         revolutions=None, steps_per_revolution=None)  # fmt: skip
 
 
 def with_steps(scene: Scene, steps: int) -> Scene:

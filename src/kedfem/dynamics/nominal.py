@@ -25,6 +25,13 @@ KEPT = 20_000  # time points of a turn whose rigid motion is kept
 FINER = 8  # instants in a step, from whose differences the rates of constraints at the start are
 
 
+def all_motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
+    """Rigid motion at all time points, with the number of the first of each block."""
+    start = np.zeros(1)
+    yield 0, rigid_motion(linkage, along, start, path_parameter(scene, start))
+    yield from motions(scene, linkage, along)
+
+
 def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iterator[tuple[int, RigidMotion]]:
     """Rigid motion at all time points after the first, block after block with the number of its first point.
 

@@ -1,0 +1,96 @@
+"""The rigid-body motion of all links as a table, for multibody programs, animation and controllers."""
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.motion.constraints import cross
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rigid import RigidMotion
+from kedfem.results.data_sets import drive_heading
+from kedfem.results.recorded import drive_channel
+from kedfem.results.table import DIGITS, text_file
+from kedfem.scene import Scene
+
+QUANTITIES = (
+    ("position", "xyz", "m"),
+    ("orientation", "wxyz", "-"),
+    ("velocity", "xyz", "m/s"),
+    ("angular_velocity", "xyz", "rad/s"),
+    ("acceleration", "xyz", "m/s^2"),
+    ("angular_acceleration", "xyz", "rad/s^2"),
+)
+"""Of each link, in world components."""
+
+
+def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[RigidMotion]) -> int:
+    """Write the motion of all links as comma-separated values, one row per time point; how many there are.
+
+    Parameters
+    ----------
+    blocks : the motion, one part of the time after the other
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    names = ["time [s]", drive_heading(drive_channel(scene)), *_columns(list(scene.links))]
+    last: dict[int, Float[np.ndarray, "4"]] = {}
+    count = 0
+    with text_file(path) as file:
+        csv.writer(file, lineterminator="\n").writerow(names)
+        for motion in blocks:
+            rows = [motion.t[:, None], motion.phi[:, None]]
+            for name in scene.links:
+                body = linkage.bodies.index(name)
+                q = continuous_quaternions(motion.R[:, body], last.get(body))
+                last[body] = q[-1]
+                rows += _rows(motion, body, reference_point(scene, name), q)
+            np.savetxt(file, np.hstack(rows), fmt=DIGITS, delimiter=",")
+            count += len(motion.t)
+    return count
+
+
+def reference_point(scene: Scene, name: str) -> Float[np.ndarray, "3"]:
+    """The place, as drawn, of a link's first joint; the origin of a link without one [m]."""
+    at = (joint.at for joint in scene.joints.values() if name in joint.links)
+    return np.asarray(next(at, (0.0, 0.0, 0.0)), float)
+
+
+def continuous_quaternions(
+    R: Float[np.ndarray, "T 3 3"], before: Float[np.ndarray, "4"] | None = None
+) -> Float[np.ndarray, "T 4"]:
+    """Unit quaternions w, x, y, z of rotations, each with the sign that is nearer to the one before it.
+
+    Parameters
+    ----------
+    before : of the time point before the first; without it the first has w ≥ 0
+    """
+    from scipy.spatial.transform import Rotation
+
+    q = np.asarray(Rotation.from_matrix(R).as_quat(canonical=True))[:, [3, 0, 1, 2]]
+    near = np.einsum("tk,tk->t", q, np.vstack([q[:1] if before is None else before, q[:-1]]))
+    return q * np.cumprod(np.where(near < 0, -1.0, 1.0))[:, None]
+
+
+def _columns(links: Sequence[str]) -> list[str]:
+    return [
+        f"links/{name}/{quantity} {component} [{unit}]"
+        for name in links
+        for quantity, components, unit in QUANTITIES
+        for component in components
+    ]
+
+
+def _rows(
+    motion: RigidMotion, body: int, at: Float[np.ndarray, "3"], q: Float[np.ndarray, "T 4"]
+) -> list[Float[np.ndarray, "T c"]]:
+    """All quantities of a body, in the order of QUANTITIES."""
+    omega, alpha, arm = motion.omega[:, body], motion.alpha[:, body], motion.R[:, body] @ at
+    velocity = motion.v[:, body] + cross(omega, arm)
+    acceleration = motion.p2[:, body] + motion.R2[:, body] @ at
+    return [motion.p[:, body] + arm, q, velocity, omega, acceleration, alpha]
