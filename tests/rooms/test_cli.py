@@ -120,7 +120,7 @@ MAIN = "from kedfem.cli import main; main()"
 def test_help_names_every_command_and_each_explains_itself(run_kedfem: Command) -> None:
     said = run_kedfem("--help")
     assert said.code == 0
-    for name in ("run", "check", "kinematics", "frequencies", "mesh", "accuracy", "new", "cache", "bench"):
+    for name in ("run", "check", "kinematics", "frequencies", "mesh", "accuracy", "new", "cache"):
         assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), (
             f"{name} is cut off or missing"
         )
