@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, needs_rows
@@ -28,6 +29,8 @@ from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import Joint, Scene
+
+ACROSS = 0.2  # of what points of a slide lie apart sideways: along it less is no lever that holds a rotation
 
 
 @dataclass
@@ -132,9 +135,12 @@ def joined(
             unknowns += _mixed(scene, name, {link: (ports[link], seats[link]) for link in held}, unknowns)
             continue
         points = port_points(scene, name, joint, seats, links) if held else np.zeros((0, 3))
-        for point in points:
+        across, travel = _lies_across(joint, points), unknowns
+        for k, point in enumerate(points):
             components = _components(scene, name, joint, [links[link] for link in held])
             first, block, new = _target(joint, others, sliders, first_of, unknowns, components)
+            if across and k and new:  # one travel for all, so that the surface cannot tilt
+                first, new = travel, 0
             for link in held:
                 weights = port_weights(seats[link], point[None, :])[0]
                 ports[link].add(weights, point, name, components, first, block)
@@ -219,6 +225,15 @@ def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list
             f"joints.{name}: must be a hinge between a beam and a plane link, got a {joint.kind} of {kinds}"
         )
     return [0, 1, 2]
+
+
+def _lies_across(joint: Joint, points: Float[np.ndarray, "p 3"]) -> bool:
+    """Whether the points of a slide lie across its direction: what holds them sideways would not hold their rotation."""
+    if joint.kind != "prismatic" or len(points) < 2:
+        return False
+    axis, away = joint_axis(joint), points - points.mean(axis=0)
+    along = away @ axis
+    return bool(np.abs(along).max() < ACROSS * np.linalg.norm(away - np.outer(along, axis), axis=1).max())
 
 
 def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], first_of: dict[str, int],
