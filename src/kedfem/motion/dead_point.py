@@ -95,7 +95,8 @@ def _outside(link: Linkage, along: Path, k: int) -> float | None:
     for power in (FOLD, CROSSING):
         y = sigma ** (1 / power)
         slope = (y[1] - y[0]) / x[1]
-        misfit = abs(y[0] + slope * x[2] - y[2]) / abs(y[2] - y[0])
+        change = abs(y[2] - y[0])  # none of a linkage whose drives leave its shape as it is
+        misfit = abs(y[0] + slope * x[2] - y[2]) / change if change > 0.0 else np.inf
         trials.append((misfit, y[0] / slope if slope > 0 else np.inf))
     distance = float(min(trials)[1])
     far = SEARCHED * link.drives.units[0] if len(link.drives) == 1 else np.ptp(along.phi) / 4
