@@ -221,6 +221,36 @@ link = "rocker"
 at = "C"
 force = ["50 N", 0]
 ''',
+    "[fatigue]": '''
+[fatigue]
+required_life = "20000 h"
+
+[fatigue.materials.steel]
+group = "steel"
+tensile_strength = "800 MPa"
+''',
+    "[fatigue.materials.NAME], [fatigue.links.NAME]": '''
+[fatigue.materials.steel]               # of the FKM guideline, by name of the links' material
+group = "steel"
+tensile_strength = "800 MPa"
+roughness = "12.5 um"
+
+[fatigue.links.rocker]                  # or of one link: an S-N curve
+endurance_stress = "220 MPa"
+endurance_cycles = 2e6
+slope = 6
+mean_stress_sensitivity = 0.25
+''',
+    "strain_life of a material": '''
+[fatigue.materials.steel]
+mean_stress_sensitivity = 0.25
+
+[fatigue.materials.steel.strain_life]
+strength_coefficient = "900 MPa"
+strength_exponent = -0.1
+ductility_coefficient = 0.4
+ductility_exponent = -0.6
+''',
     "[output]": '''
 [output]
 folder = "run-1"
