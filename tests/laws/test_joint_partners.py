@@ -32,9 +32,10 @@ BOTH_RIGID = 1e-3
 def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> str | None:
     """What the message says where the two do not go together; None if they do."""
     bare = partners.count("bare")
-    if kind == "slot" and plane and set(partners) == {"rigid", "bare"}:
+    if kind == "slot" and plane and bare and {"rigid", "bare"}.issuperset(partners):
         return "links: must hold a link that the drive does not simply carry along"
-    if bare == 2 or (bare and partners[1] == "ground" and kind != "prismatic"):
+    moving_ground = driven and kind == "revolute" and partners == ("bare", "ground")
+    if bare == 2 or (bare and partners[1] == "ground" and kind != "prismatic" and not moving_ground):
         return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
     if bare and partners[1] != "ground" and (driven or kind not in SHARED):
         return rf"joints\.J\.links: must join links with a shape by a {kind} joint .* a rigid slider"
