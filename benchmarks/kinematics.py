@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.pages import script, table, write_page
+from kedfem.motion.batch import settled
 from kedfem.motion.linkage import Linkage, linkage
-from kedfem.motion.newton import closed, derivatives, target
+from kedfem.motion.newton import target
 from kedfem.motion.path import Path as MotionPath
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
+from kedfem.motion.values import features
 from kedfem.scene import Scene, scene_from
 
 POINTS, LITERAL_POINTS, REPEATS = 20_000, 300, 9
@@ -75,11 +77,9 @@ def _one_by_one(link: Linkage, along: MotionPath, tau: np.ndarray) -> np.ndarray
     poses, near, out = link.start, along.near[:1], []
     for each in tau:
         at = np.array([each])
-        aim = target(link, at, near)
-        poses, _ = closed(link, poses, aim)
-        _, second, factor = derivatives(link, poses, at, aim)
-        near = factor.f.value[link.rows.angles].T
-        out.append(second[1][0])
+        got = settled(link, poses, target(link, at, near), link.drives.at(at)[1:])
+        poses, near = got.poses, features(link.rows, got.poses, near).value[link.rows.angles].T
+        out.append(got.second[1][0])
     return np.stack(out)
 
 

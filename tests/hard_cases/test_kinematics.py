@@ -59,6 +59,16 @@ def test_a_parallelogram_follows_between_its_change_points_and_is_refused_throug
         motion_at(scene, np.linspace(0, np.radians(121), 90))
 
 
+@pytest.mark.parametrize("gap", [0.05, 0.5, 2.0, 5.0])
+def test_a_narrow_range_that_cannot_be_assembled_is_not_stepped_over(gap: float) -> None:
+    """Crank 0.5, frame 1: coupler and rocker are in line that many degrees before and after 180°, too short between."""
+    reach = np.sqrt(0.5**2 + 1.0 + np.cos(np.radians(gap)))
+    with pytest.raises(MotionError, match=r"locks \(dead point\) at drive angle") as refused:
+        motion_at(linkage_scene(four_bar(0.5, reach - 0.6, 0.6, 1.0, 1.0)), np.linspace(0, 2 * np.pi, 90))
+    angle = float(str(refused.value).split("drive angle ")[1].split()[0])
+    assert angle + np.degrees(1.0) == pytest.approx(180.0 - gap, abs=0.02)
+
+
 def test_two_change_points_at_once_are_not_stepped_over() -> None:
     """Two parallelograms on one crank, mirrored: both branch at the same angle, so that the orientation stays."""
     joints = four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60))

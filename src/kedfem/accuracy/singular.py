@@ -16,8 +16,7 @@ from jaxtyping import Float
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.links.record import in_space
-from kedfem.motion.newton import Factor
-from kedfem.motion.values import Poses, features
+from kedfem.motion.values import Poses, features, jacobian
 
 NEAR = 0.05  # of its largest value: singular value that vanishes at a singular position (others: 0.19 and more, measured)
 LOOKED_AT = 32  # of a block's time points at first; all of them around the smallest values
@@ -69,7 +68,8 @@ class SingularPasses:
         """The singular value, of the largest one, at some time points."""
         linkage = self.ready.linkage
         near = np.zeros((len(which), len(linkage.rows.angles)))
-        J = Factor(linkage, features(linkage.rows, self._poses(block, which), near)).J
+        f = features(linkage.rows, self._poses(block, which), near)
+        J = jacobian(linkage.rows, f, len(linkage.bodies), linkage.size)
         s = np.linalg.svd(J, compute_uv=False)
         return np.asarray(s[:, self._rank - 1] / s[:, 0])
 

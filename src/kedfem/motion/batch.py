@@ -4,9 +4,8 @@ A constant set of as many rows as motions, independent all along the path, takes
 rows; the others are only checked to be closed.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -14,8 +13,19 @@ from jaxtyping import Float, Int
 
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import SETTLED, Target, driven_rows, moved, remainder, stride, twists
-from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian
+from kedfem.motion.newton import (
+    SETTLED,
+    BlockFactor,
+    Factor,
+    Target,
+    driven_rows,
+    factored,
+    moved,
+    remainder,
+    stride,
+    twists,
+)
+from kedfem.motion.values import Poses, Twists, convective, features
 
 EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
 QUADRATIC = 1e-7  # after such a step the next one would be rounding
@@ -32,11 +42,11 @@ Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Some rows of a linkage, with the numbers of their constraints and angles."""
+    """Some rows of a linkage, or all, with the numbers of their constraints and angles."""
 
     rows: Rows
-    which: Int[np.ndarray, " k"]
-    angles: Int[np.ndarray, " a"]
+    which: Int[np.ndarray, " k"] | slice
+    angles: Int[np.ndarray, " a"] | slice
 
     def target(self, aim: Target) -> Target:
         """What these rows shall be."""
@@ -51,7 +61,7 @@ def choice(rows: Rows, which: Int[np.ndarray, " k"]) -> Choice:
 
 
 def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " i"]:
-    """Numbers of k rows that are about as well conditioned as all of them at G places; all rows where none are.
+    """Numbers of k rows about as well conditioned as all of them at and between G places; all rows where none are.
 
     Parameters
     ----------
@@ -66,7 +76,8 @@ def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -
             worse = np.linalg.norm(np.linalg.inv(J[:, which]), axis=(1, 2)) * least
         except np.linalg.LinAlgError:
             return np.arange(m)
-        if worse.max() < SPREAD * np.sqrt(k):
+        sign = np.linalg.slogdet(J[:, which])[0]  # where it changes, they are singular between two places
+        if worse.max() < SPREAD * np.sqrt(k) and (sign == sign[0]).all():
             return np.asarray(which)
         at = int(worse.argmax())
     return np.arange(m)
@@ -80,6 +91,8 @@ class Moving:
     first, second : twists (v, ω) and their time derivatives, each a pair of (T, B, 3)
     partial : (T, B, 3) each: twists per unit of the first drive
     gap : (T,) largest gap left, in units of size; infinite where Newton has not settled
+    steps : (T,) each: of points that were solved together the Newton steps, in units of size and radians
+    factor : of these, rows at the poses
     """
 
     poses: Poses
@@ -87,6 +100,8 @@ class Moving:
     second: Twists
     partial: Twists
     gap: Float[np.ndarray, " T"]
+    steps: Sequence[Float[np.ndarray, " T"]] = ()
+    factor: Factor | BlockFactor | None = None
 
 
 def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Target, rates: Rates) -> Moving:
@@ -105,8 +120,15 @@ def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Targe
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Target, rates: Rates) -> Moving:
-    rows, own = chosen.rows, chosen.target(aim)
+def settled(link: Linkage, guess: Poses, aim: Target, rates: Rates) -> Moving:
+    """The same of all constraints, in the least squares, all points together."""
+    return _block(link, Choice(link.rows, slice(None), slice(None)), None, guess, aim, rates)
+
+
+def _block(
+    link: Linkage, chosen: Choice, rest: Choice | None, poses: Poses, aim: Target, rates: Rates
+) -> Moving:
+    rows, own, steps = chosen.rows, chosen.target(aim), []
     scale = rows.scale(link.size)[: rows.count]
     rhs = np.empty((len(aim), rows.count, 3))
     rhs[..., 1] = driven_rows(rows, rates[0]) * scale
@@ -116,38 +138,28 @@ def _block(link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Targe
         f = features(rows, poses, own.near)
         rhs[..., 0] = -scale * remainder(rows, f, own)
         try:
-            solve = solver(link, rows, f)
-            x = solve(rhs)
+            factor = factored(link, f, rows)
+            x = factor.solve(rhs)
         except np.linalg.LinAlgError:
             return _one_by_one(link, chosen, rest, poses, aim, rates)
         change = twists(link, x[..., 0])
         before, step = step, stride(link, change)
+        steps.append(step)
         poses = moved(poses, change)
         if not (step > EXACT).any() or not (before > QUADRATIC).any() or not (step < 1).any():
             break
     if not (step <= SETTLED).all():
-        return _failed(poses, aim, step)
+        return _failed(poses, step)
     first = twists(link, x[..., 1])
     bent = scale * (driven_rows(rows, rates[1]) - convective(rows, f, first))
-    second = solve(bent[..., None])[..., 0]
-    gap = _gap(link, rest, poses, aim)
-    return Moving(poses, first, twists(link, second), twists(link, x[..., 2]), gap)
+    second = twists(link, factor.solve(bent[..., None])[..., 0])
+    gap = np.maximum(np.abs(rhs[..., 0]).max(axis=1, initial=0.0), _gap(link, rest, poses, aim))
+    return Moving(poses, first, second, twists(link, x[..., 2]), gap, steps, factor)
 
 
-def solver(link: Linkage, rows: Rows, f: Features) -> Callable[[np.ndarray], np.ndarray]:
-    """Solution of J x = b; in least squares if there are more rows than unknowns."""
-    if link.blocks is not None:
-        return partial(link.blocks.least_squares, link.blocks.values(rows, f, link.size))
-    J = jacobian(rows, f, len(link.bodies), link.size)
-    if J.shape[1] == J.shape[2]:
-        return partial(np.linalg.solve, J)
-    Q, U = np.linalg.qr(J)
-    return lambda b: np.linalg.solve(U, np.swapaxes(Q, 1, 2) @ b)
-
-
-def _gap(link: Linkage, rest: Choice, poses: Poses, aim: Target) -> Float[np.ndarray, " T"]:
+def _gap(link: Linkage, rest: Choice | None, poses: Poses, aim: Target) -> Float[np.ndarray, " T"]:
     """The largest gap of rows that were not solved for."""
-    if not rest.rows.count:
+    if rest is None or not rest.rows.count:
         return np.zeros(len(aim))
     own = rest.target(aim)
     left = remainder(rest.rows, features(rest.rows, poses, own.near), own)
@@ -155,11 +167,11 @@ def _gap(link: Linkage, rest: Choice, poses: Poses, aim: Target) -> Float[np.nda
 
 
 def _one_by_one(
-    link: Linkage, chosen: Choice, rest: Choice, poses: Poses, aim: Target, rates: Rates
+    link: Linkage, chosen: Choice, rest: Choice | None, poses: Poses, aim: Target, rates: Rates
 ) -> Moving:
     """Time points apart from each other, as the system of one is singular."""
     if len(aim) == 1:
-        return _failed(poses, aim, np.full(1, np.inf))
+        return _failed(poses, np.full(1, np.inf))
     each = [slice(k, k + 1) for k in range(len(aim))]
     return _joined([
         _block(link, chosen, rest, (poses[0][k], poses[1][k]), aim.at(k), (rates[0][k], rates[1][k]))
@@ -167,7 +179,7 @@ def _one_by_one(
     ])  # fmt: skip
 
 
-def _failed(poses: Poses, aim: Target, step: Float[np.ndarray, " T"]) -> Moving:
+def _failed(poses: Poses, step: Float[np.ndarray, " T"]) -> Moving:
     """Points of which some have not settled; without rates."""
     nothing = np.zeros_like(poses[1])
     twist, gap = (nothing, nothing), np.where(step <= SETTLED, 0.0, np.inf)

@@ -6,14 +6,15 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import Factor, moved
-from kedfem.motion.path import Path
-from kedfem.motion.values import Poses, features
+from kedfem.motion.newton import moved
+from kedfem.motion.path import Path, aimed, predicted
+from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene
 
 SEARCHED = np.radians(
     60.0
 )  # joints, and drives beyond their range (slides by size, times by a quarter of the path)
+INWARD = 0.01  # of a step of the path: how far apart places are from which it is led on
 FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singular value vanishes
 
 
@@ -47,7 +48,7 @@ def nearest_dead_point(scene: Scene, link: Linkage, along: Path) -> DeadPoint:
 
 def _rows(link: Linkage, poses: Poses, near: Float[np.ndarray, "T A"]) -> Float[np.ndarray, "T m k"]:
     """Scaled derivatives of the rows."""
-    return Factor(link, features(link.rows, poses, near)).J
+    return jacobian(link.rows, features(link.rows, poses, near), len(link.bodies), link.size)
 
 
 def _off(
@@ -84,13 +85,15 @@ def _outside(link: Linkage, along: Path, k: int) -> float | None:
     """Where beyond an end of the path the least singular value σ would vanish.
 
     With x inward from the end, d to the dead point: σ² = c (d + x) at a limit of the drive, σ = c (d + x) where two
-    branches meet; whichever fits the next three points of the path better.
+    branches meet; whichever fits three points of the path better.
     """
-    near = np.arange(k, k + 3) if k == 0 else np.arange(k, k - 3, -1)
-    if len(along.phi) < len(near):
+    low, high = float(along.phi[0]), float(along.phi[-1])
+    if high <= low:
         return None
-    s = np.linalg.svd(_rows(link, (along.R[near], along.p[near]), along.near[near]), compute_uv=False)
-    x, sigma = np.abs(along.phi[near] - along.phi[k]), s[:, -1] / s[:, 0]
+    x = min(INWARD * link.drives.step(low, high), (high - low) / 2) * np.arange(3)
+    tau = along.phi[k] + (x if k == 0 else -x)
+    s = np.linalg.svd(_rows(link, predicted(along, tau), aimed(link, along, tau).near), compute_uv=False)
+    sigma = s[:, -1] / s[:, 0]
     trials = []
     for power in (FOLD, CROSSING):
         y = sigma ** (1 / power)

@@ -8,7 +8,9 @@ from jaxtyping import Float
 from kedfem.scene import MotionLaw, Scene, drive_angle
 
 Driven = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
-STEP = np.radians(3.0)  # of a drive between grid points of a path [rad], of a slide in lengths of the linkage
+STEP = np.radians(
+    12.0
+)  # of a drive between grid points of a path [rad], of a slide in lengths of the linkage
 SAMPLES = 4001  # of laws over a path, to find the fastest
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from kedfem.motion.blocks import Blocks
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.values import Features, Poses, Twists, convective, features, jacobian, residuals
+from kedfem.motion.values import Features, Poses, Twists, features, jacobian, residuals
 
 SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding
 NEARLY = 1e-8  # what is as far from a rotation is one to rounding after a step
@@ -72,18 +72,18 @@ def target(link: Linkage, tau: Float[np.ndarray, " T"], near: Float[np.ndarray, 
 
 
 class Factor:
-    """QR of the scaled rows at T poses; least squares over all rows, so redundant ones need no choice."""
+    """The scaled rows J at T poses, if there are more of them than unknowns with their QR: then in the least squares."""
 
-    def __init__(self, link: Linkage, f: Features) -> None:
-        self.link, self.f = link, f
-        self.row = link.rows.scale(link.size)[: link.rows.count]
-        self.J = jacobian(link.rows, f, len(link.bodies), link.size)
-        self.Q, self.U = np.linalg.qr(self.J)
+    def __init__(self, link: Linkage, f: Features, rows: Rows | None = None) -> None:
+        self.f = f
+        self.J = self.U = jacobian(rows or link.rows, f, len(link.bodies), link.size)
+        self.Q = None
+        if self.J.shape[1] > self.J.shape[2]:
+            self.Q, self.U = np.linalg.qr(self.J)
 
-    def twists(self, rhs: Float[np.ndarray, "T m"]) -> Twists:
-        """Least-squares solution of J (v, ω) = rhs; the ground's are zero."""
-        projected = np.swapaxes(self.Q, 1, 2) @ (rhs * self.row)[..., None]
-        return twists(self.link, np.linalg.solve(self.U, projected)[..., 0])
+    def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
+        """x that leaves least of J x = rhs."""
+        return np.linalg.solve(self.U, rhs if self.Q is None else np.swapaxes(self.Q, 1, 2) @ rhs)
 
     def extremes(self) -> Float[np.ndarray, "T 2"]:
         """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
@@ -96,23 +96,21 @@ class BlockFactor:
     """The same of a large linkage, entry by entry."""
 
     def __init__(self, link: Linkage, f: Features, blocks: Blocks) -> None:
-        self.link, self.f, self.blocks = link, f, blocks
-        self.row = link.rows.scale(link.size)[: link.rows.count]
+        self.f, self.blocks = f, blocks
         self.values = blocks.values(link.rows, f, link.size)
 
-    def twists(self, rhs: Float[np.ndarray, "T m"]) -> Twists:
-        """Least-squares solution of J (v, ω) = rhs; the ground's are zero."""
-        found = self.blocks.least_squares(self.values, (rhs * self.row)[..., None])
-        return twists(self.link, found[..., 0])
+    def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
+        """x that leaves least of J x = rhs."""
+        return self.blocks.least_squares(self.values, rhs)
 
     def extremes(self) -> Float[np.ndarray, "T 2"]:
         """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
         return self.blocks.extremes(self.values)
 
 
-def factored(link: Linkage, f: Features) -> Factor | BlockFactor:
-    """The scaled rows at T poses, ready to be solved."""
-    return Factor(link, f) if link.blocks is None else BlockFactor(link, f, link.blocks)
+def factored(link: Linkage, f: Features, rows: Rows | None = None) -> Factor | BlockFactor:
+    """The scaled rows at T poses, ready to be solved: all of them, or some of a small linkage."""
+    return Factor(link, f, rows) if link.blocks is None else BlockFactor(link, f, link.blocks)
 
 
 def agree(here: Factor | BlockFactor, there: Factor | BlockFactor) -> bool:
@@ -157,32 +155,19 @@ def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]
     return np.asarray(R)
 
 
-def closed(
-    link: Linkage, poses: Poses, aim: Target, sweeps: int = 12
-) -> tuple[Poses, Float[np.ndarray, " T"]]:
-    """Newton: poses at which all rows vanish (redundant ones in the least squares), from poses close by.
-
-    Parameters
-    ----------
-    poses : R (T, B, 3, 3), p (T, B, 3) first guess
-
-    Returns
-    -------
-    poses, and (T,) the largest gap left, in units of size; infinite where Newton has not settled
-    """
-    step = np.full(len(aim), np.inf)
+def closed(link: Linkage, poses: Poses, aim: Target, sweeps: int) -> Poses:
+    """Poses after so many steps of Newton at most, towards those at which all rows vanish."""
     for _ in range(sweeps):
         f = features(link.rows, poses, aim.near)
+        rest = scaled(link, link.rows, remainder(link.rows, f, aim))
         try:
-            change = factored(link, f).twists(-remainder(link.rows, f, aim))
+            change = twists(link, factored(link, f).solve(-rest[..., None])[..., 0])
         except np.linalg.LinAlgError:
-            return poses, np.full(len(aim), np.inf)
-        poses = moved(poses, change)
-        step = stride(link, change)
+            return poses
+        poses, step = moved(poses, change), stride(link, change)
         if (step <= SETTLED).all() or not (step < 1).any():
             break
-    gap = gaps(link, poses, aim)
-    return poses, np.where(step <= SETTLED, gap.max(axis=1, initial=0.0), np.inf)
+    return poses
 
 
 def stride(link: Linkage, change: Twists) -> Float[np.ndarray, " T"]:
@@ -191,18 +176,6 @@ def stride(link: Linkage, change: Twists) -> Float[np.ndarray, " T"]:
     return np.asarray(np.maximum(np.abs(v).max(axis=(1, 2)) / link.size, np.abs(theta).max(axis=(1, 2))))
 
 
-def gaps(link: Linkage, poses: Poses, aim: Target) -> Float[np.ndarray, "T m"]:
-    """How far rows are from zero, in units of size."""
-    rest = remainder(link.rows, features(link.rows, poses, aim.near), aim)
-    return np.asarray(np.abs(rest * link.rows.scale(link.size)[: link.rows.count]))
-
-
-def derivatives(
-    link: Linkage, poses: Poses, tau: Float[np.ndarray, " T"], aim: Target
-) -> tuple[Twists, Twists, Factor | BlockFactor]:
-    """First and second derivatives of the motion by τ, as twists: differentiated constraints."""
-    _, q1, q2 = link.drives.at(tau)
-    factor = factored(link, features(link.rows, poses, aim.near))
-    first = factor.twists(driven_rows(link.rows, q1))
-    second = factor.twists(driven_rows(link.rows, q2) - convective(link.rows, factor.f, first))
-    return first, second, factor
+def scaled(link: Linkage, rows: Rows, values: Float[np.ndarray, "T m"]) -> Float[np.ndarray, "T m"]:
+    """Values of rows in units of size."""
+    return np.asarray(values * rows.scale(link.size)[: rows.count])

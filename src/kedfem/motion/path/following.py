@@ -1,0 +1,140 @@
+"""Following a linkage over its drives' range: grid, period, weakest position; the last paths are kept."""
+
+import pickle
+from dataclasses import replace
+from hashlib import sha256
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.motion.constraints import ANGLE
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.newton import OPEN
+from kedfem.motion.path.continuation import ROUNDING, Stand, continued, quintics, shapes, started
+from kedfem.motion.path.record import Path
+from kedfem.motion.path.refinement import halved, refined
+from kedfem.motion.path.weakest import checked
+
+FINER = 0.25  # of a usual step: where one between two grid points cannot be closed
+MOST_TURNS = 60  # that a linkage may take to return to its pose
+RETURNED = 1e-9  # of the size [-, rad]: as closely gears must return
+MOST_KEPT = 4  # paths of a process
+
+
+def path(link: Linkage, low: float, high: float) -> Path:
+    """Follow the linkage from its reference position over low ≤ 0 ≤ high of τ; undriven it rests there.
+
+    The last ones are kept: a drive's speed does not change the path over whole periods.
+
+    Raises
+    ------
+    MotionError
+        Naming the joint and the place where the linkage locks or cannot be assembled.
+    """
+    if link.drive is None:
+        none, A = np.zeros((1, len(link.bodies), 3)), len(link.rows.angles)
+        return Path(
+            np.zeros(1), *link.start, (none, none), (none, none), np.zeros((1, A)), np.inf,
+            np.zeros(link.rows.count), (1.0, 0.0), np.arange(link.rows.count), np.zeros((0, 6, 12)),
+        )  # fmt: skip
+    period = link.drives.period()
+    low, high = _on_periods(low, period), _on_periods(high, period)
+    name = _named(link, low, high)
+    found = _KEPT.pop(name, None) or _followed(link, low, high, period)
+    _KEPT[name] = found
+    if len(_KEPT) > MOST_KEPT:
+        del _KEPT[next(iter(_KEPT))]
+    return found
+
+
+_KEPT: dict[bytes, Path] = {}
+"""The last paths of this process, by linkage and range."""
+
+
+def _named(link: Linkage, low: float, high: float) -> bytes:
+    """A digest of all that a path depends on: of a single drive τ is its turn, whatever its law."""
+    drives = replace(link.drives, laws=()) if len(link.drives) == 1 else link.drives
+    return sha256(pickle.dumps((replace(link, drives=drives), low, high))).digest()
+
+
+def _on_periods(tau: float, period: float) -> float:
+    """A place that is whole periods off, but for rounding, at these."""
+    if not np.isfinite(period):
+        return tau
+    whole = period * round(tau / period)
+    return whole if abs(tau - whole) <= ROUNDING * abs(whole) else tau
+
+
+def _followed(link: Linkage, low: float, high: float, period: float) -> Path:
+    """By usual steps, or by finer ones where a position between two of these cannot be closed."""
+    usual = link.drives.step(low, high)
+    for step in (usual, FINER * usual):
+        along, closes = halved(link, _assembled(link, *_grid(link, low, high, period, step)))
+        if closes:
+            break
+    return refined(link, checked(link, along))
+
+
+def _grid(link: Linkage, low: float, high: float, period: float, step: float) -> tuple[list[Stand], float]:
+    """Grid points over a range, or over a period if the linkage is back after it, and that period."""
+    start = started(link)
+    ahead, behind = [start], [start]
+    if high > period or low < -period:
+        forwards = high > period
+        once = _turns(link, start, step, period, high if forwards else low)
+        turns = round(abs(once[-1].tau) / period)
+        if _returned(link, start, once[-1]) and abs(abs(once[-1].tau) - turns * period) < ROUNDING * period:
+            return once if forwards else once[::-1], turns * period
+        ahead, behind = (once, behind) if forwards else (ahead, once)
+    ahead = continued(link, ahead, step, high)
+    behind = continued(link, behind, step, low)
+    return behind[:0:-1] + ahead, np.inf
+
+
+def _turns(link: Linkage, start: Stand, step: float, period: float, end: float) -> list[Stand]:
+    """Turn by turn, until the linkage is back or the end reached; at most so many turns."""
+    out = [start]
+    for turn in range(1, MOST_TURNS + 1):
+        to = np.sign(end) * min(turn * period, abs(end))
+        out = continued(link, out, step, to)
+        if abs(to) == abs(end) or _returned(link, start, out[-1]):
+            break
+    return out
+
+
+def _returned(link: Linkage, start: Stand, here: Stand) -> bool:
+    """Whether a linkage is in its first pose again."""
+    one = len(link.drives) == 1 and not link.rows.plus
+    apart = (
+        np.abs(start.poses[0] - here.poses[0]).max(),
+        np.abs(start.poses[1] - here.poses[1]).max() / link.size,
+    )
+    return bool(max(apart) < (OPEN if one else RETURNED))
+
+
+def _assembled(link: Linkage, grid: list[Stand], period: float) -> Path:
+    """The path through grid points, not looked at yet."""
+    phi = np.array([g.tau for g in grid])
+    R, p, near = (np.concatenate(x) for x in zip(*((*g.poses, g.near) for g in grid), strict=True))
+    first, second = (
+        (np.concatenate([x[0] for x in rates]), np.concatenate([x[1] for x in rates]))
+        for rates in ([g.first for g in grid], [g.second for g in grid])
+    )
+    return Path(
+        phi, R, p, first, second, near, period, _gathered(link, near, period), (1.0, float(phi[0])),
+        np.arange(link.rows.count), quintics(shapes(R, p, first, second), np.diff(phi)),
+    )  # fmt: skip
+
+
+def _gathered(link: Linkage, near: Float[np.ndarray, "G A"], period: float) -> Float[np.ndarray, " m"]:
+    """What couplings gather over a period: turns of their angles are whole ones, their ratio need not be."""
+    rows, out = link.rows, np.zeros(link.rows.count)
+    if not np.isfinite(period):
+        return out
+    turns = np.zeros(len(rows.kind))
+    turns[rows.angles] = np.round((near[-1] - near[0]) / (2 * np.pi))
+    for k, other, c in rows.plus:
+        out[k] += 2 * np.pi * c * turns[other]
+    for k in {k for k, _, _ in rows.plus if rows.kind[k] == ANGLE}:
+        out[k] += 2 * np.pi * turns[k]
+    return out
