@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import OutputError
-from kedfem.output.compare_plots import write_comparison
+from kedfem.output.plots.comparison import write_comparison
 from kedfem.results import Results, read_results, results_file
 from kedfem.results.differences import (
     Difference,

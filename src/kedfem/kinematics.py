@@ -85,7 +85,7 @@ def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
     results = read_results(target / "results.h5")
     clock.timed("table", lambda: write_csv(results, target / TABLE))
     if scene.output.plots:
-        clock.timed("plots", lambda: write_plots(results, target / PLOTS))
+        clock.timed("plots", lambda: write_plots(results, target / PLOTS, scene.output.plots == "each"))
     warnings = (
         *assembly_warning(assembly),
         *_missing(scene, linked, masses),

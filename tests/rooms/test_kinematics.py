@@ -401,6 +401,7 @@ def test_the_results_of_a_run_are_left_alone(run_kedfem: Command, tmp_path: Path
 
 def test_plots_group_what_belongs_together(tmp_path: Path) -> None:
     raw = scene_with_plots()
+    raw.output.fill(plots="each")
     moved = kinematics(raw, tmp_path)
     names = {path.name for path in (tmp_path / "plots").glob("*.png")}
     assert {"links-arm-motion.png", "links-arm-rotation.png", "drive-rigid_torque.png"} <= names

@@ -14,10 +14,12 @@ import pytest
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
 from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
-from kedfem.output.abscissa import abscissa
 from kedfem.output.bars import THINNEST, bars, heights, shape_functions
 from kedfem.output.frames import link_fields
-from kedfem.output.plots import drawn_over, envelope
+from kedfem.output.plots.abscissa import abscissa
+from kedfem.output.plots.drawing import drawn_over, envelope
+from kedfem.output.plots.groups import pictures
+from kedfem.output.plots.overview import shown
 from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
 from kedfem.output.vtu import SECTION
@@ -230,7 +232,9 @@ def assert_shows_something(path: Path) -> None:
 
 
 def test_every_channel_has_a_plot(tmp_path: Path) -> None:
-    written = write_plots(results(), tmp_path / "plots")
+    page, *written = write_plots(results(), tmp_path / "plots", each=True)
+    assert_shows_something(page)
+    assert page.name == "overview.png"
     assert [path.name for path in written] == [
         "probes-mid-stress.png",
         "joints-A-force.png",
@@ -256,8 +260,26 @@ def test_every_channel_has_a_plot(tmp_path: Path) -> None:
 )
 def test_unusual_runs_are_plotted(tmp_path: Path, made: Results) -> None:
     few = {name: made.channels[name] for name in ("probes/mid/stress", "joints/A/force")}
-    for path in write_plots(replace(made, channels=few), tmp_path):
+    for path in write_plots(replace(made, channels=few), tmp_path, each=True):
         assert_shows_something(path)
+
+
+def test_many_curves_go_onto_several_pages(tmp_path: Path) -> None:
+    """Thirty probes on three pages; of twelve joints' forces the nine largest are in one panel, and none on its own."""
+    made, force = results(), Channel("joints/A/force", ("x", "y", "z"), "N", "world", "force")
+    t = made.time[:, None] * np.ones(3)
+    probes = {f"probes/{k}/stress": made.channels["probes/mid/stress"] for k in range(30)}
+    joints = {
+        f"joints/{k}/force": (replace(force, name=f"joints/{k}/force"), (k + 1.0) * t) for k in range(12)
+    }
+    written = write_plots(replace(made, channels=probes | joints), tmp_path)
+    assert [path.name for path in written] == ["overview.png", "overview-2.png", "overview-3.png"]
+    for path in written:
+        assert_shows_something(path)
+    pages = {x.name: x for x in pictures(replace(made, channels=probes | joints))}
+    title, (_, _, curves) = shown(pages["joint_forces"])
+    assert title.endswith("the largest 9 of 12")
+    assert list(curves) == [str(k) for k in range(3, 12)]
 
 
 def test_results_that_are_not_finite_are_plotted(tmp_path: Path) -> None:
@@ -266,18 +288,19 @@ def test_results_that_are_not_finite_are_plotted(tmp_path: Path) -> None:
     values[400:] = np.nan
     values[399] = np.inf
     one = {"drive/torque": (made.channels["drive/torque"][0], values)}
-    assert_shows_something(write_plots(replace(made, channels=one), tmp_path)[0])
+    for path in write_plots(replace(made, channels=one), tmp_path, each=True):
+        assert_shows_something(path)
 
 
 def test_stale_plots_go_and_a_users_pictures_stay(tmp_path: Path) -> None:
     from PIL import Image
 
-    write_plots(results(), tmp_path)
+    write_plots(results(), tmp_path, each=True)
     Image.new("RGB", (4, 4)).save(tmp_path / "photo.png")
     (tmp_path / "broken.png").write_bytes(b"no picture")
     few = {"drive/torque": results().channels["drive/torque"]}
     write_plots(replace(results(), channels=few), tmp_path)
-    assert {p.name for p in tmp_path.iterdir()} == {"photo.png", "broken.png", "drive-torque.png"}
+    assert {p.name for p in tmp_path.iterdir()} == {"photo.png", "broken.png", "overview.png"}
 
 
 def test_results_without_rows_have_no_plots(tmp_path: Path) -> None:
@@ -501,7 +524,7 @@ def test_what_the_table_calls_nothing_is_not_drawn(tmp_path: Path) -> None:
     both = {"joints/A/moment": (large, np.full((5, 1), 64.0)), **kept}
     for channels, names in ((both, ["joints-A-moment.png"]), (kept, ["joints-B-moment.png"])):
         results = Results(time, time, channels, "complete", "{}")
-        assert [path.name for path in write_plots(results, tmp_path)] == names
+        assert [path.name for path in write_plots(results, tmp_path, each=True)] == ["overview.png", *names]
 
 
 def test_gravity_points_down_the_page_unless_it_is_looked_along() -> None:

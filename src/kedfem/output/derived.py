@@ -139,7 +139,7 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
 
     def plots() -> None:
         if scene.output.plots:
-            write_plots(results, folder / PLOTS)
+            write_plots(results, folder / PLOTS, each=scene.output.plots == "each")
 
     if not (scene.output.picture and peak):
         plots()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from kedfem.output.plots import figure_saved
+from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.units import prefixed
 from kedfem.results import Results
 from kedfem.results.data_sets import drive_heading

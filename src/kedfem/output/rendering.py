@@ -270,11 +270,15 @@ def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) ->
     font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
     letters = int(plotter.window_size[0] / 16)
     text = "\n".join(textwrap.wrap(title, letters, max_lines=3, placeholder=" …"))
-    words = plotter.add_text(text, (0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font)
+    words = plotter.add_text(
+        text, position=(0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font
+    )
     words.prop.justification_vertical = "top"
     words.prop.SetLineSpacing(1.2)
     scale = f"deformation × {deformation_scale:g}" + ("; cut at the highest stress" if cut else "")
-    plotter.add_text(scale, (0.03, 0.015), viewport=True, font_size=11, color="black", font_file=font)
+    plotter.add_text(
+        scale, position=(0.03, 0.015), viewport=True, font_size=11, color="black", font_file=font
+    )
     wide, high = plotter.window_size
     plotter.add_axes(color="black", line_width=3, viewport=(1 - 210 / wide, 0.0, 1 - 30 / wide, 180 / high))
 

@@ -163,8 +163,8 @@ class Output(Record):
     """whether the results are also written as CSV, with nine digits"""
     parquet: StrictBool = False
     """whether they are also written as Parquet; needs `pip install 'kedfem[data]'`"""
-    plots: StrictBool = True
-    """whether curves are plotted"""
+    plots: StrictBool | Literal["each"] = True
+    """whether curves are plotted, all on one page; `"each"`: every channel on its own too"""
     picture: StrictBool = True
     """whether the frame with the worst stress is drawn"""
     report: StrictBool = False

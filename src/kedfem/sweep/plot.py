@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from kedfem.accuracy.steady import GROWS
-from kedfem.output.plots import figure_saved
+from kedfem.output.plots.drawing import figure_saved
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.edges import Edge
 from kedfem.sweep.files import column_units, largest, plain_quantities

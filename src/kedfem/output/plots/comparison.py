@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.plots import envelope, figure_saved, remove_plots
+from kedfem.output.plots.drawing import envelope, figure_saved
+from kedfem.output.plots.files import remove_plots
 from kedfem.output.units import prefixed
 from kedfem.results import ready_folder
 from kedfem.results.differences import Difference, Over, magnitude

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.plots import figure_saved
+from kedfem.output.plots.drawing import figure_saved
 
 FASTEST = 2.0  # of the drive's speed: how far a Campbell plot goes
 
