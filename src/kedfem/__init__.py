@@ -4,9 +4,14 @@
 >>> from kedfem.analysis import analyse
 """
 
-from importlib.metadata import PackageNotFoundError, version
 
-try:
-    __version__ = version("kedfem")
-except PackageNotFoundError:  # run from the source tree without being installed
-    __version__ = "unknown"
+def __getattr__(name: str) -> str:
+    """`__version__`, looked up when it is asked for: finding it takes as long as importing the command line."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(__name__)
+    except PackageNotFoundError:  # run from the source tree without being installed
+        return "unknown"

@@ -13,16 +13,17 @@ import pytest
 
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
-from kedfem.output import AnimationWriter, LinkField, remove_animation, write_picture, write_plots
 from kedfem.output.bars import THINNEST, bars, heights, shape_functions
 from kedfem.output.frames import link_fields
+from kedfem.output.picture import write_picture
+from kedfem.output.plots import write_plots
 from kedfem.output.plots.abscissa import abscissa
 from kedfem.output.plots.drawing import drawn_over, envelope
 from kedfem.output.plots.groups import pictures
 from kedfem.output.plots.overview import shown
 from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
-from kedfem.output.vtu import SECTION
+from kedfem.output.vtu import SECTION, AnimationWriter, LinkField, remove_animation
 from kedfem.results import Channel, Results
 from tests.moving import ran
 from tests.spatial_joints import P, pushed

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import cKDTree
 
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
@@ -62,6 +61,8 @@ def _of_solid(link: Link, beside: Sequence[Link]) -> FreeSurface:
 
 def _cut(link: Link, centres: Float[np.ndarray, "f 3"], beside: Sequence[Link]) -> Bool[np.ndarray, " f"]:
     """Which boundary facets of a segment are those of another one, too."""
+    from scipy.spatial import cKDTree
+
     cut = np.zeros(len(centres), bool)
     for other in beside:
         others = boundary(other)[1].mean(axis=1)

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.output.vtu import SECTION
+SECTION = "height, thickness, round"
+"""The cell array of a frame that has the sections of beams."""
 
 THINNEST = 0.004
 """Least height and thickness of a beam in the picture, as part of the diagonal."""

@@ -1,4 +1,4 @@
-"""The drawing process of :func:`kedfem.output.write_picture`.
+"""The drawing process of :func:`kedfem.output.picture.write_picture`.
 
 It is run by its path.
 """
@@ -70,7 +70,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     Parameters
     ----------
     vtu, png, title, deformation_scale, gravity
-        As in :func:`kedfem.output.write_picture`.
+        As in :func:`kedfem.output.picture.write_picture`.
     """
     import pyvista
 

@@ -12,9 +12,9 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
 from kedfem.mesh import SolidMesh, mesh_quality
+from kedfem.output.bars import SECTION
 from kedfem.results.files import ready_folder, reason, replacing
 
-SECTION = "height, thickness, round"
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
