@@ -18,6 +18,7 @@ from kedfem.results.recorded import Recorded
 from kedfem.scene import time_grid
 
 IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
+ALIKE = 1e-6  # relative difference of work that means nothing
 LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
 SURE = 0.7  # of the error asked for, that a step is chosen for
 SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
@@ -114,7 +115,8 @@ def cheapest(
         factor = min(factor, longest / found.h)
         h = found.h * factor
         out.append(StepChoice(h, count, float((error * factor**power).max()), _work(count) / h))
-    return min(out, key=lambda choice: choice.work)
+    least = min(choice.work for choice in out)
+    return next(choice for choice in out if choice.work <= (1 + ALIKE) * least)  # the fewest levels of those
 
 
 def _orders(found: StepEstimate, names: Sequence[str]) -> Float[np.ndarray, " c"]:
