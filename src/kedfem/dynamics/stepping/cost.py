@@ -10,7 +10,7 @@ from jaxtyping import Float
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.transient import Steps, block_length
 from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 
@@ -20,13 +20,14 @@ SWEEPS = 4.0  # times the work of a step with rigid-body frames, where frames fo
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
+RUN_BYTES = 1e7  # beside libraries, of the smallest runs
 TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
 FIRST, MORE, MOST = (
     4,
     4,
     1024,
 )  # steps that are tried: a few, then so many times as many until they take ENOUGH more
-ENOUGH = 0.2  # seconds
+ENOUGH = 0.5  # seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,22 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     return Cost(
         factor=levels * FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=(2**levels - 1) * time_grid(scene).steps * step,
-        memory=levels * factor_bytes(model) + LINK_BYTES * float(N.sum()) + ASSEMBLY_BYTES * float(N.max()),
+        memory=levels * factor_bytes(model) + _held(model) + _blocks(scene, model),
         frame_bytes=120.0 * sum((link.full or link).n for link in model.links),
     )
+
+
+def _held(model: Model) -> float:
+    """Bytes of a run's libraries and of the links: of reduced ones those that they were made from."""
+    whole = float(sum((link.full or link).unknowns for link in model.links))
+    largest = float(max((link.unknowns for link in model.links if link.full is None), default=0))
+    return RUN_BYTES + LINK_BYTES * whole + ASSEMBLY_BYTES * largest
+
+
+def _blocks(scene: Scene, model: Model) -> float:
+    """Bytes of the time points that are kept together, and of what is made of them."""
+    states = 9 * 8 * model.unknowns * min(block_length(model), time_grid(scene).steps)
+    return (4.0 if any(link.fit is not None for link in model.links) else 2.0) * states
 
 
 def factor_bytes(model: Model) -> float:
