@@ -7,6 +7,7 @@ A link that a drive turns at Ω about its own axis has constant coefficients in 
 so that the multipliers of a turn are exp(λ T) with the eigenvalues λ of that. In modes of the clamped link.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.steady import Steady, steady_of, steady_warning
 from kedfem.analysis import analyse
 from kedfem.dynamics.modes.frozen import Frozen
@@ -58,7 +60,7 @@ def as_steady(raw: Raw, **analysis: Any) -> Raw:
 
 def steady(raw: Raw, **analysis: Any) -> tuple[Prepared, np.ndarray, Steady]:
     """A scene as a steady motion."""
-    ready = meshed(over_one_period(scene_from(as_steady(raw, **analysis))))
+    ready = prepared(over_one_period(scene_from(as_steady(raw, **analysis))))[0]
     found, of = states(ready)
     assert of is not None
     return ready, found, of
@@ -70,7 +72,7 @@ def off(raw: Raw, turns: int, of: np.ndarray, ready: Prepared) -> float:
     span = {key: turns * analysis[key] for key in ("revolutions", "end_time") if analysis.get(key)}
     keys = {k: v for k, v in {**analysis, **span}.items() if v is not None and v != {}}
     keys.setdefault("accuracy", "quick")
-    marched, _ = states(meshed(scene_from({**raw, "analysis": keys})))
+    marched, _ = states(replace(meshed(scene_from({**raw, "analysis": keys})), model=ready.model))
     last = marched[-len(of) :]
     return float(np.abs(last - of).max() / np.abs(of).max())
 

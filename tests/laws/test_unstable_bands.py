@@ -1,17 +1,25 @@
 """Edges of unstable bands that `kedfem sweep --edges` finds: closed forms, reduced and full links, growth in marching."""
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
+from kedfem.accuracy.prepared import meshed
+from kedfem.accuracy.reduction import prepared
 from kedfem.errors import SceneError
+from kedfem.motion.period import over_one_period
+from kedfem.scene import scene_from
 from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
-from tests.laws.test_steady import clamped, spun
+from tests.laws.test_steady import as_steady, clamped, planar, spun, states
 from tests.laws.test_varying_springs import hill, multiplier
 from tests.rooms.test_sweep import Inline
+from tests.scenes import constant_speed
 
 Raw = dict[str, Any]
 WIDTH = 3e-2
@@ -92,3 +100,80 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
     assert "must be combined with numbers of the first key, analysis.initial" in said(
         kind="steady", axes=words
     )
+
+
+def plane_four_bar(reduced: bool) -> Raw:
+    """Thin planes, 6 mm in their plane."""
+    link = {"mesh": {"elements": [8, 1]}, "shape": {"kind": "bar", "width": 0.006, "thickness": 0.02}}
+    more = {"reduced": True} if reduced else {}
+    raw = planar("plane", link={**link, **more}, damping={"beta": 1e-5})
+    return {**raw, "analysis": {"steps_per_revolution": 360, "rho_inf": 0.95}}
+
+
+def plane_slider_crank(reduced: bool) -> Raw:
+    """A rod of 3 mm in its plane, which a block of 0.3 kg presses and pulls."""
+    shape = {"kind": "bar", "between": [[0.05, 0], [0.25, 0]], "width": 0.003, "thickness": 0.015}
+    rod = {"fidelity": "plane", "material": "steel", "shape": shape, "mesh": {"elements": [8, 1]}}
+    crank = {"kind": "bar", "between": [[0, 0], [0.05, 0]], "width": 0.02, "thickness": 0.02}
+    pin = {"kind": "revolute"}
+    return {
+        "links": {
+            "crank": {"fidelity": "beam", "material": "steel", "shape": crank, "mesh": {"elements": 1}},
+            "rod": {**rod, **({"reduced": True} if reduced else {})},
+            "slider": {"fidelity": "rigid", "mass": 0.3},
+        },
+        "joints": {
+            "A": {**pin, "links": ["ground", "crank"], "at": [0, 0]},
+            "B": {**pin, "links": ["crank", "rod"], "at": [0.05, 0]},
+            "C": {**pin, "links": ["rod", "slider"], "at": [0.25, 0]},
+            "guide": {"kind": "prismatic", "links": ["slider", "ground"], "at": [0.25, 0], "axis": "x"},
+        },
+        "drive": {"joint": "A", "motion": constant_speed("3000 rpm")}, "damping": {"beta": 5e-6},
+        "analysis": {"steps_per_revolution": 90, "rho_inf": 0.95, "stiffening": True},
+    }  # fmt: skip
+
+
+def at_speed(raw: Raw, rpm: float) -> Raw:
+    return {**raw, "drive": {"joint": "A", "motion": constant_speed(f"{rpm:.12g} rpm")}}
+
+
+def log_growth(raw: Raw, rpm: float) -> float:
+    """In a turn, by multipliers."""
+    scene = over_one_period(scene_from(as_steady(at_speed(raw, rpm), reduction_tolerance=1e-2)))
+    of = states(prepared(scene)[0])[1]
+    assert of is not None
+    assert of.growth is not None
+    return float(np.log(of.growth))
+
+
+def marched_growth(raw: Raw, rpm: float, turns: int) -> float:
+    """The logarithm of what a turn multiplies the vibration of the start by, over the last half of a march from rest."""
+    raw = at_speed(raw, rpm)
+    given = {**raw["analysis"], "accuracy": "quick", "revolutions": turns}
+    found, _ = states(meshed(scene_from({**raw, "analysis": given})))
+    turned = found[1:].reshape(turns, -1, found.shape[1])
+    changes = np.linalg.norm(np.diff(turned, axis=0).reshape(turns - 1, -1), axis=1)
+    half = len(changes) // 2
+    return float(np.polyfit(np.arange(half), np.log(changes[-half:]), 1)[0])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("linkage", "between", "turns"),
+    [(plane_four_bar, (6200, 6400), 160), (plane_slider_crank, (3300, 3600), 40)],
+)
+def test_an_edge_is_the_same_by_reduced_links_full_ones_and_growth_in_a_march(
+    linkage: Callable[[bool], Raw], between: tuple[float, float], turns: int
+) -> None:
+    """Stable below, unstable above; the march's edge is within 0.5 % where it decays a quarter below and grows above."""
+    reduced, full = linkage(True), linkage(False)
+
+    def edge(raw: Raw) -> float:
+        return float(brentq(lambda rpm: log_growth(raw, rpm), *between, rtol=5e-4))
+
+    found = edge(full)
+    assert_allclose(edge(reduced), found, rtol=5e-3)
+    assert marched_growth(full, 0.9975 * found, turns) < 0.0 < marched_growth(full, 1.0025 * found, turns)
+    if "stiffening" in full["analysis"]:  # which alone makes it unstable
+        plain = {**full, "analysis": {**full["analysis"], "stiffening": False}}
+        assert log_growth(plain, 1.05 * found) < -0.02
