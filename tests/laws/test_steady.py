@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.steady import map_of
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared, meshed
@@ -23,6 +24,8 @@ from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.transient import started
 from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.krylov import Watched
+from kedfem.dynamics.system.multipliers import multipliers
 from kedfem.errors import KedfemError, SolveError
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
@@ -244,6 +247,23 @@ def test_multipliers_of_a_shaft_that_spins(axis: str, ratio: float, section: Any
             2.0: 1.06476769,
         }
         assert_allclose(of.growth, published[ratio], rtol=2e-6)
+
+
+def test_a_shaft_at_its_own_frequency_neither_grows_nor_decays() -> None:
+    """Its damping turns with it: a deflection constant in space stays, so that its multiplier is one."""
+    omega = clamped(spun("oblique", 100.0, (0.003, 0.003)), "oblique")[0]
+    found = []
+    for steps in (180, 360):
+        raw = spun("oblique", float(omega[0]), (0.003, 0.003), damping={"beta": 0.04 / omega[0]})
+        raw["analysis"] = {"steps_per_revolution": steps}
+        over = map_of(meshed(over_one_period(scene_from(as_steady(raw)))))
+        x = over.vector(over.start)
+        y = over(x)
+        over.weighed(y)
+        values, certain, _ = multipliers(Watched(over, lambda marched: None, 1e-9), x, y)
+        assert certain
+        found.append(float(np.abs(values).max()))
+    assert_allclose((4 * found[1] - found[0]) / 3, 1.0, rtol=2e-6)
 
 
 def test_growth_that_levels_in_time_do_not_agree_on_is_not_told() -> None:
