@@ -65,6 +65,7 @@ def precompile(watch: Callable[[str, int, int], None]) -> None:
             watch(kind, number, len(others))
             few_steps(kind)
             beside.wait()
+        _count_cycles()
     finally:
         beside.kill()
         beside.wait()
@@ -81,6 +82,17 @@ def few_steps(kind: str) -> None:
         scene = Path(folder, "scene.toml")
         scene.write_text(ARM + KINDS[kind], encoding="utf-8")
         analyse(read_scene(scene))
+
+
+def _count_cycles() -> None:
+    """The loop of fatigue, which no steps take."""
+    import numpy as np
+
+    from kedfem.results.fatigue_kernel import counted
+
+    counted(
+        np.zeros((1, 4)), 0.0, np.array([-1.0, 0.0, 1.0]), np.array([9.0, 0.0, -5.0]), 0.0, np.zeros((1, 4))
+    )
 
 
 def _all_compiled() -> Path:

@@ -162,6 +162,12 @@ def bounded(seconds: float, memory: float) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
 
 
+def threads() -> int:
+    """How many threads may work at once: as many as BLAS is given, else one a processor."""
+    given = os.environ.get("OMP_NUM_THREADS", "")
+    return int(given) if given.isdecimal() and int(given) > 0 else os.cpu_count() or 1
+
+
 def most_memory() -> float:
     """The most that this process has held so far [bytes]; nan where the system does not tell."""
     try:

@@ -91,33 +91,37 @@ def findley_stresses(
     """
     angle = np.radians(np.arange(0.0, 180.0, STEP))
     inclined = np.pi / 2 - 0.5 * np.arctan2(1.0, factor)
-    both = [_sheared(H, axes, angle, tilt) for tilt in (np.pi / 2, inclined)]
-    h, amplitude, normal = (np.concatenate(each, axis=1) for each in zip(*both, strict=True))
+    few = np.ascontiguousarray(H[:, :, :: max(1, H.shape[2] // FEW)])
+    rows, shear = zip(*(_sheared(few, axes, angle, tilt) for tilt in (np.pi / 2, inclined)), strict=True)
+    normal = np.matmul(np.concatenate(rows, axis=1), H).max(axis=2)
+    h = np.matmul(np.concatenate(shear, axis=1), H)
+    amplitude = (h.max(axis=2) - h.min(axis=2)) / 2
     sheared = amplitude > SHEARED * amplitude.max(axis=1, keepdims=True)
     sheared &= amplitude > SOME * np.abs(normal)
     raised = np.maximum(1 + factor * normal / np.where(sheared, amplitude, 1.0), 0.0)
-    scale = 2 / (np.sqrt(1 + factor**2) + factor)
-    return Planes(h * (scale * np.where(sheared, raised, 0.0))[:, :, None], np.concatenate([angle, angle]))
+    h *= (2 / (np.sqrt(1 + factor**2) + factor) * np.where(sheared, raised, 0.0))[:, :, None]
+    return Planes(h, np.concatenate([angle, angle]))
 
 
 def _sheared(
-    H: Float[np.ndarray, "k 6 T"],
+    few: Float[np.ndarray, "k 6 F"],
     axes: Float[np.ndarray, "k 3 3"],
     angle: Float[np.ndarray, " P"],
     tilt: float,
-) -> tuple[Float[np.ndarray, "k P T"], Float[np.ndarray, "k P"], Float[np.ndarray, "k P"]]:
-    """Shear on planes in the direction of its largest range, its amplitude, and the largest normal stress."""
+) -> tuple[Float[np.ndarray, "k P 6"], Float[np.ndarray, "k P 6"]]:
+    """Rows by which normal stress on planes, and shear in the direction of its largest range, follow from H.
+
+    few : H at some instants, by which the direction is chosen
+    """
     n = _normals(axes, angle, tilt)
     level = _normals(axes, angle + np.pi / 2, np.pi / 2)
-    up = np.cross(n, level)
-    largest = np.matmul(_rows(n, n), H).max(axis=2)
-    a, b = np.matmul(_rows(n, level), H), np.matmul(_rows(n, up), H)
-    some = (a[:, :, :: max(1, a.shape[2] // FEW)], b[:, :, :: max(1, b.shape[2] // FEW)])
+    both = np.stack([_rows(n, level), _rows(n, np.cross(n, level))])
+    a, b = np.matmul(both, few)
     turns = np.pi / DIRECTIONS * np.arange(DIRECTIONS)
-    spans = np.stack([np.ptp(np.cos(turn) * some[0] + np.sin(turn) * some[1], axis=2) for turn in turns])
+    along = (np.cos(turn) * a + np.sin(turn) * b for turn in turns)
+    spans = np.stack([x.max(axis=2) - x.min(axis=2) for x in along])
     turn = turns[spans.argmax(axis=0)][:, :, None]
-    h = np.cos(turn) * a + np.sin(turn) * b
-    return h, np.ptp(h, axis=2) / 2, largest
+    return _rows(n, n), np.cos(turn) * both[0] + np.sin(turn) * both[1]
 
 
 def _normals(

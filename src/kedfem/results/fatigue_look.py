@@ -1,6 +1,7 @@
 """The surface of a link over a period: the history of the stress at its points, and the damage that it does."""
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from jaxtyping import Float, Int
 from kedfem.links.free_surface import FreeSurface, free_surface
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
+from kedfem.processes import threads
 from kedfem.results.critical_plane import (
     disproportion,
     dominant,
@@ -20,7 +22,7 @@ from kedfem.results.envelope import Kept
 from kedfem.results.fatigue_strength import Strength
 from kedfem.scene import Fatigue as Asked
 
-CHUNK = 32_000_000  # bytes of histories on all planes of some points
+CHUNK = 4_000_000  # bytes of histories on 36 planes of some points: they stay in the cache
 NOTHING = 1e-6  # of a link's highest stress: histories whose shape is rounding
 CRITERIA = ("signed von Mises", "normal stress", "Findley")
 SIGNED, NORMAL, FINDLEY = range(3)
@@ -175,18 +177,19 @@ class Look:
     def field(self) -> LinkFatigue:
         """At all points; of the two fibres of a planar beam the worse."""
         out = np.full((6, self.recovery.stressed), np.nan)
-        for which in self.chunks():
+        endurance = self.strength.endurance * self.strength.endless / self.asked.safety_factor
+
+        def fill(which: slice) -> None:
             each = self.judged(which)
-            used = (
-                self.asked.safety_factor
-                * each.found[:, 1]
-                / (self.strength.endurance * self.strength.endless)
-            )
-            columns = [each.found[:, 0], used, each.found[:, 2], each.found[:, 3]]
+            columns = [each.found[:, 0], each.found[:, 1] / endurance, each.found[:, 2], each.found[:, 3]]
             out[:, self.surface.places[which]] = [*columns, each.disproportion, each.criterion]
+
+        with ThreadPoolExecutor(threads()) as pool:
+            for _ in pool.map(fill, self.chunks()):
+                pass  # an error of one is raised here
         sides = out.reshape(6, -1, self.recovery.points)
-        worse = np.take_along_axis(sides, self._side(sides)[None, None], 1)[:, 0]
-        return LinkFatigue(self.recovery, *worse)
+        of_worse = np.take_along_axis(sides, self._side(sides)[None, None], 1)[:, 0]
+        return LinkFatigue(self.recovery, *of_worse)
 
     def _side(self, sides: Float[np.ndarray, "6 s p"]) -> Int[np.ndarray, " p"]:
         return worse(np.nan_to_num(sides[0].T), np.nan_to_num(sides[1].T))
