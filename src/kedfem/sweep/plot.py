@@ -101,8 +101,8 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
         ):
             which = np.array(known)[some]
             shown = ax.scatter(
-                x[which], y[which], c=growth[some], marker=marker, s=28, cmap="coolwarm", vmin=1 - (far := _far(growth)),
-                vmax=1 + far, edgecolors="black", linewidths=0.3, label=label,
+                x[which], y[which], c=growth[some], marker=marker, s=28, cmap="coolwarm",
+                norm="log", vmin=1 / (far := _far(growth)), vmax=far, edgecolors="black", linewidths=0.3, label=label,
             )  # fmt: skip
         for same in dict.fromkeys(each.others for each in edges):
             line = [each for each in edges if each.others == same]
@@ -126,5 +126,5 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
 
 
 def _far(growth: np.ndarray) -> float:
-    """How far colours go from one: as far as growth does on either side."""
-    return max(float(np.abs(growth - 1).max()), 1e-9)
+    """By what factor colours go from one: as far as growth does on either side, to a thousandth of it."""
+    return float(np.exp(max(np.abs(np.log(np.maximum(growth, 1e-3))).max(), 1e-9)))
