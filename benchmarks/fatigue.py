@@ -1,4 +1,4 @@
-"""Fatigue at 20,000 points over 720 instants: seconds of each criterion, from histories to damage, in one thread and two."""
+"""Fatigue at 20,000 points over 720 instants: seconds of each criterion, histories to damage, in one thread and two."""
 
 import os
 from pathlib import Path
