@@ -1,4 +1,4 @@
-"""Fatigue at 20,000 points over 720 instants: seconds of each criterion, histories to damage, in one thread and two."""
+"""Fatigue at 20,000 points over 720 instants: seconds of each criterion, from histories to damage."""
 
 import os
 from pathlib import Path
@@ -11,9 +11,9 @@ from kedfem.links.build import link_axes
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.links.solid import solid_link
 from kedfem.mesh import link_mesh
-from kedfem.results.envelope import Kept
-from kedfem.results.fatigue_look import Look, Period, Stressed
-from kedfem.results.fatigue_strength import strength_of
+from kedfem.results.fatigue.strength import strength_of
+from kedfem.results.fatigue.surface import Look, Period, Stressed
+from kedfem.results.stresses.envelope import Kept
 from kedfem.scene import Bar, Fatigue, FatigueData, LinkScene, Material, Meshing
 
 ELEMENTS, INSTANTS, MODES, PERIOD = (120, 26, 2), 720, 30, 0.1

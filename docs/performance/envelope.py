@@ -9,7 +9,7 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.links.recovery import stress_recovery
-from kedfem.results.envelope import Envelope
+from kedfem.results.stresses.envelope import Envelope
 from kedfem.scene import read_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -52,14 +52,14 @@ from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
-from kedfem.results.envelope import Envelope, highest, peaks
-from kedfem.results.fatigue import fatigue_of, kept_since
-from kedfem.results.fatigue_strength import require_fatigue
-from kedfem.results.force_elements import measured_actions
-from kedfem.results.hot_spots import hot_spots
-from kedfem.results.indeterminate import undetermined, undetermined_warning
+from kedfem.results.fatigue.damage import fatigue_of, kept_since
+from kedfem.results.fatigue.strength import require_fatigue
+from kedfem.results.forces.force_elements import measured_actions
+from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
-from kedfem.results.singular_stress import doubtful
+from kedfem.results.stresses.envelope import Envelope, highest, peaks
+from kedfem.results.stresses.hot_spots import hot_spots
+from kedfem.results.stresses.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene, time_grid, without_vibration

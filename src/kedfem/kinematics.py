@@ -27,9 +27,9 @@ from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
+from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
-from kedfem.results.rigid import RigidForces, rigid_forces
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, time_grid
 from kedfem.stepping import Watch, frame_steps
 

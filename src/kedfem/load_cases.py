@@ -28,7 +28,7 @@ from kedfem.output.static_decks import (
 from kedfem.output.vtu import write_collection
 from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.data_sets import drive_heading
-from kedfem.results.load_cases import LoadCase, Statics, load_case
+from kedfem.results.forces.load_cases import LoadCase, Statics, load_case
 from kedfem.scene import Scene, corotational, scene_from
 from kedfem.stepping import Watch
 

@@ -14,7 +14,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.load_files import write_drive_load, write_joint_load, write_polar, write_summary
 from kedfem.results import Results, read_results, ready_folder, results_file
-from kedfem.results.loads import (
+from kedfem.results.forces.loads import (
     DriveLoad,
     JointLoad,
     drive_loads,

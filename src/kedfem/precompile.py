@@ -88,7 +88,7 @@ def _count_cycles() -> None:
     """The loop of fatigue, which no steps take."""
     import numpy as np
 
-    from kedfem.results.fatigue_kernel import counted
+    from kedfem.results.fatigue.counting_kernel import counted
 
     counted(
         np.zeros((1, 4)), 0.0, np.array([-1.0, 0.0, 1.0]), np.array([9.0, 0.0, -5.0]), 0.0, np.zeros((1, 4))

@@ -28,10 +28,10 @@ from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
-from kedfem.results.envelope import Envelope
 from kedfem.results.modelled import modelled
 from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
+from kedfem.results.stresses.envelope import Envelope
 from kedfem.resume import Keeper, remove_state
 from kedfem.scene import Scene, time_grid, turn_steps
 

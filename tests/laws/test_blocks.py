@@ -17,7 +17,7 @@ from kedfem.motion.newton import BlockFactor, Factor
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.motion.values import features
-from kedfem.results.rigid import rigid_forces
+from kedfem.results.forces.rigid import rigid_forces
 from kedfem.scene import Scene, path_parameter
 from tests.linkages import four_bar, linkage_scene, motion_at, slider_crank
 from tests.spatial_linkages import rssr

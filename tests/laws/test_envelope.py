@@ -14,7 +14,7 @@ from kedfem.dynamics.stepping.transient import steps_of, transient
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
 from kedfem.links.singular_stress import re_entrant, reach
 from kedfem.results import read_results
-from kedfem.results.envelope import EXACT, Envelope, leading
+from kedfem.results.stresses.envelope import EXACT, Envelope, leading
 from kedfem.scene import scene_from
 from tests.scenes import arm, bar, constant_speed, four_bar
 

@@ -7,15 +7,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.links.free_surface import surface_axes
-from kedfem.results.critical_plane import (
+from kedfem.results.fatigue.counting_kernel import counted
+from kedfem.results.fatigue.planes import (
     disproportion,
     dominant,
     findley_stresses,
     normal_stresses,
     signed_von_mises,
 )
-from kedfem.results.fatigue_kernel import counted
-from kedfem.results.fatigue_strength import (
+from kedfem.results.fatigue.strength import (
     collective,
     material_factors,
     reversed_collective,

@@ -25,8 +25,8 @@ from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.results.forces.rigid import RigidForces, rigid_forces, told
 from kedfem.results.recording import recording
-from kedfem.results.rigid import RigidForces, rigid_forces, told
 from kedfem.scene import Scene, drive_angle, path_parameter, scene_from, time_grid
 
 from ..linkages import linkage_scene

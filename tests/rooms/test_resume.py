@@ -15,7 +15,8 @@ from kedfem.dynamics import nominal
 from kedfem.dynamics.stepping import transient
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
-from kedfem.results import envelope, read_results
+from kedfem.results import read_results
+from kedfem.results.stresses import envelope
 from kedfem.resume import STATE
 from kedfem.scene import Scene, scene_from
 from tests.laws.test_levels import linkage

@@ -21,7 +21,7 @@ from kedfem.output.vtu import LinkField, remove_animation
 from kedfem.output.words import clock, moment, place_of, stress_at
 from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
 from kedfem.results.reader import foreign
-from kedfem.results.singular_stress import AWAY, reason
+from kedfem.results.stresses.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
 STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "plots", "mesh_error.vtu"

@@ -8,8 +8,8 @@ import numpy as np
 
 from kedfem.output.vtu import write_points
 from kedfem.results import Fatigue
-from kedfem.results.fatigue_look import LinkFatigue
-from kedfem.results.hot_spots import drawn_points
+from kedfem.results.fatigue.surface import LinkFatigue
+from kedfem.results.stresses.hot_spots import drawn_points
 from kedfem.results.table import cell, text_file
 
 FIELD, SPOTS, POINTS = "fatigue.vtu", "fatigue.csv", "fatigue_points.csv"

@@ -12,7 +12,7 @@ from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.units import prefixed
 from kedfem.results import Results
 from kedfem.results.data_sets import drive_heading
-from kedfem.results.loads import DriveLoad, JointLoad, facing
+from kedfem.results.forces.loads import DriveLoad, JointLoad, facing
 from kedfem.results.table import cell, text_file, write_numbers
 
 XYZ = "xyz"

@@ -17,7 +17,7 @@ from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
 from kedfem.output.vtu import STRESS_COMPONENTS
 from kedfem.results.files import replacing
-from kedfem.results.load_cases import LoadCase
+from kedfem.results.forces.load_cases import LoadCase
 from kedfem.results.table import cell, text_file
 from kedfem.scene import Material
 

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from kedfem.output.vtu import write_points
 from kedfem.results import Peak
-from kedfem.results.envelope import LinkEnvelope
-from kedfem.results.hot_spots import drawn_points
+from kedfem.results.stresses.envelope import LinkEnvelope
+from kedfem.results.stresses.hot_spots import drawn_points
 from kedfem.results.table import cell, text_file
 
 ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"

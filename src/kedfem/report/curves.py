@@ -11,7 +11,7 @@ from kedfem.output.load_files import draw_polar, has_polar, polar_title
 from kedfem.output.plots.abscissa import Abscissa
 from kedfem.output.plots.drawing import draw_panels, drawn_over, figure_svg, heading, worth_drawing
 from kedfem.results import Results
-from kedfem.results.loads import JointLoad
+from kedfem.results.forces.loads import JointLoad
 
 GROUPS = {
     "probes": "Probes", "drive": "Drive", "joints": "Joints", "energy": "Energy", "gears": "Gears",

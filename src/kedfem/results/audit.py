@@ -27,12 +27,12 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, carried_fields, fields_of, flow
-from kedfem.results.constraint_forces import ConstraintForces
-from kedfem.results.constraint_work import row_work
-from kedfem.results.force_elements import Measured
-from kedfem.results.moments import Constants, Nominal, constants, nominal
+from kedfem.results.forces.constraint_forces import ConstraintForces
+from kedfem.results.forces.constraint_work import row_work
+from kedfem.results.forces.force_elements import Measured
+from kedfem.results.forces.moments import Constants, Nominal, constants, nominal
+from kedfem.results.forces.resistance import Last, last_of, products, resistance
 from kedfem.results.records import Channel
-from kedfem.results.resistance import Last, last_of, products, resistance
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import turned_vectors
-from kedfem.results.moments import Constants, Field, Nominal, dot, in_world, paired, rotated, turned
+from kedfem.results.forces.moments import Constants, Field, Nominal, dot, in_world, paired, rotated, turned
 
 Scalars = Float[np.ndarray, " T"]
 Vectors = Float[np.ndarray, "3 T"]

@@ -14,8 +14,8 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions
+from kedfem.results.forces.rigid import stated_link
 from kedfem.results.records import Channel
-from kedfem.results.rigid import stated_link
 from kedfem.scene import Scene
 
 Rows = Float[np.ndarray, "T c"]

@@ -29,7 +29,7 @@ from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.force_elements import measured_actions
+from kedfem.results.forces.force_elements import measured_actions
 from kedfem.results.recording import recording
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
 from kedfem.scene.timing import turn_steps

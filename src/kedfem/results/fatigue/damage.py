@@ -1,7 +1,7 @@
 """Damage at the surfaces of links by the stresses of the last period of a motion that repeats itself.
 
 The stress of a link over the period is a product of a few modes' stresses and their coordinates, which the envelope
-keeps; it is made for a few points at a time (`fatigue_look`).
+keeps; it is made for a few points at a time (`surface`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,11 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.links.recovery import StressRecovery
-from kedfem.results.envelope import Envelope
-from kedfem.results.fatigue_look import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
-from kedfem.results.fatigue_strength import Strength, strength_of, verdict
-from kedfem.results.hot_spots import drawn_points, places_apart
+from kedfem.results.fatigue.strength import Strength, strength_of, verdict
+from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
 from kedfem.results.records import Fatigue, FatigueSpot
+from kedfem.results.stresses.envelope import Envelope
+from kedfem.results.stresses.hot_spots import drawn_points, places_apart
 from kedfem.scene import Fatigue as Asked
 from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
 

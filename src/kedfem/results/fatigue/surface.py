@@ -11,15 +11,15 @@ from kedfem.links.free_surface import FreeSurface, free_surface
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
 from kedfem.processes import threads
-from kedfem.results.critical_plane import (
+from kedfem.results.fatigue.planes import (
     disproportion,
     dominant,
     findley_stresses,
     normal_stresses,
     signed_von_mises,
 )
-from kedfem.results.envelope import Kept
-from kedfem.results.fatigue_strength import Strength
+from kedfem.results.fatigue.strength import Strength
+from kedfem.results.stresses.envelope import Kept
 from kedfem.scene import Fatigue as Asked
 
 CHUNK = 4_000_000  # bytes of histories on 36 planes of some points: they stay in the cache
@@ -157,7 +157,7 @@ class Look:
         axes: Float[np.ndarray, "k 3 3"],
     ) -> tuple[Float[np.ndarray, "k 4"], Float[np.ndarray, "k T"]]:  # fmt: skip
         """The worst history of each point, and what counting found."""
-        from kedfem.results.fatigue_kernel import counted
+        from kedfem.results.fatigue.counting_kernel import counted
 
         known = self.strength
         if kind == SIGNED:

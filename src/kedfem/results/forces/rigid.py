@@ -17,7 +17,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.force_elements import Measured
+from kedfem.results.forces.force_elements import Measured
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 

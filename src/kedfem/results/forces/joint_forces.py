@@ -16,8 +16,8 @@ from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
-from kedfem.results.constraint_forces import ConstraintForces, known, of_joint
-from kedfem.results.force_elements import Measured
+from kedfem.results.forces.constraint_forces import ConstraintForces, known, of_joint
+from kedfem.results.forces.force_elements import Measured
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, Scene

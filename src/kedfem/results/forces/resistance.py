@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
-from kedfem.results.moments import (
+from kedfem.results.forces.moments import (
     Constants,
     Field,
     Nominal,

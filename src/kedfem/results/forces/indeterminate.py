@@ -5,8 +5,8 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from kedfem.dynamics.model import Model
-from kedfem.results.constraint_forces import shared_rows
-from kedfem.results.joint_forces import INDETERMINATE, rows_of_joint
+from kedfem.results.forces.constraint_forces import shared_rows
+from kedfem.results.forces.joint_forces import INDETERMINATE, rows_of_joint
 from kedfem.scene import GROUND, Scene
 
 

@@ -191,7 +191,7 @@ class Envelope:
             self.worst = block.part(k, k + 1).at(0).copied()
 
     def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int, early: int) -> None:
-        from kedfem.results.envelope_kernel import LEVELS, enveloped, residuals_of
+        from kedfem.results.stresses.envelope_kernel import LEVELS, enveloped, residuals_of
 
         C = modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0))))
         if early < len(C):

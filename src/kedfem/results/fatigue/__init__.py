@@ -1,0 +1,1 @@
+"""Damage at the surfaces of links by stresses that repeat themselves."""

@@ -1,0 +1,1 @@
+"""Forces and moments in joints, of force elements and of rigid links."""
