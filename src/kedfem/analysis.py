@@ -239,7 +239,8 @@ def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, 
         return steady, None
     over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
     found = vibration(over, solver, solver.steady)
-    return replace(steady, vibration=found.words), found
+    steady = steady.told(found.frequency, found.words, solver.ready.c.h)
+    return steady, found if steady.unstable else None
 
 
 def _drawn(

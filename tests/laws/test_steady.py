@@ -419,6 +419,8 @@ def test_an_undamped_resonance_is_refused_and_its_frequency_named() -> None:
     assert "a resonance without damping" in said
     named = float(said.split("about ")[1].split(" Hz")[0])
     assert_allclose(named, omega / 2 / np.pi, rtol=0.01)
+    speed = float(said.split(", at ")[1].split(" rpm")[0])
+    assert_allclose(speed, share * omega * 60 / (2 * np.pi), rtol=1e-5)
 
 
 def test_a_search_that_does_not_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

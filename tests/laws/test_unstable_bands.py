@@ -12,10 +12,13 @@ from scipy.optimize import brentq
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
+from kedfem.analysis import Run, analyse
 from kedfem.errors import SceneError
 from kedfem.motion.period import over_one_period
 from kedfem.scene import scene_from
 from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
+from kedfem.sweep.edges import edges
+from kedfem.sweep.points import GROWTH, Row
 from tests.laws.test_steady import as_steady, clamped, planar, spun, states
 from tests.laws.test_varying_springs import hill, multiplier
 from tests.rooms.test_sweep import Inline
@@ -100,6 +103,40 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
     assert "must be combined with numbers of the first key, analysis.initial" in said(
         kind="steady", axes=words
     )
+
+
+def test_an_edge_is_not_looked_for_where_points_between_tell_nothing() -> None:
+    """Stable, unknown, unstable: halving that interval again and again would never end."""
+
+    def row(growth: float | None) -> Row:
+        found = {} if growth is None else {GROWTH: ("1", (growth, np.nan, np.nan, np.nan))}
+        return Row("complete", "", 0.0, extremes=found)
+
+    axes = axes_of(["drive.speed=10,20,30,40"], spun("x", 100.0, (0.012, 0.01)))
+    rows = {k: row(x) for k, x in enumerate((0.9, None, 1.2, 0.8))}
+    assert [(x.below, x.above, x.untold) for x in edges(axes, rows)] == [(10, 30, 1), (30, 40, 0)]
+
+
+def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None:
+    """At four degrees a step and β = 2e-5 the crank's 38 kHz grow by 1.9 in a turn, by the method; half a step tells."""
+    raw = at_speed(plane_slider_crank(True), 2600)
+    raw["damping"] = {"beta": 2e-5}
+
+    def found(steps: int) -> Run:
+        analysis = {**raw["analysis"], "kind": "steady", "accuracy": "quick", "steps_per_revolution": steps}
+        output = {"folder": str(tmp_path), "plots": False, "picture": False, "animation": False}
+        return analyse(scene_from({**raw, "analysis": analysis, "output": output}))
+
+    long = found(90)
+    assert long.steady is not None
+    assert long.steady.growth is None
+    assert long.steady.levels[0] > 1.5
+    assert any("cannot be told with steps as long as these: a vibration at about" in x for x in long.warnings)
+    assert not (tmp_path / "growing.pvd").exists()
+    short = found(180)
+    assert short.steady is not None
+    assert short.steady.growth is not None
+    assert short.steady.growth < 0.9
 
 
 def plane_four_bar(reduced: bool) -> Raw:

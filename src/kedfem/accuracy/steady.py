@@ -1,7 +1,7 @@
 """What a run of a steady motion knows of it: its period, how it was found, and whether vibrations about it die away."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, log
 
 import numpy as np
@@ -11,6 +11,9 @@ from kedfem.dynamics.stepping.transient import Steps
 from kedfem.dynamics.system.periodic import Periodic
 from kedfem.scene import Scene, time_grid, turn_steps
 
+RESOLVED = (
+    0.2  # oscillations in a step, five steps each: of faster ones a step does not tell whether they grow
+)
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
 APART = 0.1  # of logarithms of growth, by which levels of a step that resolves what grows differ at most
@@ -31,6 +34,7 @@ class Steady:
     certain : whether that was found to the tolerance
     levels : growth of each level
     vibration : that one, of an unstable motion: how fast it is, and which link moves most, in words
+    passed : periods of that vibration in a step, if these are too many for its growth to be more than the method's doing
     """
 
     period: float
@@ -41,6 +45,17 @@ class Steady:
     certain: bool
     levels: tuple[float, ...] = ()
     vibration: str = ""
+    passed: float = 0.0
+
+    def told(self, frequency: float, words: str, step: float) -> "Steady":
+        """With the vibration that grows; its growth is not known where steps [s] do not resolve its frequency [Hz].
+
+        Several levels in time that agree do resolve it.
+        """
+        passed = frequency * step
+        if len(self.levels) > 1 or passed <= RESOLVED:
+            return replace(self, vibration=words)
+        return replace(self, vibration=words, growth=None, passed=passed)
 
     @property
     def unstable(self) -> bool:
@@ -64,7 +79,7 @@ class Steady:
         """As a results file keeps them."""
         known: dict[str, str | float] = {}
         known |= {} if self.growth is None else {"steady growth in a period": self.growth}
-        known |= {"steady vibration that grows": self.vibration} if self.vibration else {}
+        known |= {"steady vibration that grows": self.vibration} if self.vibration and not self.passed else {}
         return {
             "steady period [s]": self.period, "steady revolutions": self.revolutions,
             "steady marches": float(self.marches), "steady residual": self.residual, **known,
@@ -107,7 +122,13 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
     """What the user should know."""
     if steady is None:
         return ()
-    if steady.growth is None and steady.levels:
+    if steady.growth is None and steady.passed:
+        return (
+            "steady motion: whether it is stable cannot be told with steps as long as these: a vibration "
+            f"{steady.vibration}, is multiplied by {steady.levels[0]:.3g} in a period, but {steady.passed:.2g} of its "
+            "oscillations pass in a step, and the growth may be the method's doing; take smaller steps",
+        )
+    if steady.growth is None and len(steady.levels) > 1:
         least, most = min(steady.levels), max(steady.levels)
         return (
             "steady motion: whether it is stable cannot be told with steps as long as these: at the levels in time "

@@ -29,6 +29,7 @@ class Edge:
     below, above : of the first key: the edge is between them
     unstable_above : else below
     points : numbers of these two points
+    untold : points between of which nothing is known: they failed, or their steps are too long
     """
 
     others: tuple[Value, ...]
@@ -36,6 +37,7 @@ class Edge:
     above: float
     unstable_above: bool
     points: tuple[int, int]
+    untold: int = 0
 
     @property
     def at(self) -> float:
@@ -76,13 +78,14 @@ def edges(axes: Sequence[Axis], rows: Mapping[int, Row]) -> Iterator[Edge]:
         return
     lines: dict[tuple[Value, ...], list[int]] = {}
     for k in sorted(rows, key=lambda k: (float(numbers[k]), k)):
-        if GROWTH in rows[k].extremes:
-            lines.setdefault(tuple(axis.values[k] for axis in others), []).append(k)
+        lines.setdefault(tuple(axis.values[k] for axis in others), []).append(k)
     for same, line in lines.items():
-        for i, j in pairwise(line):
+        known = [n for n, k in enumerate(line) if GROWTH in rows[k].extremes]
+        for m, n in pairwise(known):
+            i, j = line[m], line[n]
             first, second = (rows[k].extremes[GROWTH][1][0] > 1 + GROWS for k in (i, j))
             if first != second:
-                yield Edge(same, float(numbers[i]), float(numbers[j]), bool(second), (i, j))
+                yield Edge(same, float(numbers[i]), float(numbers[j]), bool(second), (i, j), n - m - 1)
 
 
 def with_middles(axes: Sequence[Axis], found: Sequence[Edge]) -> list[Axis]:

@@ -114,7 +114,7 @@ def sweep(
                 if asked.edges is None:
                     break
                 found = list(edges(axes, rows))
-                if not (wide := [each for each in found if each.width > asked.edges]):
+                if not (wide := [each for each in found if each.width > asked.edges and not each.untold]):
                     break
                 axes = with_middles(axes, wide)
             _end(pool, kill=False)

@@ -64,6 +64,13 @@ class PeriodMap:
         self._weights: dict[str, float] = {}
         self._now = Instant(of, motion_at, 0.0)
 
+    @property
+    def speed_words(self) -> str:
+        """The mean speed of a drive that goes on turning, in words; else nothing."""
+        first, last = self.motion_at(np.array([0.0, self.period])).phi
+        turns = abs(float(last - first)) / TURN  # a slide that comes back has none
+        return f", at {60 * turns / self.period:.6g} rpm" if turns > 0.5 else ""
+
     def vector(self, state: State) -> Flat:
         """A state as a vector."""
         return np.concatenate([getattr(state, name).ravel() for name in CARRIED])

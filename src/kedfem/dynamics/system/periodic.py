@@ -189,7 +189,7 @@ def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:
     return (
         "analysis.kind: must be a motion whose vibrations die away for a steady motion, got a resonance without "
         f"damping: a natural vibration of about {of.frequency(*shapes):.4g} Hz repeats itself with the period of "
-        f"{of.period:.6g} s; give it damping, or another speed"
+        f"{of.period:.6g} s{of.speed_words}; give it damping, or another speed"
     )
 
 
