@@ -4,8 +4,9 @@ Marches over a period, and processor time: to find the steady state, to find mul
 what is left of the vibration of the start is 1e-6 of the state. Ratios count.
 """
 
+import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -23,9 +24,10 @@ from kedfem.scene import Scene, path_parameter, scene_from, time_grid
 
 LEFT, MOST = 1e-6, 400
 EXAMPLES = Path(__file__).parents[1] / "examples"
-#: example, and its damping where it is changed
-CASES = {
+#: example, its damping where it is changed, whether its links are reduced where they are not
+CASES: dict[str, tuple[str, float] | tuple[str, float, bool]] = {
     "four_bar_beams": ("four_bar_beams", 0.0),
+    "the same, 1 % damping ": ("four_bar_beams", 0.01),
     "the same, 0.2 % damping": ("four_bar_beams", 0.002),
     "four_bar_corotational": ("four_bar_corotational", 0.0),
     "the same, 0.2 % damping ": ("four_bar_corotational", 0.002),
@@ -34,11 +36,13 @@ CASES = {
     "universal_joint_shaft": ("universal_joint_shaft", 0.0),
     "the same, 0.1 % damping": ("universal_joint_shaft", 0.001),
     "four_bar_solids": ("four_bar_solids", 0.0),
+    "the same, 1 % damping": ("four_bar_solids", 0.01),
+    "the same, 1 % damping, reduced": ("four_bar_solids", 0.01, True),
     "connecting_rod": ("connecting_rod", 0.0),
 }
 
 
-def scene_of(name: str, damping: float) -> Scene:
+def scene_of(name: str, damping: float, reduced: bool = False) -> Scene:
     """An example as a steady motion."""
     raw = tomllib.loads((EXAMPLES / name / "scene.toml").read_text(encoding="utf-8"))
     gone = ("revolutions", "end_time", "initial", "accuracy")
@@ -46,6 +50,8 @@ def scene_of(name: str, damping: float) -> Scene:
     raw["analysis"] = {**analysis, "kind": "steady", "accuracy": "quick"}
     if damping:
         raw["damping"]["ratio"] = damping
+    for link in raw["links"].values() if reduced else ():
+        link["reduced"] = True
     return over_one_period(scene_from(raw, EXAMPLES / name))
 
 
@@ -81,12 +87,13 @@ def marched(over: PeriodMap, until: Periodic) -> int:
     return MOST
 
 
-def main() -> None:
-    """A line for each case."""
+def main(named: Sequence[str] = ()) -> None:
+    """A line for each case, or for some."""
     steady = "steady: marches, s | with multipliers: marches, s"
     print(f"| scene | unknowns | left after a period | {steady} | marching: periods, s |")
     print("|---|---:|---:|---:|---:|---:|")
-    for name, case in CASES.items():
+    for name in named or CASES:
+        case = CASES[name]
         scene = scene_of(*case)
         reduced = any(link.reduced for link in scene.links.values())
         ready = prepared(scene, lambda stage: None)[0] if reduced else meshed(scene)
@@ -104,4 +111,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
