@@ -10,11 +10,12 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.laws.test_unstable_bands import plane_four_bar, plane_slider_crank
+
 from kedfem.sweep import sweep
 from kedfem.sweep.axes import axes_of
 from kedfem.sweep.points import Base
 from kedfem.sweep.run import Asked
-from tests.laws.test_unstable_bands import plane_four_bar, plane_slider_crank
 
 #: scene, speeds, damping β [s], steps in a turn
 MAPS = {

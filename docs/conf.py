@@ -32,7 +32,9 @@ nb_execution_raise_on_error = True
 
 # names of other packages are no targets here: nothing is fetched while building
 nitpicky = True
-inner = r"kedfem\.(scene\.base|accuracy|results\.(differences|kinematic|forces\.load_cases)|links|dynamics)\..*"
+inner = (
+    r"kedfem\.(scene\.base|accuracy|results\.(differences|kinematic|forces\.load_cases)|links|dynamics)\..*"
+)
 nitpick_ignore_regex = [("py:.*", r"(?!kedfem\.).*"), ("py:class", inner)]
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"

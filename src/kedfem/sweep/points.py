@@ -15,7 +15,7 @@ from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.shared_modes import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
-from kedfem.dynamics.system.period_map import Carried
+from kedfem.dynamics.system.period.map import Carried
 from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled
 from kedfem.resume import origin

@@ -10,6 +10,7 @@ from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.coarse import coarse_model
 from kedfem.dynamics.nominal import POINTS, forcings, instants, motions, rows_at_start
 from kedfem.dynamics.segment import CONVERGED, FREE
 from kedfem.dynamics.stepping.literal import LiteralSteps
@@ -21,8 +22,8 @@ from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
-from kedfem.dynamics.system.period_map import PeriodMap
-from kedfem.dynamics.system.periodic import periodic
+from kedfem.dynamics.system.period.map import PeriodMap
+from kedfem.dynamics.system.period.search import periodic, residual
 from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
@@ -126,6 +127,7 @@ def transient(
                 advice = "give it more elements" if stresses is None else STIFFENED
                 raise SolveError(_stuck(first + k + failed.taken, part, failed, advice)) from None
             yield from _finite(Block(first + k, part, links))
+    _marched(solver, state)
 
 
 def _corotational(
@@ -224,8 +226,31 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
         raise ValueError("a steady state must be that of a system, got the monolithic solver's")
 
     over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
-    solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed)
+    small = coarse_map(scene, linkage, along, model) if over.linear else None
+    solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed, small)
+    if isinstance(solver, SystemSteps):
+        solver.over = over
     return solver.steady.state
+
+
+def _marched(solver: Steps, last: Any) -> None:
+    """What a period leaves of a steady state, from the state with which the recorded one ends."""
+    if isinstance(solver, SystemSteps) and solver.steady is not None and solver.over is not None:
+        over = solver.over
+        left = residual(over, over.vector(solver.steady.state), over.vector(last))
+        solver.steady = replace(solver.steady, residual=max(left, solver.steady.residual))
+
+
+def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> PeriodMap | None:
+    """The map of the steps of the model with its large links reduced; None if it has none."""
+    small = coarse_model(scene, linkage, along, model)
+    if small is None:
+        return None
+    solver = steps_of(scene, small)
+    start = _begun(scene, linkage, along, small, solver)
+    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
+        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
+    return period_map(scene, linkage, along, small, solver, start)
 
 
 def period_map(

@@ -24,10 +24,10 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.forces.exerted import exerted, on_links
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.forces.turning_loads import turned, turning
-from kedfem.dynamics.system.krylov import Watch
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, displacements, march, ready
-from kedfem.dynamics.system.periodic import Periodic, Search
+from kedfem.dynamics.system.period.krylov import Watch
+from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static

@@ -24,11 +24,12 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.exerted import ELEMENTS
 from kedfem.dynamics.system.forces.supports import supports
-from kedfem.dynamics.system.krylov import Watch
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.oracle.literal import Now
 from kedfem.dynamics.system.oracle.literal_steps import literal_march, oracle
-from kedfem.dynamics.system.periodic import Periodic, Search
+from kedfem.dynamics.system.period.krylov import Watch
+from kedfem.dynamics.system.period.map import PeriodMap
+from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.starts.instant import Motion
@@ -111,6 +112,7 @@ class SystemSteps:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme)
         self.steady: Periodic | None = None
+        self.over: PeriodMap | None = None  # whose steady state that is
         self.watch: Watch = lambda marched: None
         self.search = Search()
         self.oracle = oracle(self.ready) if literal else None

@@ -13,9 +13,18 @@ import numpy as np
 from jaxtyping import Complex
 
 from kedfem.dynamics.system.arrays import State, copied
-from kedfem.dynamics.system.krylov import Watch, Watched, arnoldi, combined, scale_of
-from kedfem.dynamics.system.multipliers import multipliers
-from kedfem.dynamics.system.period_map import CARRIED, Carried, PeriodMap
+from kedfem.dynamics.system.period.coarse import Coarse
+from kedfem.dynamics.system.period.krylov import (
+    Derivative,
+    Solution,
+    Watch,
+    Watched,
+    combined,
+    gmres,
+    scale_of,
+)
+from kedfem.dynamics.system.period.map import CARRIED, Carried, PeriodMap
+from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.errors import SolveError
@@ -54,7 +63,7 @@ class Periodic:
 
     state : at the beginning of the period
     period : [s]
-    residual : what the period leaves of it, of its size
+    residual : what the period leaves of it, of its size; of linear systems as GMRES knows it, until it is marched
     marches : periods that were marched to find it, and its multipliers
     multipliers : those found, of largest magnitude first; none if not asked for
     certain : whether the first of them was found to SURE, or ABOUT
@@ -76,14 +85,16 @@ class Periodic:
 
 
 def periodic(
-    over: PeriodMap, stability: bool = True, watch: Watch = lambda marched: None, closed: float = CLOSED
-) -> Periodic:
+    over: PeriodMap, stability: bool = True, watch: Watch = lambda marched: None, closed: float = CLOSED,
+    small: PeriodMap | None = None,
+) -> Periodic:  # fmt: skip
     """The state at t = 0 that returns after a period; the search begins with `over.start`.
 
     Parameters
     ----------
     stability : whether multipliers are asked for; with stops there are none, as P is not smooth where these are met
     closed : what a period may leave of its size
+    small : the map of the same linear system with reduced links, which preconditions the search; none: nothing does
 
     Raises
     ------
@@ -91,13 +102,17 @@ def periodic(
         If there is none, or none is found; iterations of a step that do not converge.
     """
     steps = Watched(over, watch, closed)
-    x, y = _fixed(steps, over.vector(over.start))
-    residual = over.size(over.change(y, x)) / max(scale_of(over, y), 1e-300)
+    x, y = _fixed(steps, over.vector(over.start), None if small is None else Coarse(over, small))
     stops = any(isinstance(each.law, Stop) for each in over.of.system.constraints)
     found, certain, shape = np.zeros(0, complex), not stops, np.zeros(0)
     if stability and not stops:
         found, certain, shape = multipliers(steps, x, y)
-    return Periodic(over.state(x), over.period, residual, over.marches, found, certain, shape)
+    return Periodic(over.state(x), over.period, residual(over, x, y), over.marches, found, certain, shape)
+
+
+def residual(over: PeriodMap, x: Flat, y: Flat) -> float:
+    """What a period that leads from x to y leaves, of the size of the state."""
+    return over.size(over.change(y, x)) / max(scale_of(over, y), 1e-300)
 
 
 def _closed(steps: Watched) -> float:
@@ -106,13 +121,14 @@ def _closed(steps: Watched) -> float:
     return steps.closed if of.linear else max(steps.closed, ROUGH * of.of.c.tolerance)
 
 
-def _fixed(steps: Watched, x: Flat) -> tuple[Flat, Flat]:
+def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat]:
     """x and P(x), which are the same."""
     map_, last = steps.map, np.inf
     y = steps(x)
     _refuse_windings(map_, x, y)
     map_.weighed(y)
-    x, y = y, steps(y)  # a period damps most vibrations away
+    x = y if coarse is None else x + coarse.start(map_.change(y, x))  # a period damps most vibrations away
+    y = steps(x)
     if not map_.linear:
         x, y = _mixed(steps, x, y)
     for _ in range(NEWTON):
@@ -124,8 +140,9 @@ def _fixed(steps: Watched, x: Flat) -> tuple[Flat, Flat]:
         if not np.isfinite(left):
             break
         last = left
-        x = map_.possible(x + _solved(steps, x, y, r, scale))
-        y = steps(x)
+        found = _solved(steps, x, y, r, scale, coarse)
+        x = map_.possible(x + found.d)
+        y = x + found.left if map_.linear else steps(x)
     raise SolveError(
         "analysis.kind: must be a motion for which a steady state can be found, got one whose search does not "
         f"converge: a period still leaves {100 * left / scale:.2g} % of it; take more damping, smaller steps, or "
@@ -160,8 +177,8 @@ def _mixed(steps: Watched, x: Flat, y: Flat) -> tuple[Flat, Flat]:
     return best[1], best[2]
 
 
-def _solved(steps: Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
-    """d with (I − Φ) d = r, by GMRES in the energy's product.
+def _solved(steps: Watched, x: Flat, y: Flat, r: Flat, scale: float, coarse: Coarse | None) -> Solution:
+    """(I − Φ) d = r by GMRES in the energy's product.
 
     Raises
     ------
@@ -171,17 +188,10 @@ def _solved(steps: Watched, x: Flat, y: Flat, r: Flat, scale: float) -> Flat:
     map_, beta = steps.map, steps.map.whole(r)
     least = INNER * _closed(steps) * scale
     by, allowed = (beta, least) if map_.linear else (SMALL * scale, max(least, SMALL * beta))
-    basis = [r / beta]
-    for H in arnoldi(steps, (x, y), basis, by, KRYLOV):
-        rest, asked = np.eye(*H.shape) - H, beta * np.eye(len(H))[0]
-        d = np.linalg.lstsq(rest, asked, rcond=None)[0]
-        if float(np.linalg.norm(rest @ d - asked)) <= allowed:
-            break
-    values, shapes = np.linalg.eig(rest[:-1].astype(complex))
-    nearest = shapes[:, int(np.abs(values).argmin())]
-    if np.abs(values).min() < REPEATS:
-        raise SolveError(_resonant(map_, [combined(part, basis) for part in (nearest.real, nearest.imag)]))
-    return combined(d, basis)
+    found = gmres(Derivative(steps, x, y, by), r, allowed, KRYLOV, coarse)
+    if found.nearest < REPEATS:
+        raise SolveError(_resonant(map_, found.shape))
+    return found
 
 
 def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:

@@ -7,7 +7,7 @@ not excite: by the largest magnitude a vibration grows, or falls, in a period.
 import numpy as np
 from jaxtyping import Complex
 
-from kedfem.dynamics.system.krylov import Watched, arnoldi, combined, scale_of
+from kedfem.dynamics.system.period.krylov import Derivative, Watched, arnoldi, combined, scale_of
 from kedfem.dynamics.system.starts.instant import Flat
 
 MOST, AGAIN = 80, 5  # marches, at most; those after which no larger one may have come up
@@ -31,7 +31,7 @@ def multipliers(steps: Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray, "
         return np.zeros(1, complex), True, 0 * v
     by, found, since = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex), 0
     basis = [v / size]
-    for H in arnoldi(steps, (x, y), basis, by, MOST):
+    for H in arnoldi(Derivative(steps, x, y, by), basis, MOST):
         values, shapes = np.linalg.eig(H[:-1].astype(complex))
         order = np.argsort(-np.abs(values))
         off = H[-1, -1] * np.abs(shapes[-1, order]) / np.linalg.norm(shapes[:, order], axis=0)

@@ -1,0 +1,28 @@
+"""A model whose large links are reduced in the first modes that come: good enough to precondition with, not to answer."""
+
+import numpy as np
+
+from kedfem.dynamics.matrices.dense import SMALL
+from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.modes.bases import bases
+from kedfem.dynamics.modes.reduction import static_parts
+from kedfem.dynamics.nominal import instants
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import Scene, path_parameter, time_grid
+
+INSTANTS = 16  # of the run, at which the linkage is looked at
+LEFT_OUT = 1e-4  # of the energy norm of its deflections there
+
+
+def coarse_model(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Model | None:
+    """The model with its large links reduced; None if it has none, or is free to move where its drives are held."""
+    large = {link.name for link in model.links if link.unknowns > SMALL and link.full is None}
+    if not large or linkage.mobility:
+        return None
+    t = time_grid(scene).end * (np.arange(INSTANTS) + 0.5) / INSTANTS
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    found = bases(model, instants(model, motion), static_parts(model), only=large)
+    modes = [None if each is None else each.first(each.count(LEFT_OUT)) for each in found]
+    return reduced_model(model, modes)

@@ -1,0 +1,144 @@
+"""Krylov spaces of the derivative of a period map: a march over the period a product."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.system.period.map import PeriodMap
+from kedfem.dynamics.system.starts.instant import Flat
+
+WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
+Watch = Callable[[int], None]
+"""Told of the periods that were marched so far."""
+Nearer = Callable[[Flat], Flat]
+"""r → about (I − Φ)⁻¹ r."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """The map, told about."""
+
+    map: PeriodMap
+    watch: Watch
+    closed: float
+
+    def __call__(self, x: Flat, blow: Sequence[np.ndarray] | None = None) -> Flat:
+        """As the map itself."""
+        out = self.map(x, blow)
+        self.watch(self.map.marches)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class Derivative:
+    """Φ at x, of which y = P(x), from the difference that `by` times a vector makes: a march a product."""
+
+    steps: Watched
+    x: Flat
+    y: Flat
+    by: float
+
+    @property
+    def map(self) -> PeriodMap:
+        """The map whose derivative it is."""
+        return self.steps.map
+
+    def __call__(self, v: Flat) -> Flat:
+        """Φ v."""
+        moved = self.map.possible(self.x + self.by * v)
+        return self.map.change(self.steps(moved), self.y) / self.by
+
+
+def scale_of(of: PeriodMap, y: Flat) -> float:
+    """√ of the largest energy in a period."""
+    return float(np.sqrt(of.largest)) + of.size(y)
+
+
+def combined(c: Flat, basis: Sequence[Flat]) -> Flat:
+    """Σ c_i v_i of the first vectors of a basis."""
+    out = np.zeros_like(basis[0])
+    for k, v in zip(c, basis, strict=False):
+        out += k * v
+    return out
+
+
+def arnoldi(
+    phi: Derivative, basis: list[Flat], most: int, nearer: Nearer | None = None,
+    tried: list[Flat] | None = None,
+) -> Iterator[Float[np.ndarray, "j1 j"]]:  # fmt: skip
+    """H of Φ V = V₊ H, on an orthonormal basis that grows by a vector, and a march, each time.
+
+    It ends where the basis holds all that there is, after `most` marches at the latest.
+
+    Parameters
+    ----------
+    basis : its first vector; the others are added
+    nearer : P⁻¹ ≈ (I − Φ)⁻¹, which may differ from vector to vector; H is that of 1 − (I − Φ) P⁻¹ then
+    tried : P⁻¹ V is added
+    """
+    H = np.zeros((most + 1, most))
+    for j in range(most):
+        v = basis[j]
+        if nearer is None:
+            w = phi(v)
+        else:
+            z = nearer(v)
+            w = v - z + phi(z)
+            if tried is not None:
+                tried.append(z)
+        w, H[: j + 2, j] = _orthogonal(phi.map, basis, w)
+        whole = H[j + 1, j] <= WHOLE * max(1.0, np.abs(H[: j + 2, : j + 1]).max())
+        if not whole:
+            basis.append(w / H[j + 1, j])
+        yield H[: j + 2, : j + 1]
+        if whole:
+            return
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """What GMRES found of (I − Φ) d = r.
+
+    d : solution; left : r − (I − Φ) d
+    nearest : the smallest eigenvalue of (I − Φ) P⁻¹ in the Krylov space, its magnitude
+    shape : real and imaginary part of its vector, times P⁻¹
+    """
+
+    d: Flat
+    left: Flat
+    nearest: float
+    shape: tuple[Flat, Flat]
+
+
+def gmres(phi: Derivative, r: Flat, least: float, most: int, nearer: Nearer | None = None) -> Solution:
+    """d with (I − Φ) d = r, but for `least`, in the product of the map; a flexible GMRES if it is preconditioned.
+
+    Parameters
+    ----------
+    most : marches; others as of `arnoldi`
+    """
+    beta = phi.map.whole(r)
+    basis, tried = [r / beta], list[Flat]()
+    for H in arnoldi(phi, basis, most, nearer, tried):
+        rest, asked = np.eye(*H.shape) - H, beta * np.eye(len(H))[0]
+        c = np.linalg.lstsq(rest, asked, rcond=None)[0]
+        left = asked - rest @ c
+        if float(np.linalg.norm(left)) <= least:
+            break
+    values, shapes = np.linalg.eig(rest[:-1].astype(complex))
+    k, found = int(np.abs(values).argmin()), tried or basis
+    shape = combined(shapes[:, k].real, found), combined(shapes[:, k].imag, found)
+    return Solution(combined(c, found), combined(left, basis), float(np.abs(values[k])), shape)
+
+
+def _orthogonal(of: PeriodMap, basis: Sequence[Flat], w: Flat) -> tuple[Flat, Flat]:
+    """What is left of w beside a basis, its coefficients there and its size."""
+    h = np.zeros(len(basis) + 1)
+    for _ in range(2):
+        c = of.products(basis, w)
+        h[:-1] += c
+        w = w - combined(c, basis)
+    h[-1] = of.whole(w)
+    return w, h
