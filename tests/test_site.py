@@ -1,5 +1,6 @@
 """The pages of docs/: each is found from the start page; what lessons and how-to pages have typed does what they show."""
 
+import asyncio
 import contextlib
 import io
 import re
@@ -149,7 +150,9 @@ def test_the_notebook_runs_and_shows_its_bar(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.delenv("MPLBACKEND", raising=False)  # notebooks have one of their own
     book = nbformat.read(DOCS / "how-to" / "notebook.ipynb", 4)
     assert all(not cell.get("outputs") for cell in book.cells), "commit it without outputs"
-    NotebookClient(book, timeout=600, kernel_name="python3").execute()
+    asyncio.run(  # closes its loop, unlike `execute`
+        NotebookClient(book, timeout=600, kernel_name="python3").async_execute()
+    )
     shown = [output for cell in book.cells for output in cell.get("outputs", [])]
     kinds = [kind for output in shown for kind in output.get("data", {})]
     assert "image/png" in kinds
