@@ -22,10 +22,11 @@ from kedfem.accuracy.steady import Steady, steady_of, steady_warning
 from kedfem.analysis import analyse
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.levels import level_steps, leveled
-from kedfem.dynamics.stepping.transient import started
+from kedfem.dynamics.stepping.transient import coarse_map, started
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.period.krylov import Watched
 from kedfem.dynamics.system.period.multipliers import multipliers
+from kedfem.dynamics.system.period.search import periodic
 from kedfem.errors import KedfemError, SolveError
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
@@ -174,6 +175,29 @@ def test_a_steady_motion_is_what_a_march_settles_to(name: str) -> None:
     assert of.residual < 1e-6
     assert_allclose(found[-1], found[0], atol=1e-6 * np.abs(found).max())
     assert off(raw, turns, found, ready) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["plane links", "solids"])
+def test_reduced_links_save_marches_and_lead_to_the_same_state(name: str) -> None:
+    raw = planar("plane") if name == "plane links" else swinging("spherical", ("solid", "solid"))
+    raw["damping"] = {"beta": 2e-6}
+    for link in raw["links"].values():  # large enough to gain from it
+        if link["fidelity"] != "beam":
+            link["mesh"] = {"elements": [24, 2] if link["fidelity"] == "plane" else [12, 1, 1]}
+    ready = meshed(over_one_period(scene_from(as_steady(raw))))
+    small = coarse_map(ready.scene, ready.linkage, ready.path, ready.model)
+    assert small is not None
+    over = map_of(ready)
+    alone = periodic(over, stability=False)
+    helped = periodic(map_of(ready), stability=False, small=small)
+    assert helped.marches <= 0.75 * alone.marches
+    x, y = over.vector(alone.state), over.vector(helped.state)
+    assert over.size(over.change(y, x)) < 1e-8 * over.size(x)
+
+
+def test_small_links_are_not_reduced_for_it() -> None:
+    ready = meshed(over_one_period(scene_from(as_steady(beams()))))
+    assert coarse_map(ready.scene, ready.linkage, ready.path, ready.model) is None
 
 
 ROUND = (0.0015, 0.0015)  # so thin that its rotary inertia does not count

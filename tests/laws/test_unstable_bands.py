@@ -17,7 +17,7 @@ from kedfem.errors import SceneError
 from kedfem.motion.period import over_one_period
 from kedfem.scene import scene_from
 from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
-from kedfem.sweep.edges import edges
+from kedfem.sweep.edges import edges, unstable_bands
 from kedfem.sweep.points import GROWTH, Row
 from tests.laws.test_steady import as_steady, clamped, planar, spun, states
 from tests.laws.test_varying_springs import hill, multiplier
@@ -108,13 +108,37 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
 def test_an_edge_is_not_looked_for_where_points_between_tell_nothing() -> None:
     """Stable, unknown, unstable: halving that interval again and again would never end."""
 
-    def row(growth: float | None) -> Row:
-        found = {} if growth is None else {GROWTH: ("1", (growth, np.nan, np.nan, np.nan))}
-        return Row("complete", "", 0.0, extremes=found)
-
     axes = axes_of(["drive.speed=10,20,30,40"], spun("x", 100.0, (0.012, 0.01)))
-    rows = {k: row(x) for k, x in enumerate((0.9, None, 1.2, 0.8))}
-    assert [(x.below, x.above, x.untold) for x in edges(axes, rows)] == [(10, 30, 1), (30, 40, 0)]
+    found = edges(axes, dict(enumerate(grown(0.9, None, 1.2, 0.8))))
+    assert [(x.below, x.above, x.untold) for x in found] == [(10, 30, 1), (30, 40, 0)]
+
+
+def grown(*growths: float | None) -> list[Row]:
+    """Points of a sweep that tell of growth, or of nothing."""
+    told = [{} if x is None else {GROWTH: ("1", (x, np.nan, np.nan, np.nan))} for x in growths]
+    return [Row("complete", "", 0.0, extremes=extremes) for extremes in told]
+
+
+@pytest.mark.parametrize(
+    ("growths", "bands"),
+    [
+        ((0.9, 1.2, 1.3, 0.8), [(15, 35)]),
+        ((1.2, 0.9, 0.9, 1.3), [(10, 15), (35, 40)]),
+        ((1.2, 0.9, 1.1, 0.8), [(10, 15), (25, 35)]),
+        ((1.2, 1.1, 1.1, 1.3), [(10, 40)]),
+        ((0.9, 0.9, 0.8, 0.9), []),
+        ((1.2, None, 1.1, 1.3), [(10, 40)]),
+        ((None, None, None, None), []),
+    ],
+)
+def test_bands_are_between_edges_or_throughout(
+    growths: tuple[float | None, ...], bands: list[tuple[float, float]]
+) -> None:
+    axes, rows = axes_of(["drive.speed=10,20,30,40"], spun("x", 100.0, (0.012, 0.01))), grown(*growths)
+    numbers = axes[0].numbers
+    assert numbers is not None
+    found = list(edges(axes, dict(enumerate(rows))))
+    assert unstable_bands(numbers, rows, [2, 0, 3, 1], found) == bands
 
 
 def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None:

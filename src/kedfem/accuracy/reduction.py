@@ -28,7 +28,7 @@ from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
-from kedfem.dynamics.modes.bases import bases
+from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.nominal import instants
@@ -218,12 +218,8 @@ def first_reduced(
     left &= reducible(model)
     if not left:
         return replace(full, model=model)
-    found = bases(model, instants(model, _training(full)), static_parts(model), only=left)
-    Q = [
-        None if basis is None else basis.first(_count(link, basis, tolerance))
-        for link, basis in zip(model.links, found, strict=True)
-    ]
-    return replace(full, model=reduced_model(model, Q))
+    small = reduced_at(model, _training(full), left, lambda link, basis: _count(link, basis, tolerance))
+    return replace(full, model=small)
 
 
 def _settled(

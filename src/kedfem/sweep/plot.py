@@ -1,7 +1,6 @@
 """The resonance plot: largest stresses, joint forces and torques over a swept key; the map of stability over two. PNG."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from kedfem.accuracy.steady import GROWS
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.sweep.axes import Axis
-from kedfem.sweep.edges import Edge
+from kedfem.sweep.edges import Edge, unstable_bands
 from kedfem.sweep.files import column_units, largest, plain_quantities
 from kedfem.sweep.points import GROWTH, Row
 
@@ -18,7 +17,7 @@ PANELS = (
     ("joints/", "N", "joint force (N)", 1.0),
     ("drive/", "N m", "drive torque (N m)", 1.0),
     ("drive/", "N", "drive force (N)", 1.0),
-    ("steady/", "1", "vibrations:\nleft after a period", 1.0),
+    (GROWTH, "1", "vibrations:\nleft after a period", 1.0),
 )
 
 
@@ -48,9 +47,10 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
         return
     order = np.argsort(numbers)
     loose = np.array([rows[k].settled == "no" for k in order])
+    bands = unstable_bands(numbers, rows, range(len(rows)), edges)
     title = f"Largest over the last turns of each run, over {axes[0].key}"
     with figure_saved(
-        path, title + ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if edges else "")
+        path, title + ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if bands else "")
     ) as figure:
         panes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (label, scale, names) in zip(panes, panels, strict=True):
@@ -65,23 +65,13 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
                     fillstyle="none",
                     color=line.get_color(),
                 )
-            for first, last in _bands(numbers[order], edges):
+            for first, last in bands:
                 ax.axvspan(first, last, color="tab:red", alpha=0.12, linewidth=0)
             ax.set_ylabel(label)
             ax.set_ylim(0.0, 1.05 * ax.get_ylim()[1])
             ax.grid(alpha=0.3)
             ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
         panes[-1].set_xlabel(axes[0].key + (f" ({axes[0].unit})" if axes[0].unit else ""))
-
-
-def _bands(numbers: np.ndarray, edges: Sequence[Edge]) -> list[tuple[float, float]]:
-    """From where to where a motion is unstable, of one key."""
-    if not edges:
-        return []
-    ends = [] if edges[0].unstable_above else [float(numbers[0])]
-    ends += [each.at for each in edges]
-    ends += [float(numbers[-1])] if edges[-1].unstable_above else []
-    return list(pairwise(ends))[::2]
 
 
 def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges: Sequence[Edge]) -> None:
@@ -91,9 +81,13 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
     if x is None or y is None or len(known) < 2:
         return
     growth = np.array([rows[k].extremes[GROWTH][1][0] for k in known])
-    with figure_saved(
-        path, "By what vibrations are multiplied in a period" + ("; red: unstable bands" if edges else "")
-    ) as figure:
+    lines: dict[float, list[int]] = {}
+    for k in known:
+        lines.setdefault(float(y[k]), []).append(k)
+    ends = {at: [each for each in edges if y[each.points[0]] == at] for at in lines}
+    bands = [(at, band) for at, line in lines.items() for band in unstable_bands(x, rows, line, ends[at])]
+    title = "By what vibrations are multiplied in a period"
+    with figure_saved(path, title + ("; red: unstable bands" if bands else "")) as figure:
         ax = figure.subplots()
         for some, marker, label in (
             (growth <= 1 + GROWS, "o", "stable"),
@@ -104,20 +98,10 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
                 x[which], y[which], c=growth[some], marker=marker, s=28, cmap="coolwarm",
                 norm="log", vmin=1 / (far := _far(growth)), vmax=far, edgecolors="black", linewidths=0.3, label=label,
             )  # fmt: skip
-        for same in dict.fromkeys(each.others for each in edges):
-            line = [each for each in edges if each.others == same]
-            at, along = float(y[line[0].points[0]]), [k for k in known if y[k] == y[line[0].points[0]]]
-            for first, last in _bands(np.sort(x[along]), line):
-                ax.plot(
-                    [first, last],
-                    [at, at],
-                    color="tab:red",
-                    alpha=0.35,
-                    linewidth=7,
-                    solid_capstyle="butt",
-                    zorder=0,
-                )
-            ax.plot([each.at for each in line], [at] * len(line), "k|", markersize=16)
+        for at, band in bands:
+            look = {"color": "tab:red", "alpha": 0.35, "linewidth": 7, "solid_capstyle": "butt", "zorder": 0}
+            ax.plot(band, [at, at], **look)
+        ax.plot([each.at for each in edges], [y[each.points[0]] for each in edges], "k|", markersize=16)
         figure.colorbar(shown, ax=ax, label="growth in a period")
         for name, axis in (("x", axes[0]), ("y", axes[1])):
             getattr(ax, f"set_{name}label")(axis.key + (f" ({axis.unit})" if axis.unit else ""))

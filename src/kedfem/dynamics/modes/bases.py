@@ -1,17 +1,35 @@
 """A basis for every link of a model, or segment of one, from what its loads do at some instants of the motion."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from kedfem.dynamics.matrices.substructure import Substructure
-from kedfem.dynamics.model import Model
-from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions
+from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.modes.segment_modes import segment_basis
+from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stepping.state import NodalOf
+from kedfem.links.record import Link
+from kedfem.motion.rigid import RigidMotion
+
+
+def reduced_at(
+    model: Model, motion: RigidMotion, only: Collection[str], count: Callable[[Link, Basis], int]
+) -> Model:
+    """The model with some links reduced in the first modes that its loads excite at the times of a motion.
+
+    Parameters
+    ----------
+    only : names of these links
+    count : of modes that a link takes of its basis
+    """
+    found = bases(model, instants(model, motion), static_parts(model), only)
+    every = zip(model.links, found, strict=True)
+    return reduced_model(model, [None if x is None else x.first(count(link, x)) for link, x in every])
 
 
 def bases(
-    model: Model, instants: Sequence[Instant], parts: Sequence[Substructure],
+    model: Model, moments: Sequence[Instant], parts: Sequence[Substructure],
     only: Collection[str] | None = None,
 ) -> list[Basis | None]:  # fmt: skip
     """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
@@ -25,7 +43,7 @@ def bases(
     only : names of the links that need one; all if not given
     """
     deflections: list[list[NodalOf]] = [[] for _ in model.links]
-    for instant in instants:
+    for instant in moments:
         for kept, found in zip(deflections, excited(model, parts, instant), strict=True):
             kept.extend(found)
     return [

@@ -3,10 +3,8 @@
 import numpy as np
 
 from kedfem.dynamics.matrices.dense import SMALL
-from kedfem.dynamics.model import Model, reduced_model
-from kedfem.dynamics.modes.bases import bases
-from kedfem.dynamics.modes.reduction import static_parts
-from kedfem.dynamics.nominal import instants
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.bases import reduced_at
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
@@ -23,6 +21,4 @@ def coarse_model(scene: Scene, linkage: Linkage, along: Path, model: Model) -> M
         return None
     t = time_grid(scene).end * (np.arange(INSTANTS) + 0.5) / INSTANTS
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    found = bases(model, instants(model, motion), static_parts(model), only=large)
-    modes = [None if each is None else each.first(each.count(LEFT_OUT)) for each in found]
-    return reduced_model(model, modes)
+    return reduced_at(model, motion, large, lambda _, basis: basis.count(LEFT_OUT))

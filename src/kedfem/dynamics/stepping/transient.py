@@ -23,7 +23,7 @@ from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
 from kedfem.dynamics.system.period.map import PeriodMap
-from kedfem.dynamics.system.period.search import periodic, residual
+from kedfem.dynamics.system.period.search import periodic
 from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
@@ -236,9 +236,11 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
 def _marched(solver: Steps, last: Any) -> None:
     """What a period leaves of a steady state, from the state with which the recorded one ends."""
     if isinstance(solver, SystemSteps) and solver.steady is not None and solver.over is not None:
-        over = solver.over
-        left = residual(over, over.vector(solver.steady.state), over.vector(last))
-        solver.steady = replace(solver.steady, residual=max(left, solver.steady.residual))
+        over, steady = solver.over, solver.steady
+        left = over.size(over.change(over.vector(last), over.vector(steady.state))) / max(
+            steady.scale, 1e-300
+        )
+        solver.steady = replace(steady, residual=max(left, steady.residual))
 
 
 def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> PeriodMap | None:

@@ -65,8 +65,7 @@ def combined(c: Flat, basis: Sequence[Flat]) -> Flat:
 
 
 def arnoldi(
-    phi: Derivative, basis: list[Flat], most: int, nearer: Nearer | None = None,
-    tried: list[Flat] | None = None,
+    phi: Derivative, basis: list[Flat], most: int, nearer: Nearer = lambda v: v
 ) -> Iterator[Float[np.ndarray, "j1 j"]]:  # fmt: skip
     """H of Φ V = V₊ H, on an orthonormal basis that grows by a vector, and a march, each time.
 
@@ -76,19 +75,11 @@ def arnoldi(
     ----------
     basis : its first vector; the others are added
     nearer : P⁻¹ ≈ (I − Φ)⁻¹, which may differ from vector to vector; H is that of 1 − (I − Φ) P⁻¹ then
-    tried : P⁻¹ V is added
     """
     H = np.zeros((most + 1, most))
     for j in range(most):
-        v = basis[j]
-        if nearer is None:
-            w = phi(v)
-        else:
-            z = nearer(v)
-            w = v - z + phi(z)
-            if tried is not None:
-                tried.append(z)
-        w, H[: j + 2, j] = _orthogonal(phi.map, basis, w)
+        z = nearer(basis[j])
+        w, H[: j + 2, j] = _orthogonal(phi.map, basis, basis[j] - z + phi(z))
         whole = H[j + 1, j] <= WHOLE * max(1.0, np.abs(H[: j + 2, : j + 1]).max())
         if not whole:
             basis.append(w / H[j + 1, j])
@@ -121,16 +112,21 @@ def gmres(phi: Derivative, r: Flat, least: float, most: int, nearer: Nearer | No
     """
     beta = phi.map.whole(r)
     basis, tried = [r / beta], list[Flat]()
-    for H in arnoldi(phi, basis, most, nearer, tried):
+
+    def kept(v: Flat) -> Flat:
+        tried.append(v if nearer is None else nearer(v))
+        return tried[-1]
+
+    for H in arnoldi(phi, basis, most, kept):
         rest, asked = np.eye(*H.shape) - H, beta * np.eye(len(H))[0]
         c = np.linalg.lstsq(rest, asked, rcond=None)[0]
         left = asked - rest @ c
         if float(np.linalg.norm(left)) <= least:
             break
     values, shapes = np.linalg.eig(rest[:-1].astype(complex))
-    k, found = int(np.abs(values).argmin()), tried or basis
-    shape = combined(shapes[:, k].real, found), combined(shapes[:, k].imag, found)
-    return Solution(combined(c, found), combined(left, basis), float(np.abs(values[k])), shape)
+    k = int(np.abs(values).argmin())
+    shape = combined(shapes[:, k].real, tried), combined(shapes[:, k].imag, tried)
+    return Solution(combined(c, tried), combined(left, basis), float(np.abs(values[k])), shape)
 
 
 def _orthogonal(of: PeriodMap, basis: Sequence[Flat], w: Flat) -> tuple[Flat, Flat]:

@@ -18,9 +18,8 @@ from jaxtyping import Float
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.system.arrays import History, State, copied, ends_of
 from kedfem.dynamics.system.march import Ready, march
-from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal import own, remembered
+from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
 from kedfem.motion.rigid import RigidMotion
 
 CARRIED = (
@@ -153,13 +152,9 @@ class PeriodMap:
 
     def complete(self, state: State) -> None:
         """Give a difference of states of a linear system what follows from its displacements, rates, accelerations."""
-        of = self.of
         for k, each in enumerate(self._now.inside(state.u, state.v)):
-            remembered(of, k, each, state)
-            if isinstance(of.parts[k], SparsePart):
-                here, link = own(of, k), of.system.model.links[k]
-                moving = [momentum(link, x[here]) for x in (state.u, state.v, state.a)]
-                state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moving)
+            remembered(self.of, k, each, state)
+        put_momenta(self.of, state)
 
     def weighed(self, like: Flat) -> None:
         """Count accelerations and forces too, as far as the method's own swing in them is not damped away in a period.

@@ -63,7 +63,9 @@ class Periodic:
 
     state : at the beginning of the period
     period : [s]
-    residual : what the period leaves of it, of its size; of linear systems as GMRES knows it, until it is marched
+    residual : what the period leaves of it, of its size; of linear systems without multipliers as GMRES knows it, until
+        the period is recorded
+    scale : that size [J^½]
     marches : periods that were marched to find it, and its multipliers
     multipliers : those found, of largest magnitude first; none if not asked for
     certain : whether the first of them was found to SURE, or ABOUT
@@ -73,6 +75,7 @@ class Periodic:
     state: State
     period: float
     residual: float
+    scale: float
     marches: int
     multipliers: Complex[np.ndarray, " f"] = field(default_factory=lambda: np.zeros(0, complex))
     certain: bool = True
@@ -102,17 +105,16 @@ def periodic(
         If there is none, or none is found; iterations of a step that do not converge.
     """
     steps = Watched(over, watch, closed)
-    x, y = _fixed(steps, over.vector(over.start), None if small is None else Coarse(over, small))
+    x, y, scale = _fixed(steps, over.vector(over.start), None if small is None else Coarse(over, small))
     stops = any(isinstance(each.law, Stop) for each in over.of.system.constraints)
     found, certain, shape = np.zeros(0, complex), not stops, np.zeros(0)
     if stability and not stops:
+        if over.linear:  # P(x) as GMRES knows it is noise beside small multipliers
+            y = steps(x)
+            scale = scale_of(over, y)
         found, certain, shape = multipliers(steps, x, y)
-    return Periodic(over.state(x), over.period, residual(over, x, y), over.marches, found, certain, shape)
-
-
-def residual(over: PeriodMap, x: Flat, y: Flat) -> float:
-    """What a period that leads from x to y leaves, of the size of the state."""
-    return over.size(over.change(y, x)) / max(scale_of(over, y), 1e-300)
+    residual = over.size(over.change(y, x)) / max(scale, 1e-300)
+    return Periodic(over.state(x), over.period, residual, scale, over.marches, found, certain, shape)
 
 
 def _closed(steps: Watched) -> float:
@@ -121,8 +123,8 @@ def _closed(steps: Watched) -> float:
     return steps.closed if of.linear else max(steps.closed, ROUGH * of.of.c.tolerance)
 
 
-def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat]:
-    """x and P(x), which are the same."""
+def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat, float]:
+    """x and P(x), which are the same, and their size, to which what a period leaves is compared."""
     map_, last = steps.map, np.inf
     y = steps(x)
     _refuse_windings(map_, x, y)
@@ -131,18 +133,21 @@ def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat]:
     y = steps(x)
     if not map_.linear:
         x, y = _mixed(steps, x, y)
+    scale = scale_of(map_, y)
     for _ in range(NEWTON):
-        r, scale = map_.change(y, x), scale_of(map_, y)
+        r = map_.change(y, x)
         left = map_.size(r)
         enough = (ENOUGH if map_.linear else LOOSE) * scale
         if left <= _closed(steps) * scale or (left <= enough and left > 0.5 * last):
-            return x, y
+            return x, y, scale
         if not np.isfinite(left):
             break
         last = left
         found = _solved(steps, x, y, r, scale, coarse)
         x = map_.possible(x + found.d)
         y = x + found.left if map_.linear else steps(x)
+        now = scale_of(map_, y)
+        scale = min(scale, now) if map_.linear else now  # the last march was not that of x, but of a product
     raise SolveError(
         "analysis.kind: must be a motion for which a steady state can be found, got one whose search does not "
         f"converge: a period still leaves {100 * left / scale:.2g} % of it; take more damping, smaller steps, or "

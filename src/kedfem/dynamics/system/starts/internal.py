@@ -16,7 +16,7 @@ from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RIGID_BODY
-from kedfem.dynamics.system.sparse import SparsePart, component_order
+from kedfem.dynamics.system.sparse import SparsePart, component_order, momentum
 from kedfem.links.record import Link, mass_times
 
 Flat = Float[np.ndarray, " N"]
@@ -156,3 +156,12 @@ def remembered(of: Ready, k: int, found: Inside, state: State) -> None:
         for m, x in enumerate((seen.g, seen.g1)):
             at = 3 * here.start + m * N
             state.seen[at : at + N] = coordinates(link, part, x).ravel()
+
+
+def put_momenta(of: Ready, state: State) -> None:
+    """M δ, M δ', M δ'' of sparse bodies, put into the state beside δ, δ' and δ''."""
+    for k, part in enumerate(of.parts):
+        if isinstance(part, SparsePart):
+            here, link = own(of, k), of.system.model.links[k]
+            moving = [momentum(link, x[here]) for x in (state.u, state.v, state.a)]
+            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moving)

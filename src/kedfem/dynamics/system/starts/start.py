@@ -15,11 +15,11 @@ from kedfem.dynamics.stepping.state import LinkState
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.sparse import SparsePart, momentum
+from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.balance import DEPENDENT, Asked, Balance, Solved
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal import own, remembered
+from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
 
 Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
 
@@ -110,12 +110,7 @@ def begun(now: Instant, u: Flat, v: Flat, accelerated: Accelerated = acceleratio
     state.a[:], state.port_force[:] = found.x, found.forces
     state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
     state.turned[:] = turned(now, z)
-    for k, part in enumerate(of.parts):
-        if isinstance(part, SparsePart):
-            here, link = own(of, k), of.system.model.links[k]
-            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(
-                [momentum(link, x[here]) for x in (u, v, found.x)]
-            )
+    put_momenta(of, state)
     return state
 
 
