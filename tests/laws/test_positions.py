@@ -272,6 +272,18 @@ def test_a_whole_run_has_positions_without_steps(tmp_path: Path) -> None:
     assert np.abs(moved.channels["links/arm/angular_velocity"][1]).max() > 1.0
 
 
+def test_what_nothing_loads_is_told(tmp_path: Path) -> None:
+    joint = {"kind": "weld", "links": ["rod", "ground"], "at": [0, 0, 0]}
+    raw = {
+        "links": {"rod": rod(AXES["oblique"])}, "joints": {"W": joint}, "analysis": {"kind": "static"},
+        "output": {"plots": False, "picture": False, "animation": False},
+    }  # fmt: skip
+    run = analyse(scene_from(raw), tmp_path / "idle")
+    assert [text for text in run.warnings if text.startswith("no link is stressed at all")]
+    loaded = analyse(scene_from({**raw, "gravity": [0, 0, -G]}), tmp_path / "loaded")
+    assert not any("stressed at all" in text for text in loaded.warnings)
+
+
 def test_what_nothing_holds_is_told_in_words() -> None:
     hanging = {
         "gravity": [0, -G],

@@ -1,11 +1,13 @@
 """`kedfem frequencies`: positions, speeds of crossings, files, refusals."""
 
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from rich.console import Console
 
 from kedfem.errors import SceneError
 from kedfem.frequencies import Wanted, crossed, frequencies
@@ -28,9 +30,22 @@ def test_an_arm_has_the_same_frequencies_all_around_and_its_critical_speeds(tmp_
     assert {x.name for x in (tmp_path / "out").iterdir()} == {
         "frequencies.csv", "frequencies.png", "campbell.png"
     }  # fmt: skip
-    assert [table.row_count for table in frequencies_tables(scene, found)] == [4, 3]
+    assert [table.row_count for table in frequencies_tables(scene, found)] == [4, 2]
     one = frequencies(scene, Wanted(2, 1), tmp_path / "one")
     assert found.factorisations == one.factorisations  # links are factored once for all positions
+
+
+def test_tables_fit_into_a_terminal_with_all_their_numbers(tmp_path: Path) -> None:
+    scene = scene_from(arm("beam"), tmp_path)
+    found = frequencies(scene, Wanted(modes=12, positions=2, harmonics=9), tmp_path / "out")
+    screen = Console(width=80, file=StringIO())
+    screen.print(*frequencies_tables(scene, found))
+    assert isinstance(screen.file, StringIO)
+    said = screen.file.getvalue()
+    assert "…" not in said
+    numbers = {f"{x:.4g}" for x in found.values[0]}
+    ranges = [(60 * x.slowest / (2 * np.pi), 60 * x.fastest / (2 * np.pi)) for x in found.crossings]
+    assert all(word in said.split() for word in [*numbers, *(f"{a:.0f}–{b:.0f}" for a, b in ranges)])
 
 
 def test_a_free_drive_leaves_one_motion_without_strain(tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ from kedfem.scene.faults import either, one_of
 
 Watch = Callable[[str, int, int], None]
 HELD = ("revolute", "spherical", "weld")  # joints of which what they hold needs no other link
+MANY = 12  # names of faces that a message lists
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +109,8 @@ def _facets(link: Link, face: str | ChosenFace) -> Int[np.ndarray, " f"]:
     known = {each.face.name: each.facets for each in link.faces if len(each.facets)}
     if face not in known:
         other = 'one that has no name by what it is: { plane = "x", near = [0, 0, 0] }'
-        wanted = one_of(list(known), face) if known else f"must be a face by what it is, got {face!r}"
+        names = list(known) if len(known) <= MANY else [next(iter(known)), "…", list(known)[-1]]
+        wanted = one_of(names, face) if known else f"must be a face by what it is, got {face!r}"
         raise MeshError(f"--hold: {wanted}; {other}")
     return known[face]
 

@@ -1,5 +1,7 @@
 """Natural frequencies over positions, and where harmonics of the drive meet them."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from rich.table import Table
 from rich.text import Text
@@ -9,30 +11,43 @@ from kedfem.output.words import moment, with_prefix
 from kedfem.scene import Scene
 
 RPM = 60 / (2 * np.pi)
+WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
+MODES = 8  # side by side
 
 
 def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
     """Frequencies at each position; of a drive that goes on turning critical speeds of each harmonic."""
     still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
-    table = Table(title=Text(f"Natural frequencies of the frozen linkage [Hz]{still}"))
-    table.add_column("position")
-    for k in range(found.values.shape[1]):
-        table.add_column(str(k + 1), justify="right")
-    for t, angle, row in zip(found.time, found.angle, found.values, strict=True):
-        place = "as drawn" if scene.driven is None else moment(scene, float(t), float(angle))
-        table.add_row(place, *("–" if np.isnan(f) else f"{f:.4g}" for f in row))
-    return [table, _speeds(found)] if found.crossings else [table]
+    out = []
+    for modes in _blocks(range(found.values.shape[1]), MODES):
+        table = Table(title=Text(f"Natural frequencies of the frozen linkage [Hz]{still}"))
+        table.add_column("position")
+        for k in modes:
+            table.add_column(str(k + 1), justify="right")
+        for t, angle, row in zip(found.time, found.angle, found.values, strict=True):
+            place = "as drawn" if scene.driven is None else moment(scene, float(t), float(angle))
+            table.add_row(place, *("–" if np.isnan(row[k]) else f"{row[k]:.4g}" for k in modes))
+        out.append(table)
+    ranges = {(x.mode, x.harmonic): _range(x, found.speed) for x in found.crossings}
+    harmonics = sorted({k for _, k in ranges})
+    side_by_side = WIDTH // (BORDER + max(map(len, ranges.values()), default=1))
+    return out + [_speeds(found, ranges, some) for some in _blocks(harmonics, side_by_side)]
 
 
-def _speeds(found: Frequencies) -> Table:
+def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
     said = f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
     table = Table(title=Text(said), caption="* at the drive's speed")
-    table.add_column("harmonic")
-    for mode in sorted({x.mode for x in found.crossings}):
-        table.add_column(f"mode {mode}", justify="right")
-    for k in sorted({x.harmonic for x in found.crossings}):
-        table.add_row(f"{k}×", *(_range(x, found.speed) for x in found.crossings if x.harmonic == k))
+    table.add_column("mode")
+    for k in harmonics:
+        table.add_column(f"{k}×", justify="right")
+    for mode in sorted({mode for mode, _ in ranges}):
+        table.add_row(str(mode), *(ranges.get((mode, k), "–") for k in harmonics))
     return table
+
+
+def _blocks(numbers: Sequence[int], most: int) -> list[Sequence[int]]:
+    """Columns that fit beside one another."""
+    return [numbers[k : k + most] for k in range(0, len(numbers), most)]
 
 
 def _range(x: Crossing, speed: float) -> str:

@@ -43,7 +43,7 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
     spent = Table(title=f"{taken}; seconds", show_header=False)
     for stage, seconds in done.seconds.items():
         spent.add_row(stage, f"{seconds:.2f}")
-    errors = [] if done.budget is None else [budget_table(done.budget)]
+    errors = [budget_table(done.budget)] if done.budget and done.budget.kinds else []
     stress = [stress_table(scene, done.peaks)] if done.peaks else []
     damaged = [fatigue_table(done.results.fatigue)] if done.results.fatigue else []
     steady = [] if done.steady is None else [steady_table(done.steady)]
