@@ -278,9 +278,9 @@ def test_what_nothing_loads_is_told(tmp_path: Path) -> None:
         "links": {"rod": rod(AXES["oblique"])}, "joints": {"W": joint}, "analysis": {"kind": "static"},
         "output": {"plots": False, "picture": False, "animation": False},
     }  # fmt: skip
-    run = analyse(scene_from(raw), tmp_path / "idle")
+    run = analyse(scene_from(raw, tmp_path))
     assert [text for text in run.warnings if text.startswith("no link is stressed at all")]
-    loaded = analyse(scene_from({**raw, "gravity": [0, 0, -G]}), tmp_path / "loaded")
+    loaded = analyse(scene_from({**raw, "gravity": [0, 0, -G]}, tmp_path))
     assert not any("stressed at all" in text for text in loaded.warnings)
 
 
