@@ -14,6 +14,7 @@ from kedfem.accuracy.plan import Plan, plan_for
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
+from kedfem.accuracy.rounding import IDLE, unstressed
 from kedfem.accuracy.shared_modes import ALONE, Neighbours
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
@@ -192,13 +193,15 @@ def _analysed(
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
     errors = step.errors if step.levels > 1 else None
+    idle = unstressed(ready.model, highest(results.peaks))
     found = clock.timed(
-        "estimates", lambda: budget(ready, seen, reduction, _in_memory(results, solvers), errors)
+        "estimates",
+        lambda: Budget(()) if idle else budget(ready, seen, reduction, _in_memory(results, solvers), errors),
     )
     step = replace(step, errors=found.step or step.errors)
     steady, grows = _growing(ready, solvers)
     notices += [
-        *budget_warning(found, asked),
+        *([IDLE] if idle else budget_warning(found, asked)),
         *_drawn(ready, recoveries, grows, folder),
         *steady_warning(steady),
     ]

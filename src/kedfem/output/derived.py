@@ -47,11 +47,7 @@ WHOLE = (
 
 
 def peak_warning(peak: Peak | None) -> tuple[str, ...]:
-    """A warning where nothing is stressed; where the highest stress is not what it seems, with the highest elsewhere."""
-    if peak is not None and peak.stress == 0.0:
-        return (
-            "no link is stressed at all: the scene has no gravity, load, spring or acceleration that acts on them",
-        )
+    """A warning where the highest stress is not what it seems, with the highest one elsewhere."""
     if peak is None or not peak.near:
         return ()
     said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
