@@ -38,9 +38,8 @@ LEFT = {"beam": 2.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 16.0}
 """Times what S leaves: in the mean of a two- or four-link scene errors are a tenth to ten times that (test_rounding)."""
 NODAL = 8.0  # of what K0 leaves: the literal solver's factor loses more than its matrix (measured, 5 to 17)
 IDLE = "no link is stressed at all: the scene has no gravity, load, spring or acceleration that acts on them"
-UNSTRESSED = (
-    1e-12  # of E: more than rounding leaves where nothing acts (3e-14), less than a grain feels of its weight
-)
+#: of the least E: more than rounding leaves where nothing acts (3e-14), less than a grain feels of its weight
+UNSTRESSED = 1e-12
 FOLLOWED = {"beam": 4.0, "plane": 4.0, "solid": 3.0, "spatial_beam": 0.5}
 """Times eps · size · max |S| of co-rotational links: errors are a tenth to four times that (test_rounding)."""
 EPSILON = float(np.finfo(float).eps)
@@ -153,6 +152,6 @@ class Rounding:
 
 
 def unstressed(model: Model, peak: Peak | None) -> bool:
-    """Whether the highest stress of a run is rounding: nothing acts on its links."""
-    links = [each for each in model.links if peak is not None and each.name == peak.link]
-    return any(peak is not None and peak.stress <= UNSTRESSED * each.E for each in links)
+    """Whether the highest stress of a run is rounding, beside its softest link: nothing acts on its links."""
+    softest = min((link.E for link in model.links if not link.rigid), default=0.0)
+    return peak is not None and peak.stress <= UNSTRESSED * softest
