@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from rich.console import Console
 
 from kedfem.errors import SceneError
-from kedfem.frequencies import Wanted, crossed, frequencies
+from kedfem.frequencies import Campbell, Wanted, crossed, frequencies
 from kedfem.scene import scene_from
 from kedfem.tables import frequencies_tables
 from tests.rooms.test_resolution import FIRST, arm
@@ -54,9 +54,18 @@ def test_a_free_drive_leaves_one_motion_without_strain(tmp_path: Path) -> None:
 
 
 def test_crossings_are_from_the_least_frequency_of_a_mode_to_its_most() -> None:
-    (first, second) = crossed(np.array([[10.0], [16.0]]), 2)
+    over = Campbell(np.zeros(1), np.array([[[10.0], [16.0]]]), varies=False)
+    (first, second) = crossed(over, 2)
     assert_allclose([first.slowest, first.fastest], [20 * np.pi, 32 * np.pi])
     assert_allclose([second.slowest, second.fastest], [10 * np.pi, 16 * np.pi])
+
+
+def test_crossings_are_where_frequencies_that_go_with_the_speed_are() -> None:
+    """f² = 25 + a (Ω/2π)² at two positions, a = 0.5 and 2: harmonic k meets it at 5 Hz / √(k² − a)."""
+    speeds = 2 * np.pi * np.array([0.0, 2.0, 6.0])
+    f = np.sqrt(25 + np.outer((speeds / 2 / np.pi) ** 2, [0.5, 2.0]))
+    (second,) = crossed(Campbell(speeds, f[:, :, None], varies=True), 2)  # the first is met beyond, or never
+    assert_allclose([second.slowest, second.fastest], 10 * np.pi / np.sqrt([3.5, 2.0]), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +73,6 @@ def test_crossings_are_from_the_least_frequency_of_a_mode_to_its_most() -> None:
     [
         ({}, Wanted(modes=0), "--modes: must be at least 1, got 0"),
         ({}, Wanted(positions=0), "--positions: must be at least 1"),
-        ({"stiffening": True}, Wanted(), "analysis.stiffening: must be left out for frequencies"),
     ],
 )
 def test_what_cannot_be_is_refused(change: dict[str, Any], wanted: Wanted, said: str, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Natural frequencies of a scene's linkage frozen at positions over a turn of its drive: table and plots."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path as FilePath
@@ -11,10 +11,13 @@ from jaxtyping import Float
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.modes.frozen import Frozen, Modes
+from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
+from kedfem.dynamics.modes.stiffened import Stiffened
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import Curve, Stop, System
 from kedfem.errors import SceneError
+from kedfem.frequencies.campbell import Campbell, Crossing, crossed
 from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -28,6 +31,10 @@ from kedfem.results.frequencies import write_frequencies
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
 
 Watch = Callable[[str, int, int], None]
+#: of the drive's, at which stiffening is looked at; a Campbell plot ends with the last
+SPEEDS = (0.0, 0.5, 1.0, 1.5, 2.0)
+POINTS = 41  # of its curves
+BUCKLED = "frequencies: links buckle by the stresses of the motion between {:.4g} and {:.4g} rpm; nothing is told beyond"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,19 +53,6 @@ class Wanted:
     free: bool = False
     harmonics: int = 5
     shapes: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Crossing:
-    """Speeds [rad/s] at which a harmonic of the drive meets a natural frequency somewhere in the turn.
-
-    mode, harmonic : numbers from 1
-    """
-
-    mode: int
-    harmonic: int
-    slowest: float
-    fastest: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,10 +110,6 @@ def frequencies(
         raise SceneError(
             "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
         )
-    if scene.analysis.stiffening:
-        raise SceneError(
-            "analysis.stiffening: must be left out for frequencies (stresses of the motion do not enter them), got true"
-        )
     scene, assembly = assembled(scene)
     plan = plan_for(scene, lambda name: watch(name, 0, 0))
     scene = plan.scene if plan else scene
@@ -128,26 +118,35 @@ def frequencies(
     loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene
     system = system_of(loose, linkage, along)
     released = linkage.mobility + (len(scene.driven_joints) if wanted.free else 0)
-    solver = Frozen(system, wanted.modes, released)
+    solver: Frozen | Stiffened = Frozen(system, wanted.modes, released)
+    if scene.analysis.stiffening:
+        solver = Stiffened(system, elastic_model(scene, linkage, along=along), wanted.modes, released)
     t = _positions(scene, wanted.positions)
-    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    every = _over(solver, motion, watch)
-    still = max(found.still for found in every)
-    values = np.full((len(t), solver.count), np.nan)
-    for k, found in enumerate(every):
-        values[k, : len(found.frequencies)] = found.frequencies
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
+    phi, rate, change = path_parameter(scene, t)
+    shares = SPEEDS if speed and scene.analysis.stiffening else (1.0,)
+    motions = {x: rigid_motion(linkage, along, t, (phi, x * rate, x**2 * change)) for x in shares}
+    found, buckled = _at_speeds(solver, motions, speed, watch)
+    motion, every = motions[1.0], found[1.0]
+    still = max(each.still for each in every)
+    values = _table(every, wanted.modes)
+    over = Campbell(
+        speed * np.array(list(found)),
+        np.array([_table(each, wanted.modes) for each in found.values()]),
+        len(shares) > 1,
+    )
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
-    crossings = tuple(crossed(values, wanted.harmonics)) if speed else ()
-    warnings = (*assembly_warning(assembly), *_tangents(system))
+    crossings = tuple(crossed(over, wanted.harmonics)) if speed else ()
+    warnings = (*assembly_warning(assembly), *_tangents(system), *buckled)
     with claimed(folder or frequencies_folder(scene)) as target:
         done = Frequencies(target, t, angle, values, still, speed, crossings, solver.factorisations, warnings)
         write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
         if len(t) > 1:
             write_over_turn(target / "frequencies.png", t, angle, values, bool(speed))
         if speed:
-            write_campbell(target / "campbell.png", values, speed, wanted.harmonics)
+            x = np.linspace(0.0, (max(found) if over.varies else SPEEDS[-1]) * speed, POINTS)
+            write_campbell(target / "campbell.png", x, *over.bands(x), speed, wanted.harmonics)
         if wanted.shapes:
             watch("mode shapes", 0, 0)
             where = [
@@ -158,17 +157,44 @@ def frequencies(
     return done
 
 
-def _over(solver: Frozen, motion: RigidMotion, watch: Watch) -> list[Modes]:
+def _at_speeds(
+    solver: Frozen | Stiffened, motions: Mapping[float, RigidMotion], speed: float, watch: Watch
+) -> tuple[dict[float, list[Modes]], tuple[str, ...]]:
+    """Modes at each share of the drive's speed, as far as links do not buckle, and a warning if they do beyond it."""
+    found: dict[float, list[Modes]] = {}
+    for share, motion in motions.items():
+        done, total = len(found) * len(motion.t), len(motions) * len(motion.t)
+        try:
+            found[share] = _over(solver, motion, watch, done, total)
+        except UnstableError:
+            if share <= 1.0:
+                raise
+            between = (60 / (2 * np.pi) * speed * x for x in (max(found), share))
+            return found, (BUCKLED.format(*between),)
+    return found, ()
+
+
+def _over(
+    solver: Frozen | Stiffened, motion: RigidMotion, watch: Watch, since: int, total: int
+) -> list[Modes]:
     """Modes at each position; shapes of the first vibration's lowest frequency so far alone."""
     out: list[Modes] = []
     lowest = np.inf
     for k in range(len(motion.t)):
-        watch("positions", k, len(motion.t))
+        watch("positions", since + k, total)
         found = solver.at(motion.part(k, k + 1))
         first = float(found.frequencies[0]) if len(found.frequencies) else np.inf
         out.append(found if first < lowest else replace(found, shapes=()))
         lowest = min(lowest, first)
     return out
+
+
+def _table(every: Sequence[Modes], count: int) -> Float[np.ndarray, "P f"]:
+    """Frequencies at positions [Hz], NaN where there are fewer."""
+    values = np.full((len(every), count), np.nan)
+    for k, found in enumerate(every):
+        values[k, : len(found.frequencies)] = found.frequencies
+    return values
 
 
 def _shapes(
@@ -214,16 +240,3 @@ def _tangents(system: System) -> tuple[str, ...]:
     return (
         f"frequencies: force laws that are not linear enter with their tangent at rest: {', '.join(names)}",
     )
-
-
-def crossed(values: Float[np.ndarray, "P f"], harmonics: int) -> list[Crossing]:
-    """Speeds at which harmonic k of the drive has a natural frequency of some position: from its least to its most."""
-    out = []
-    for mode, f in enumerate(values.T, 1):
-        if np.isnan(f).any():
-            continue
-        out += [
-            Crossing(mode, k, *(2 * np.pi * float(x) / k for x in (f.min(), f.max())))
-            for k in range(1, harmonics + 1)
-        ]
-    return out

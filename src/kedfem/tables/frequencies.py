@@ -18,9 +18,10 @@ MODES = 8  # side by side
 def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
     """Frequencies at each position; of a drive that goes on turning critical speeds of each harmonic."""
     still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
+    stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
     out = []
     for modes in _blocks(range(found.values.shape[1]), MODES):
-        table = Table(title=Text(f"Natural frequencies of the frozen linkage [Hz]{still}"))
+        table = Table(title=Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}"))
         table.add_column("position")
         for k in modes:
             table.add_column(str(k + 1), justify="right")
@@ -36,7 +37,9 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
 
 def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
     said = f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
-    table = Table(title=Text(said), caption="* at the drive's speed")
+    beyond = any(np.isinf(x.fastest) for x in found.crossings)
+    caption = "* at the drive's speed" + ("; – alone: beyond the speeds looked at" if beyond else "")
+    table = Table(title=Text(said), caption=Text(caption))
     table.add_column("mode")
     for k in harmonics:
         table.add_column(f"{k}×", justify="right")
@@ -53,7 +56,8 @@ def _blocks(numbers: Sequence[int], most: int) -> list[Sequence[int]]:
 def _range(x: Crossing, speed: float) -> str:
     """From the slowest speed to the fastest [rpm], with a mark where the drive's is among them."""
     here = " *" * (x.slowest <= speed <= x.fastest)
-    return f"{x.slowest * RPM:.0f}–{x.fastest * RPM:.0f}{here}"
+    fastest = f"{x.fastest * RPM:.0f}" if np.isfinite(x.fastest) else ""
+    return f"{x.slowest * RPM:.0f}–{fastest}{here}"
 
 
 def part_tables(found: PartFrequencies) -> list[Table]:

@@ -24,13 +24,19 @@ from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.errors import SolveError
 from kedfem.links.reduced import wave_frequency
 from kedfem.motion.rigid import RigidMotion
 
 RIGID_MOTIONS = 6  # of a free body: so many equal frequencies must be found, at the least
 STILL = 1e-8  # ω²/s below which a motion has no strain: free chains of tests/laws/test_frozen.py leave less
+TURNED = 1e-4  # of `least`: turning links whose tension and turning cancel leave 3e-6 (tests/laws/test_stiffened.py)
 FIRST = 1e-3  # s, of the slowest link's (√(E/ρ)/L)², before the first frequency is known
 NEAR = (1e-3, 1e6)  # ω² of the first vibration over s; beyond, links are factored again with s = ω²
+
+
+class UnstableError(SolveError):
+    """A linkage would leave the position in which it is frozen by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +65,15 @@ class Frozen:
     ----------
     count : vibrations that are wanted
     free : motions without strain that there may be, which are found beside them
+    least : s at the least [1/s²], where links alone are not held by less
 
     factorisations : of links, so far
     """
 
-    def __init__(self, system: System, count: int, free: int = 0) -> None:
-        self.system, self.count, self.free = system, count, free
+    def __init__(self, system: System, count: int, free: int = 0, least: float = 0.0) -> None:
+        self.system, self.count, self.free, self.least = system, count, free, least
         elastic = [link for link in system.model.links if not link.rigid] or list(system.model.links)
-        self.shift = FIRST * min(map(wave_frequency, elastic)) ** 2
+        self.shift = max(FIRST * min(map(wave_frequency, elastic)) ** 2, least)
         self.factorisations = 0
         self._settled = False
         self._factored()
@@ -83,19 +90,32 @@ class Frozen:
         Parameters
         ----------
         motion : of one time
+
+        Raises
+        ------
+        UnstableError
+            If a motion away from the position would grow by itself.
         """
         lowest, shapes = self._modes(motion)
         while not self._settled:
             first = lowest[lowest > STILL * self.shift][:1]
             low, high = NEAR
-            self._settled = not len(first) or low <= first[0] / self.shift <= high
+            near = not len(first) or low <= first[0] / self.shift <= high
+            better = self.shift if near else max(float(first[0]), self.least)
+            self._settled = better == self.shift
             if not self._settled:
-                self.shift = float(first[0])
+                self.shift = better
                 self._factored()
                 lowest, shapes = self._modes(motion)
-        still = int((np.abs(lowest) <= STILL * self.shift).sum())
+        nothing = max(STILL * self.shift, TURNED * self.least)
+        if (lowest < -nothing).any():
+            raise UnstableError(
+                "frequencies: must be those of a linkage that is stable where it is frozen, got one that a small "
+                f"push takes away for good at t = {float(motion.t[0]):.4g} s"
+            )
+        still = int((np.abs(lowest) <= nothing).sum())
         end = still + self.count
-        omega = np.sqrt(np.where(np.abs(lowest) <= STILL * self.shift, 0.0, lowest))[:end]
+        omega = np.sqrt(np.where(np.abs(lowest) <= nothing, 0.0, lowest))[:end]
         bodies = range(len(self.of.parts))
         per_link = (np.array([rows(self.of, k, x[own(self.of, k)]) for x in shapes.T[:end]]) for k in bodies)
         return Modes(omega, tuple(per_link), still)

@@ -7,8 +7,6 @@ from jaxtyping import Float
 
 from kedfem.output.plots.drawing import figure_saved
 
-FASTEST = 2.0  # of the drive's speed: how far a Campbell plot goes
-
 
 def write_over_turn(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
@@ -33,27 +31,34 @@ def write_over_turn(
         ax.legend(title="mode", loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
 
 
-def write_campbell(path: Path, values: Float[np.ndarray, "P f"], speed: float, harmonics: int) -> None:
-    """Bands of the natural frequencies over a turn [Hz], and the drive's harmonics, over its speed [rad/s].
+def write_campbell(
+    path: Path, speeds: Float[np.ndarray, " x"], lowest: Float[np.ndarray, "f x"],
+    highest: Float[np.ndarray, "f x"], speed: float, harmonics: int,
+) -> None:  # fmt: skip
+    """Bands of the natural frequencies over a turn [Hz], and the drive's harmonics, over its speeds [rad/s].
+
+    Parameters
+    ----------
+    speed : that of the scene
 
     Raises
     ------
     OutputError
         The file cannot be written.
     """
-    rpm = np.array([0.0, FASTEST * speed * 60 / (2 * np.pi)])
+    rpm = speeds * 60 / (2 * np.pi)
     with figure_saved(
         path, "Campbell plot: natural frequencies over a turn, harmonics of the drive"
     ) as figure:
         ax = figure.subplots()
-        highest = harmonics * rpm[1] / 60
-        for k, f in enumerate(values.T, 1):
-            if np.isfinite(f).all() and (f.min() <= highest or k == 1):
-                ax.fill_between(rpm, f.min(), f.max(), color=f"C{(k - 1) % 10}", alpha=0.4, label=f"mode {k}")
-                ax.plot(rpm, [f.min()] * 2, color=f"C{(k - 1) % 10}", linewidth=0.8)
+        for k, (least, most) in enumerate(zip(lowest, highest, strict=True)):
+            if np.isfinite(least).all() and (least.min() <= harmonics * rpm[-1] / 60 or k == 0):
+                look = {"color": f"C{k % 10}"}
+                ax.fill_between(rpm, least, most, alpha=0.4, label=f"mode {k + 1}", **look)
+                ax.plot(rpm, least, linewidth=0.8, **look)
         for k in range(1, harmonics + 1):
             ax.plot(rpm, k * rpm / 60, color="0.25", linewidth=0.9, linestyle="--")
-            ax.annotate(f"{k}×", (rpm[1], k * rpm[1] / 60), xytext=(3, -3), textcoords="offset points")
+            ax.annotate(f"{k}×", (rpm[-1], k * rpm[-1] / 60), xytext=(3, -3), textcoords="offset points")
         ax.axvline(speed * 60 / (2 * np.pi), color="0.5", linewidth=0.9, linestyle=":")
         ax.set_xlabel("drive speed (rpm); dotted: the scene's")
         ax.set_ylabel("frequency (Hz)")

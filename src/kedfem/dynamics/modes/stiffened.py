@@ -1,0 +1,103 @@
+"""A linkage frozen at a position whose links are stiffened by the stresses of its motion, and feel that they turn.
+
+A link that turns at Ω sees δ = R y with M (y'' + 2 Ω̃ y' + Ω̃² y) + (K0 + k ⊗ P) y = 0 (`dynamics.stiffening`). What is
+symmetric of it stays, K0 + k ⊗ P + M Ω̃² with the link's own Ω; the gyroscopic 2 M Ω̃ y' is left out. A bar on a hinge
+that nothing holds has no frequency then, as it should: what turns the tension with it and M Ω̃² cancel.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from jaxtyping import Float
+
+from kedfem.dynamics.matrices.substructure import mass_matrix
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
+from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.stiffening import stiffening
+from kedfem.dynamics.system.record import System
+from kedfem.errors import SolveError
+from kedfem.links.record import Link, Matrix
+from kedfem.links.reduced import rigid_modes
+from kedfem.motion.newton import cross_matrix
+from kedfem.motion.rigid import RigidMotion
+
+AMPLE = 2.0  # times what holds a link that its stresses alone would let turn over
+
+
+class Stiffened:
+    """As `Frozen`, of links that the motion stiffens: each is factored anew at each position.
+
+    Parameters
+    ----------
+    driven : the model of the same links that the drive moves, from which their stresses come
+
+    Raises
+    ------
+    SolveError
+        If nothing holds a link.
+    """
+
+    def __init__(self, system: System, driven: Model, count: int, free: int = 0) -> None:
+        self.system, self.driven, self.count, self.free = system, driven, count, free
+        self.stresses = stiffening(driven)
+        self.factorisations = 0
+
+    def at(self, motion: RigidMotion) -> Modes:
+        """The lowest modes at a position.
+
+        Parameters
+        ----------
+        motion : of one time
+
+        Raises
+        ------
+        UnstableError
+            If stresses make the linkage buckle there.
+        """
+        system, shift = self.system_at(motion)
+        try:
+            solver = Frozen(system, self.count, self.free, shift)
+            found = solver.at(motion)
+        except SolveError as fault:
+            raise UnstableError(
+                "frequencies: must be those of a linkage that is stable where it is frozen, got one that buckles under "
+                f"the stresses of its motion at t = {float(motion.t[0]):.4g} s"
+            ) from fault
+        self.factorisations += solver.factorisations
+        return found
+
+    def system_at(self, motion: RigidMotion) -> tuple[System, float]:
+        """The system with its links as they are at a position, and s [1/s²] with which K + s M holds each of them."""
+        forcing = self.stresses.stressed(forcings(self.driven, motion))
+        links, shift = [], 0.0
+        for link, modes, body, force in zip(
+            self.system.model.links, self.stresses.modes, self.system.model.bodies, forcing, strict=True
+        ):
+            s = np.zeros(len(modes.k)) if force.stress is None else force.stress[0]
+            R = motion.R[0, body]
+            added = sp.kron(modes.stiffness(s), modes.P) + _turning(link, R.T @ motion.omega[0, body])
+            links.append(replace(link, K0=_plus(link.K0, added)))
+            shift = max(shift, AMPLE * _unstable(link, added))
+        return replace(self.system, model=replace(self.system.model, links=tuple(links))), shift
+
+
+def _turning(link: Link, omega: Float[np.ndarray, "3"]) -> sp.csr_array:
+    """M Ω̃², (dn, dn)."""
+    space = 2 if link.planar else 3
+    W = np.zeros((link.d, link.d))
+    W[:space, :space] = (cross_matrix(omega) @ cross_matrix(omega))[:space, :space]
+    return sp.csr_array(sp.kron(sp.csr_array(link.mass[0]), W))
+
+
+def _plus(K: Matrix, added: sp.csr_array) -> Matrix:
+    return sp.csr_array(K + added) if sp.issparse(K) else np.asarray(K) + added.toarray()
+
+
+def _unstable(link: Link, added: sp.csr_array) -> float:
+    """By how much ω² of the link's rigid motions is below zero [1/s²]."""
+    B = rigid_modes(link)
+    lowest = scipy.linalg.eigh(B.T @ (added @ B), B.T @ (mass_matrix(link) @ B), eigvals_only=True)[0]
+    return max(0.0, -float(lowest))

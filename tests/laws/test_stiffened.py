@@ -1,0 +1,163 @@
+"""Natural frequencies of links that turn: published bars, eigenvalues of the literal system, buckling, critical speeds.
+
+A cantilever that turns about its root has f(μ) of Hamza-Cherif and Houmat (ICAS 2004, table 2; Bernoulli's beam), μ =
+Ω √(ρA L⁴/EI). Gyroscopic forces, which are left out, take 1e-4 μ² from the chordwise one; shear takes 0.15 % from both.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from kedfem.accuracy.prepared import meshed
+from kedfem.dynamics.modes.frozen import Frozen, UnstableError
+from kedfem.dynamics.modes.stiffened import Stiffened
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.record import System
+from kedfem.frequencies import Wanted, frequencies
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import path_parameter, scene_from
+from tests.laws.test_frozen import difference
+from tests.scenes import constant_speed, four_bar
+
+Raw = dict[str, Any]
+LENGTH = 1.0
+HEIGHT = LENGTH * np.sqrt(12) / 70  # slenderness 70
+E, DENSITY = 1e9, 1000.0
+UNIT = float(np.sqrt(E * HEIGHT**2 / 12 / DENSITY) / LENGTH**2)
+CHORD, FLAP = {2: 3.6195, 4: 3.888, 6: 4.2393}, {2: 4.1373, 4: 5.5850, 6: 7.3603}
+AXES = {
+    "x": np.array([0, np.pi / 2, 0]), "y": np.array([-np.pi / 2, 0, 0]), "z": np.zeros(3),
+    "oblique": np.array([0.7, -0.4, 1.1]),
+}  # fmt: skip
+
+
+def arm(kind: str, mu: float, turn: Any = "z", **more: Any) -> Raw:
+    """A square bar that turns about an axis across its root."""
+    R = Rotation.from_rotvec(AXES[turn]).as_matrix()
+    planar = kind in ("planar beam", "plane")
+    tip, axis = (LENGTH * R[:, 0]).tolist(), R[:, 2].tolist()
+    shape = {"kind": "bar", "between": [[0, 0], [LENGTH, 0]], "width": HEIGHT, "thickness": HEIGHT}
+    if not planar:
+        shape |= {"between": [[0, 0, 0], tip], "up": axis}
+    link: Raw = {"material": "rubber", "shape": shape, "mesh": {"elements": [16, 1, 1]}, "fidelity": kind}
+    if kind.endswith("beam"):
+        link |= {"fidelity": "beam", "mesh": {"elements": 16}, "beam": kind.split(maxsplit=1)[0]}
+    if kind == "plane":
+        link["mesh"] = {"elements": [24, 1]}
+    joint = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0] if planar else [0, 0, 0]}
+    return {
+        "materials": {"rubber": {"density": DENSITY, "youngs_modulus": E, "poisson_ratio": 0.0}},
+        "links": {"arm": link}, "joints": {"A": joint if planar else {**joint, "axis": axis}},
+        "drive": {"joint": "A", "motion": constant_speed(mu * UNIT)},
+        "analysis": {"accuracy": "quick", "revolutions": 1, "steps_per_revolution": 360, "stiffening": True}, **more,
+    }  # fmt: skip
+
+
+def stiffened(
+    raw: Raw, count: int = 2, driven: bool = True, share: float = 0.3
+) -> tuple[System, RigidMotion, Stiffened]:
+    """A scene, its motion after a share of a revolution, and its solver."""
+    scene = scene_from(raw)
+    ready = meshed(scene)
+    loose = scene if driven else scene.model_copy(update={"drive": None, "drives": {}})
+    system = system_of(loose, ready.linkage, ready.path)
+    t = np.array([share * 2 * np.pi / scene.drive.motion.speed])
+    motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(scene, t))
+    return system, motion, Stiffened(system, ready.model, count, 0 if driven else 1)
+
+
+@pytest.mark.parametrize("mu", CHORD)
+@pytest.mark.parametrize(
+    ("kind", "turn"),
+    [
+        ("planar beam", "z"),
+        ("plane", "z"),
+        *(("spatial beam", x) for x in AXES),
+        *(("solid", x) for x in AXES),
+    ],
+)
+def test_a_bar_that_turns_has_published_frequencies(kind: str, turn: str, mu: float) -> None:
+    _, motion, solver = stiffened(arm(kind, mu, turn))
+    found = solver.at(motion).omega / UNIT
+    assert_allclose(found[0], CHORD[mu], rtol=1.5e-3 + 1e-4 * mu**2)
+    if kind not in ("planar beam", "plane"):
+        assert_allclose(found[1], FLAP[mu], rtol=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["planar beam", "plane", "spatial beam", "solid"])
+def test_at_no_speed_they_are_those_of_the_linkage_at_rest(kind: str) -> None:
+    system, motion, solver = stiffened(arm(kind, 1e-4))
+    assert_allclose(solver.at(motion).omega, Frozen(system, 2).at(motion).omega, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["planar beam", "plane", "spatial beam"])
+def test_what_a_free_drive_lets_go_of_keeps_its_motion_without_strain(kind: str) -> None:
+    _, motion, solver = stiffened(arm(kind, 2.0), driven=False)
+    assert solver.at(motion).still == 1
+
+
+LINKS: dict[str, Raw] = {
+    "planar beam": {"fidelity": "beam", "mesh": {"elements": 4}},
+    "plane": {"fidelity": "plane", "mesh": {"elements": [8, 1]}},
+    "spatial beam": {"fidelity": "beam", "beam": "spatial", "mesh": {"elements": 4}},
+    "solid": {"fidelity": "solid", "mesh": {"elements": [6, 1, 1]}},
+}
+
+
+def linkage(kind: str, rpm: float = 1500.0) -> Raw:
+    """A four-bar that stiffens by some per cent."""
+    shape = {"kind": "bar", "width": 0.006, "thickness": 0.012}
+    link = {"material": "steel", "shape": shape, **LINKS[kind]}
+    analysis = {"accuracy": "quick", "revolutions": 1, "steps_per_revolution": 360, "stiffening": True}
+    return {**four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed(f"{rpm} rpm")), "analysis": analysis}
+
+
+@pytest.mark.parametrize("kind", LINKS)
+def test_a_linkage_has_the_eigenvalues_of_the_literal_system(kind: str) -> None:
+    system, motion, solver = stiffened(linkage(kind), count=3)
+    found = solver.at(motion)
+    assert difference(solver.system_at(motion)[0], motion, found) < (1e-8 if "pla" in kind else 2e-6)
+    assert np.abs(found.omega / Frozen(system, 3).at(motion).omega - 1).max() > 0.005
+
+
+def test_a_bar_under_too_much_pressure_buckles() -> None:
+    """Euler's load of a cantilever, π² EI/4L², and 2 % less and more than it, while it hardly turns."""
+    euler = np.pi**2 * E * HEIGHT**4 / 12 / 4 / LENGTH**2
+
+    def pressed(share: float) -> Raw:
+        load = {
+            "kind": "force",
+            "link": "arm",
+            "at": [LENGTH, 0, 0],
+            "vector": [-share * euler, 0, 0],
+            "frame": "link",
+        }
+        return arm("spatial beam", 1e-3, loads={"P": load})
+
+    _, motion, solver = stiffened(pressed(0.98))
+    _, _, free = stiffened(pressed(0.0))
+    assert solver.at(motion).omega[0] < 0.2 * free.at(motion).omega[0]
+    _, motion, solver = stiffened(pressed(1.02))
+    with pytest.raises(UnstableError, match="buckles under the stresses of its motion"):
+        solver.at(motion)
+
+
+def test_a_harmonic_meets_what_stiffens_with_the_speed(tmp_path: Path) -> None:
+    """3 Ω = ω(Ω), within what straight lines over Ω² leave; Ω = ω(Ω) is beyond twice the drive's speed."""
+    found = frequencies(scene_from(arm("planar beam", 1.5)), Wanted(1, 2, harmonics=3), tmp_path / "out")
+    (third, *_) = (x for x in found.crossings if x.harmonic == 3)
+    _, motion, solver = stiffened(arm("planar beam", third.slowest / UNIT))
+    assert_allclose(solver.at(motion).omega[0], 3 * third.slowest, rtol=1e-3)
+    assert_allclose(third.fastest, third.slowest, rtol=1e-6)
+    assert not [x for x in found.crossings if x.harmonic == 1]
+    assert (tmp_path / "out" / "campbell.png").is_file()
+
+
+def test_speeds_at_which_links_buckle_are_left_out_and_told(tmp_path: Path) -> None:
+    found = frequencies(scene_from(linkage("planar beam", 3000.0), tmp_path), Wanted(2, 8), tmp_path / "out")
+    assert [text for text in found.warnings if "buckle by the stresses of the motion between" in text]
+    assert np.isfinite(found.values).all()
