@@ -70,15 +70,17 @@ def stiffened(
     return system, motion, Stiffened(system, ready.model, count, 0 if driven else 1)
 
 
-@pytest.mark.parametrize("mu", CHORD)
+BARS = [
+    (kind, turn, mu)
+    for kind in ("planar beam", "plane", "spatial beam", "solid")
+    for turn in (AXES if kind in ("spatial beam", "solid") else ("z",))
+    for mu in CHORD
+]
+
+
 @pytest.mark.parametrize(
-    ("kind", "turn"),
-    [
-        ("planar beam", "z"),
-        ("plane", "z"),
-        *(("spatial beam", x) for x in AXES),
-        *(("solid", x) for x in AXES),
-    ],
+    ("kind", "turn", "mu"),
+    [x if x[1:] in (("z", 4), ("oblique", 2)) else pytest.param(*x, marks=pytest.mark.long) for x in BARS],
 )
 def test_a_bar_that_turns_has_published_frequencies(kind: str, turn: str, mu: float) -> None:
     _, motion, solver = stiffened(arm(kind, mu, turn))
