@@ -17,6 +17,7 @@ from kedfem.dynamics.modes.frozen import Frozen, UnstableError
 from kedfem.dynamics.modes.stiffened import Stiffened
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import System
+from kedfem.errors import SceneError
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from
@@ -163,3 +164,20 @@ def test_speeds_at_which_links_buckle_are_left_out_and_told(tmp_path: Path) -> N
     found = frequencies(scene_from(linkage("planar beam", 3000.0), tmp_path), Wanted(2, 8), tmp_path / "out")
     assert [text for text in found.warnings if "buckle by the stresses of the motion between" in text]
     assert np.isfinite(found.values).all()
+
+
+@pytest.mark.parametrize("name", ["crank", "coupler", "rocker"])
+def test_rigid_links_have_the_eigenvalues_of_the_literal_system_too(name: str) -> None:
+    raw = linkage("planar beam")
+    raw["links"][name] = {**raw["links"][name], "fidelity": "rigid"}
+    del raw["links"][name]["mesh"]
+    _, motion, solver = stiffened(raw, count=3)
+    assert difference(solver.system_at(motion)[0], motion, solver.at(motion)) < 1e-8
+
+
+def test_a_free_drive_that_carries_a_rigid_link_is_refused(tmp_path: Path) -> None:
+    raw = linkage("planar beam")
+    raw["links"]["crank"] = {**raw["links"]["crank"], "fidelity": "rigid"}
+    del raw["links"]["crank"]["mesh"]
+    with pytest.raises(SceneError, match=r"--free: must be left out with analysis\.stiffening .* got crank"):
+        frequencies(scene_from(raw, tmp_path), Wanted(2, 1, free=True), tmp_path / "out")

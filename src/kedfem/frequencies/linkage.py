@@ -11,7 +11,7 @@ from jaxtyping import Float
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.modes.stiffened import Stiffened
 from kedfem.dynamics.system.build import system_of
@@ -120,7 +120,9 @@ def frequencies(
     released = linkage.mobility + (len(scene.driven_joints) if wanted.free else 0)
     solver: Frozen | Stiffened = Frozen(system, wanted.modes, released)
     if scene.analysis.stiffening:
-        solver = Stiffened(system, elastic_model(scene, linkage, along=along), wanted.modes, released)
+        driven = elastic_model(scene, linkage, along=along)
+        _refuse_carried(driven, wanted.free)
+        solver = Stiffened(system, driven, wanted.modes, released)
     t = _positions(scene, wanted.positions)
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
@@ -155,6 +157,21 @@ def frequencies(
             ]
             write_shapes(target, _shapes(system, motion, every, where, wanted.shapes), scene.gravity)
     return done
+
+
+def _refuse_carried(driven: Model, free: bool) -> None:
+    """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
+
+    Raises
+    ------
+    SceneError
+    """
+    if free and driven.carried:
+        names = ", ".join(each.link.name for each in driven.carried)
+        raise SceneError(
+            "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
+            f"not known, got {names}: take fidelity = 'beam' or 'solid' for it"
+        )
 
 
 def _at_speeds(
