@@ -5,7 +5,7 @@
 K = T K0 Tᵀ of links, κ the tangents of force laws there. All links are factored once, with
 K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.balance`), and a block
 Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the others.
-Forces that stretch a link or a spring do not change its stiffness here.
+Forces that stretch a link or a spring do not change its stiffness here; `stiffened` has those of links.
 """
 
 from dataclasses import dataclass
