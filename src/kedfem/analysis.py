@@ -193,7 +193,7 @@ def _analysed(
     add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
     results = read_results(folder / "results.h5")
     errors = step.errors if step.levels > 1 else None
-    idle = unstressed(ready.model, highest(results.peaks))
+    idle = unstressed(ready.model, peak := highest(results.peaks))
     found = clock.timed(
         "estimates",
         lambda: Budget(()) if idle else budget(ready, seen, reduction, _in_memory(results, solvers), errors),
@@ -216,7 +216,7 @@ def _analysed(
     if period:
         damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, doubts, period))
         results = replace(results, fatigue=damaged)
-    notices += [*peak_warning(peak := highest(results.peaks)), *fatigue_warning(results.fatigue)]
+    notices += [*peak_warning(peak), *fatigue_warning(results.fatigue)]
     _stress_files(ready, folder, results.drive, envelope, doubts)
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)

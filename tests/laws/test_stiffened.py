@@ -23,13 +23,12 @@ from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from
 from tests.laws.test_frozen import difference
 from tests.scenes import constant_speed, four_bar
+from tests.verification.stiffening import HEIGHT, LENGTH, RUBBER, TABLE
 
 Raw = dict[str, Any]
-LENGTH = 1.0
-HEIGHT = LENGTH * np.sqrt(12) / 70  # slenderness 70
-E, DENSITY = 1e9, 1000.0
+E, DENSITY = RUBBER.youngs_modulus, RUBBER.density
 UNIT = float(np.sqrt(E * HEIGHT**2 / 12 / DENSITY) / LENGTH**2)
-CHORD, FLAP = {2: 3.6195, 4: 3.888, 6: 4.2393}, {2: 4.1373, 4: 5.5850, 6: 7.3603}
+SPEEDS = (2, 4, 6)  # μ, of the table
 AXES = {
     "x": np.array([0, np.pi / 2, 0]), "y": np.array([-np.pi / 2, 0, 0]), "z": np.zeros(3),
     "oblique": np.array([0.7, -0.4, 1.1]),
@@ -75,7 +74,7 @@ BARS = [
     (kind, turn, mu)
     for kind in ("planar beam", "plane", "spatial beam", "solid")
     for turn in (AXES if kind in ("spatial beam", "solid") else ("z",))
-    for mu in CHORD
+    for mu in SPEEDS
 ]
 
 
@@ -83,12 +82,13 @@ BARS = [
     ("kind", "turn", "mu"),
     [x if x[1:] in (("z", 4), ("oblique", 2)) else pytest.param(*x, marks=pytest.mark.long) for x in BARS],
 )
-def test_a_bar_that_turns_has_published_frequencies(kind: str, turn: str, mu: float) -> None:
+def test_a_bar_that_turns_has_published_frequencies(kind: str, turn: str, mu: int) -> None:
     _, motion, solver = stiffened(arm(kind, mu, turn))
     found = solver.at(motion).omega / UNIT
-    assert_allclose(found[0], CHORD[mu], rtol=1.5e-3 + 1e-4 * mu**2)
+    chord, flap = TABLE[mu]
+    assert_allclose(found[0], chord, rtol=1.5e-3 + 1e-4 * mu**2)
     if kind not in ("planar beam", "plane"):
-        assert_allclose(found[1], FLAP[mu], rtol=2e-3)
+        assert_allclose(found[1], flap, rtol=2e-3)
 
 
 @pytest.mark.parametrize("kind", ["planar beam", "plane", "spatial beam", "solid"])
@@ -166,18 +166,19 @@ def test_speeds_at_which_links_buckle_are_left_out_and_told(tmp_path: Path) -> N
     assert np.isfinite(found.values).all()
 
 
+def with_rigid(name: str) -> Raw:
+    """A four-bar of beams with one rigid link."""
+    raw = linkage("planar beam")
+    link = {key: value for key, value in raw["links"][name].items() if key != "mesh"}
+    return {**raw, "links": {**raw["links"], name: {**link, "fidelity": "rigid"}}}
+
+
 @pytest.mark.parametrize("name", ["crank", "coupler", "rocker"])
 def test_rigid_links_have_the_eigenvalues_of_the_literal_system_too(name: str) -> None:
-    raw = linkage("planar beam")
-    raw["links"][name] = {**raw["links"][name], "fidelity": "rigid"}
-    del raw["links"][name]["mesh"]
-    _, motion, solver = stiffened(raw, count=3)
+    _, motion, solver = stiffened(with_rigid(name), count=3)
     assert difference(solver.system_at(motion)[0], motion, solver.at(motion)) < 1e-8
 
 
 def test_a_free_drive_that_carries_a_rigid_link_is_refused(tmp_path: Path) -> None:
-    raw = linkage("planar beam")
-    raw["links"]["crank"] = {**raw["links"]["crank"], "fidelity": "rigid"}
-    del raw["links"]["crank"]["mesh"]
     with pytest.raises(SceneError, match=r"--free: must be left out with analysis\.stiffening .* got crank"):
-        frequencies(scene_from(raw, tmp_path), Wanted(2, 1, free=True), tmp_path / "out")
+        frequencies(scene_from(with_rigid("crank"), tmp_path), Wanted(2, 1, free=True), tmp_path / "out")

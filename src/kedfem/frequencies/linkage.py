@@ -118,11 +118,13 @@ def frequencies(
     loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene
     system = system_of(loose, linkage, along)
     released = linkage.mobility + (len(scene.driven_joints) if wanted.free else 0)
-    solver: Frozen | Stiffened = Frozen(system, wanted.modes, released)
+    solver: Frozen | Stiffened
     if scene.analysis.stiffening:
         driven = elastic_model(scene, linkage, along=along)
         _refuse_carried(driven, wanted.free)
         solver = Stiffened(system, driven, wanted.modes, released)
+    else:
+        solver = Frozen(system, wanted.modes, released)
     t = _positions(scene, wanted.positions)
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
@@ -132,12 +134,9 @@ def frequencies(
     found, buckled = _at_speeds(solver, motions, speed, watch)
     motion, every = motions[1.0], found[1.0]
     still = max(each.still for each in every)
-    values = _table(every, wanted.modes)
-    over = Campbell(
-        speed * np.array(list(found)),
-        np.array([_table(each, wanted.modes) for each in found.values()]),
-        len(shares) > 1,
-    )
+    tables = {x: _table(each, wanted.modes) for x, each in found.items()}
+    values = tables[1.0]
+    over = Campbell(speed * np.array(list(tables)), np.array(list(tables.values())), len(shares) > 1)
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
     crossings = tuple(crossed(over, wanted.harmonics)) if speed else ()
     warnings = (*assembly_warning(assembly), *_tangents(system), *buckled)

@@ -89,7 +89,7 @@ def edges(axes: Sequence[Axis], rows: Mapping[int, Row]) -> Iterator[Edge]:
 
 
 def unstable_bands(
-    numbers: np.ndarray, rows: Sequence[Row], line: Sequence[int], edges: Sequence[Edge]
+    numbers: np.ndarray, rows: Sequence[Row], line: Sequence[int], found: Sequence[Edge]
 ) -> list[tuple[float, float]]:
     """From where to where a motion is unstable, along some points.
 
@@ -97,15 +97,15 @@ def unstable_bands(
     ----------
     numbers : (n,) of the first key, at all points
     line : points that differ in the first key alone
-    edges : of this line, in rising order; none: a line is unstable throughout or not at all
+    found : edges of this line, in rising order; none: a line is unstable throughout or not at all
     """
     growth = [rows[k].extremes[GROWTH][1][0] for k in line if GROWTH in rows[k].extremes]
     lowest, highest = float(np.min(numbers[line])), float(np.max(numbers[line]))
-    if not edges:
+    if not found:
         return [(lowest, highest)] if growth and min(growth) > 1 + GROWS else []
-    ends = [] if edges[0].unstable_above else [lowest]
-    ends += [each.at for each in edges]
-    ends += [highest] if edges[-1].unstable_above else []
+    ends = [] if found[0].unstable_above else [lowest]
+    ends += [each.at for each in found]
+    ends += [highest] if found[-1].unstable_above else []
     return list(pairwise(ends))[::2]
 
 

@@ -36,7 +36,19 @@ NEAR = (1e-3, 1e6)  # ω² of the first vibration over s; beyond, links are fact
 
 
 class UnstableError(SolveError):
-    """A linkage would leave the position in which it is frozen by itself."""
+    """A linkage would leave the position in which it is frozen by itself.
+
+    Parameters
+    ----------
+    how : what happens there, in words
+    motion : of that one time
+    """
+
+    def __init__(self, how: str, motion: RigidMotion) -> None:
+        super().__init__(
+            f"frequencies: must be those of a linkage that is stable where it is frozen, got one that {how} at "
+            f"t = {float(motion.t[0]):.4g} s"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +121,7 @@ class Frozen:
                 lowest, shapes = self._modes(motion)
         nothing = max(STILL * self.shift, TURNED * self.least)
         if (lowest < -nothing).any():
-            raise UnstableError(
-                "frequencies: must be those of a linkage that is stable where it is frozen, got one that a small "
-                f"push takes away for good at t = {float(motion.t[0]):.4g} s"
-            )
+            raise UnstableError("a small push takes away for good", motion)
         still = int((np.abs(lowest) <= nothing).sum())
         end = still + self.count
         omega = np.sqrt(np.where(np.abs(lowest) <= nothing, 0.0, lowest))[:end]

@@ -24,6 +24,8 @@ from kedfem.links.reduced import rigid_modes
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
+Rigid = tuple[Float[np.ndarray, "k r"], Float[np.ndarray, "r r"]]
+"""Rigid motions of a link, and its mass in them."""
 AMPLE = 2.0  # times what holds a link that its stresses alone would let turn over
 
 
@@ -43,29 +45,17 @@ class Stiffened:
     def __init__(self, system: System, driven: Model, count: int, free: int = 0) -> None:
         self.system, self.driven, self.count, self.free = system, driven, count, free
         self.stresses = stiffening(driven)
+        self.rigid = [_rigid(link) for link in system.model.links]
         self.factorisations = 0
 
     def at(self, motion: RigidMotion) -> Modes:
-        """The lowest modes at a position.
-
-        Parameters
-        ----------
-        motion : of one time
-
-        Raises
-        ------
-        UnstableError
-            If stresses make the linkage buckle there.
-        """
+        """As `Frozen.at`; stresses may make the linkage buckle there."""
         system, shift = self.system_at(motion)
         try:
             solver = Frozen(system, self.count, self.free, shift)
             found = solver.at(motion)
         except SolveError as fault:
-            raise UnstableError(
-                "frequencies: must be those of a linkage that is stable where it is frozen, got one that buckles under "
-                f"the stresses of its motion at t = {float(motion.t[0]):.4g} s"
-            ) from fault
+            raise UnstableError("buckles under the stresses of its motion", motion) from fault
         self.factorisations += solver.factorisations
         return found
 
@@ -73,15 +63,16 @@ class Stiffened:
         """The system with its links as they are at a position, and s [1/s²] with which K + s M holds each of them."""
         forcing = self.stresses.stressed(forcings(self.driven, motion))
         links, shift = [], 0.0
-        for link, modes, body, force in zip(
-            self.system.model.links, self.stresses.modes, self.system.model.bodies, forcing, strict=True
+        model = self.system.model
+        for link, rigid, modes, body, force in zip(
+            model.links, self.rigid, self.stresses.modes, model.bodies, forcing, strict=True
         ):
             s = np.zeros(len(modes.k)) if force.stress is None else force.stress[0]
             R = motion.R[0, body]
             added = sp.kron(modes.stiffness(s), modes.P) + _turning(link, R.T @ motion.omega[0, body])
             links.append(replace(link, K0=_plus(link.K0, added)))
-            shift = max(shift, AMPLE * _unstable(link, added))
-        return replace(self.system, model=replace(self.system.model, links=tuple(links))), shift
+            shift = max(shift, AMPLE * _unstable(rigid, added))
+        return replace(self.system, model=replace(model, links=tuple(links))), shift
 
 
 def _turning(link: Link, omega: Float[np.ndarray, "3"]) -> sp.csr_array:
@@ -96,8 +87,13 @@ def _plus(K: Matrix, added: sp.csr_array) -> Matrix:
     return sp.csr_array(K + added) if sp.issparse(K) else np.asarray(K) + added.toarray()
 
 
-def _unstable(link: Link, added: sp.csr_array) -> float:
-    """By how much ω² of the link's rigid motions is below zero [1/s²]."""
+def _rigid(link: Link) -> Rigid:
     B = rigid_modes(link)
-    lowest = scipy.linalg.eigh(B.T @ (added @ B), B.T @ (mass_matrix(link) @ B), eigvals_only=True)[0]
+    return B, B.T @ (mass_matrix(link) @ B)
+
+
+def _unstable(rigid: Rigid, added: sp.csr_array) -> float:
+    """By how much ω² of a link's rigid motions is below zero [1/s²]."""
+    B, mass = rigid
+    lowest = scipy.linalg.eigh(B.T @ (added @ B), mass, eigvals_only=True)[0]
     return max(0.0, -float(lowest))

@@ -23,7 +23,7 @@ from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
 from kedfem.dynamics.system.period.map import PeriodMap
-from kedfem.dynamics.system.period.search import periodic
+from kedfem.dynamics.system.period.search import periodic, residual_of
 from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
@@ -237,9 +237,7 @@ def _marched(solver: Steps, last: Any) -> None:
     """What a period leaves of a steady state, from the state with which the recorded one ends."""
     if isinstance(solver, SystemSteps) and solver.steady is not None and solver.over is not None:
         over, steady = solver.over, solver.steady
-        left = over.size(over.change(over.vector(last), over.vector(steady.state))) / max(
-            steady.scale, 1e-300
-        )
+        left = residual_of(over, over.vector(steady.state), over.vector(last), steady.scale)
         solver.steady = replace(steady, residual=max(left, steady.residual))
 
 

@@ -113,8 +113,13 @@ def periodic(
             y = steps(x)
             scale = scale_of(over, y)
         found, certain, shape = multipliers(steps, x, y)
-    residual = over.size(over.change(y, x)) / max(scale, 1e-300)
+    residual = residual_of(over, x, y, scale)
     return Periodic(over.state(x), over.period, residual, scale, over.marches, found, certain, shape)
+
+
+def residual_of(over: PeriodMap, x: Flat, y: Flat, scale: float) -> float:
+    """What a period that leads from x to y leaves, of the size of the state."""
+    return over.size(over.change(y, x)) / max(scale, 1e-300)
 
 
 def _closed(steps: Watched) -> float:
