@@ -1,7 +1,8 @@
 """Random mechanisms: trees of 2 to 12 bodies in space, on the ground or free, without a drive; driven ones of all kinds.
 
 ``python -m tests.mechanisms --count 2000`` tries as many of the first, with ``--driven rigid-body`` or ``co-rotational``
-of the others (`tests.random_scenes`); ``--first SEED --count 1`` one of them again.
+of the others (`tests.random_scenes`), with ``--solvers`` of these by both solvers; ``--first SEED --count 1`` one of
+them again.
 """
 
 import argparse
@@ -126,6 +127,7 @@ def outcome(seed: int, most: int = 12) -> tuple[str, dict[str, float]]:
 # -- driven ones ---------------------------------------------------------------------------------------------
 
 STIFFER, LIMIT, SECONDS = 3.0, 1e-3, 60.0
+ALIKE = 2e-5  # of the largest: what the monolithic step's rounding leaves of stiff hubs' forces, and iterations of laws
 #: drawn at random, some lock, or have a slot too short, or one that turns too far
 NO_MECHANISM = (MotionError, MeshError)
 
@@ -177,11 +179,46 @@ def limit(seed: int, frames: str, most: int = 6) -> tuple[str, dict[str, float]]
     return "fine" if all(x < LIMIT for x in found.values()) else "differs", found
 
 
+def by_both_solvers(seed: int, most: int = 6) -> tuple[str, dict[str, float]]:
+    """Whether a driven mechanism, in rigid-body frames and without limits, vibrates alike by both solvers; how far."""
+    raw = driven(seed, most, "rigid-body") | {"limits": {}}
+    got = []
+    try:
+        for solver in ("condensed", "monolithic"):
+            analysis = raw["analysis"] | {
+                "kind": "transient",
+                "solver": solver,
+                "end_time": 20 * STEP,
+                "step": STEP,
+            }
+            got.append(channels(*ran({**raw, "analysis": analysis})))
+    except NO_MECHANISM:
+        return "no mechanism", {}
+    except KedfemError as error:
+        return f"refused: {error}", {}
+    sizes: dict[str, float] = {}
+    for name, values in got[1].items():
+        sizes[_kind(name)] = max(sizes.get(_kind(name), 0.0), float(np.abs(values).max(initial=0.0)))
+    found = {
+        name: float(np.abs(values - got[1][name]).max(initial=0.0)) / (sizes[_kind(name)] or 1.0)
+        for name, values in got[0].items()
+        if not name.startswith("energy/")
+    }
+    return "fine" if all(x < ALIKE for x in found.values()) else "differs", found
+
+
+def _kind(name: str) -> str:
+    """What channels are measured by: force, moment, displacement …"""
+    return name.rpartition("/")[2].removeprefix("rigid_").replace("torque", "moment")
+
+
 def bounded(seed: int, given: argparse.Namespace) -> tuple[str, dict[str, float]]:
     """What becomes of a mechanism within so much processor time."""
     signal.signal(signal.SIGPROF, _stop)
     signal.setitimer(signal.ITIMER_PROF, given.seconds)
     try:
+        if given.solvers:
+            return by_both_solvers(seed, min(given.most, 6))
         return limit(seed, given.driven, min(given.most, 6)) if given.driven else outcome(seed, given.most)
     except TimeoutError:
         return "takes too long", {}
@@ -199,13 +236,15 @@ def main() -> None:
     for name, usual in (("count", 200), ("first", 0), ("most", 12)):
         parser.add_argument(f"--{name}", type=int, default=usual)
     parser.add_argument("--driven", choices=("rigid-body", "co-rotational"))
+    parser.add_argument("--solvers", action="store_true", help="driven ones by both solvers")
     parser.add_argument("--seconds", type=float, default=SECONDS, help="processor time of one")
     given = parser.parse_args()
     count: dict[str, int] = {}
     for seed in range(given.first, given.first + given.count):
         what, found = bounded(seed, given)
         count[what.split(":")[0]] = count.get(what.split(":")[0], 0) + 1
-        raw = driven(seed, min(given.most, 6), given.driven) if given.driven else mechanism(seed, given.most)
+        frames = "rigid-body" if given.solvers else given.driven
+        raw = driven(seed, min(given.most, 6), frames) if frames else mechanism(seed, given.most)
         kinds = " ".join(x["kind"] for x in raw["joints"].values())
         worst = sorted(found.items(), key=lambda x: -x[1])[:4]
         far = ", ".join(f"{key} {x:.1e}" for key, x in worst)

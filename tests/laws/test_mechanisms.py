@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
-from tests.mechanisms import as_lists, limit, mechanism, outcome
+from tests.mechanisms import as_lists, by_both_solvers, limit, mechanism, outcome
 from tests.moving import beam_in_space
 from tests.partners import joint
 
@@ -63,6 +63,21 @@ def test_forces_of_a_driven_mechanism_tend_to_those_of_rigid_links(seed: int, fr
     what, found = limit(seed, frames)
     assert what == "fine", found
     assert found
+
+
+@pytest.mark.parametrize("seed", [554, 561, 568, 593])
+def test_a_driven_mechanism_vibrates_alike_by_both_solvers(seed: int) -> None:
+    """568 and 593: a drive on a joint whose other directions give."""
+    what, found = by_both_solvers(seed)
+    assert what == "fine", found
+    assert found
+
+
+@pytest.mark.long
+def test_thirty_driven_mechanisms_vibrate_alike_by_both_solvers() -> None:
+    found = [by_both_solvers(seed, most=3)[0] for seed in range(30)]
+    assert "differs" not in found
+    assert found.count("fine") >= 15
 
 
 def test_mechanisms_are_of_two_to_twelve_bodies() -> None:

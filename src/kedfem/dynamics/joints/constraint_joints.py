@@ -116,8 +116,6 @@ def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Flo
     gap, turn = _stacked(across, across)
     if joint.kind == "screw":
         gap, turn = np.vstack([gap, axis]), np.vstack([turn, -(joint.lead or 0.0) / (2 * np.pi) * axis])
-        if driven:
-            gap, turn = np.vstack([gap, zero]), np.vstack([turn, axis])
     return gap, turn
 
 
@@ -144,12 +142,14 @@ def springs(
             if joint.kind == "universal" and turn[r].any()
             else int(np.abs(frame @ (gap[r] + turn[r])).argmax())
         )
+        if drive is not None and along == 2 and (gap if joint.kind == "prismatic" else turn)[r].any():
+            if drive.shaft_stiffness is not None:
+                k[r], c[r] = drive.shaft_stiffness, drive.shaft_damping
+            continue  # what the drive prescribes is none of the bushing's
         if of is not None and gap[r].any() and of.stiffness is not None:
             k[r], c[r] = of.stiffness[along], of.damping[along]
         if of is not None and turn[r].any() and of.rotational_stiffness is not None:
             k[r], c[r] = of.rotational_stiffness[along], of.rotational_damping[along]
-        if drive is not None and drive.shaft_stiffness is not None and turn[r].any() and along == 2:
-            k[r], c[r] = drive.shaft_stiffness, drive.shaft_damping
     return k, c
 
 
