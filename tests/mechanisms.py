@@ -127,6 +127,7 @@ def outcome(seed: int, most: int = 12) -> tuple[str, dict[str, float]]:
 # -- driven ones ---------------------------------------------------------------------------------------------
 
 STIFFER, LIMIT, SECONDS = 3.0, 1e-3, 60.0
+LEAST = 1e-12  # m, N, N m: what is less is rounding
 ALIKE = 2e-5  # of the largest: what the monolithic step's rounding leaves of stiff hubs' forces, and iterations of laws
 #: drawn at random, some lock, or have a slot too short, or one that turns too far
 NO_MECHANISM = (MotionError, MeshError)
@@ -200,7 +201,7 @@ def by_both_solvers(seed: int, most: int = 6) -> tuple[str, dict[str, float]]:
     for name, values in got[1].items():
         sizes[_kind(name)] = max(sizes.get(_kind(name), 0.0), float(np.abs(values).max(initial=0.0)))
     found = {
-        name: float(np.abs(values - got[1][name]).max(initial=0.0)) / (sizes[_kind(name)] or 1.0)
+        name: float(np.abs(values - got[1][name]).max(initial=0.0)) / max(sizes[_kind(name)], LEAST)
         for name, values in got[0].items()
         if not name.startswith("energy/")
     }

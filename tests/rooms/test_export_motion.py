@@ -128,7 +128,7 @@ def test_what_is_refused(tmp_path: Path, run_kedfem: Command) -> None:
         export_motion(scene.model_copy(update={"drive": None}), tmp_path / "motion.csv")
     assert not list(tmp_path.iterdir())
     for more, got in (
-        ([], "neither"),
+        ([], "none of them"),
         (["--link", "rod", "--motion", "m.csv"], "--link, --motion"),
         (["--file", "m.npz"], "--file"),
     ):

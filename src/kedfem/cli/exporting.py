@@ -21,21 +21,40 @@ def export(
     motion: Annotated[
         Path | None, typer.Option(metavar="FILE", help="NAME.csv for the rigid motion of all links.")
     ] = None,
+    state_space: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="NAME.npz or NAME.mat for the mechanism as a linear system at a position."
+        ),
+    ] = None,
+    modes: Annotated[
+        int, typer.Option(metavar="N", help="Of the linear system: vibrations that are kept.")
+    ] = 12,
+    at: Annotated[
+        float,
+        typer.Option(metavar="SECONDS", help="Of the linear system: when the drive is at the position."),
+    ] = 0.0,
+    free: Annotated[
+        bool,
+        typer.Option("--free", help="Of the linear system: the drive lets go, and its torque is an input."),
+    ] = False,
     within: Within = False,
 ) -> None:
-    """For other programs: matrices of a link, or motion of all."""
+    """For other programs: matrices of a link, the mechanism as a linear system, motion of all."""
     from kedfem.errors import SceneError
 
-    if motion is not None and link is None and file is None:
+    given = {"--link": link, "--file": file, "--motion": motion, "--state-space": state_space}
+    got = [key for key, value in given.items() if value is not None]
+    if got == ["--motion"] and motion is not None:
         _motion(scene, motion, within)
-    elif link is not None and motion is None:
+    elif got == ["--state-space"] and state_space is not None:
+        _state_space(scene, state_space, (modes, at, free), within)
+    elif link is not None and set(got) <= {"--link", "--file"}:
         _link(scene, link, file or scene.with_name(f"{link}.npz"), within)
     else:
-        given = {"--link": link, "--file": file, "--motion": motion}
-        got = ", ".join(key for key, value in given.items() if value is not None) or "neither"
         raise SceneError(
-            f"export: must have --link NAME (with --file FILE, if wanted) or --motion FILE, got {got}: "
-            "export matrices and motion one after the other"
+            "export: must have --link NAME (with --file FILE, if wanted), --state-space FILE or --motion FILE, got "
+            f"{', '.join(got) or 'none of them'}: export one after the other"
         )
 
 
@@ -65,6 +84,27 @@ def _motion(scene: Path, path: Path, within: bool) -> None:
     show([], warnings)
     out.print(
         f"{path}  rigid motion of {', '.join(loaded.links)}: {count} time points",
+        markup=False,
+        soft_wrap=True,
+    )
+
+
+def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: bool) -> None:
+    from kedfem.export import require_ending, state_space, write_state_space
+    from kedfem.scene import read_scene
+
+    require_ending(path)
+    loaded = read_scene(scene, within=within)
+    with progress() as watch:
+
+        def stage(name: str) -> None:
+            watch(name, 0, 0)
+
+        found, warnings = state_space(loaded, *how, stage=stage)
+    write_state_space(found, path)
+    show([], warnings)
+    out.print(
+        f"{path}  linear system: {len(found.A)} states, inputs {', '.join(found.inputs)}, {len(found.outputs)} outputs",
         markup=False,
         soft_wrap=True,
     )

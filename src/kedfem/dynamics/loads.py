@@ -51,6 +51,7 @@ class Pattern:
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
     own : turns as the link itself does, which no rigid-body orientation tells: `system.forces.turning_loads`
+    load : its name in the scene; of gravity none
     """
 
     forces: Float[np.ndarray, "n d"]
@@ -58,6 +59,7 @@ class Pattern:
     factor: Callable[[Times, Times], Times]
     share: tuple[Vector, Vector] | None = None
     own: bool = False
+    load: str = ""
 
 
 def patterns(
@@ -81,7 +83,7 @@ def patterns(
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
             own = links[key].fit is not None and not prescribed
-            out[key] += [replace(x, own=own and _turns(x)) for x in found]
+            out[key] += [replace(x, own=own and _turns(x), load=name) for x in found]
     return {key: tuple(found) for key, found in out.items()}
 
 
@@ -194,10 +196,10 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     return out
 
 
-def slider_pattern(link: Link, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
+def slider_pattern(link: Link, name: str, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
     """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
-    return Pattern(forces, False, partial(load_factor, load.factor))
+    return Pattern(forces, False, partial(load_factor, load.factor), load=name)
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
@@ -242,11 +244,30 @@ def applied(
     """
     F = link.mX @ -motion.R2[:, body, : link.d].transpose(0, 2, 1)
     F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
-    R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
     for load in loads:
         if load.own:
             continue
         factor = amounts(load, motion, body)
         if factor.any():
-            F += factor[:, None, None] * (load.forces @ R if load.follows else load.forces)
+            F += factor[:, None, None] * _in_world(link, load, motion, body)
     return np.asarray(F)
+
+
+def unit_forces(
+    link: Link, loads: tuple[Pattern, ...], name: str, motion: RigidMotion, body: int
+) -> Float[np.ndarray, "T n d"]:
+    """What a load of the scene exerts on a link at factor one over time, world components [N]."""
+    F = np.zeros((len(motion.t), link.n, link.d))
+    for load in loads:
+        if load.load == name:
+            share = amounts(replace(load, factor=_always), motion, body)
+            F += share[:, None, None] * _in_world(link, load, motion, body)
+    return F
+
+
+def _in_world(
+    link: Link, load: Pattern, motion: RigidMotion, body: int
+) -> Float[np.ndarray, "n d"] | Float[np.ndarray, "T n d"]:
+    """Its nodal forces, world components; as the rigid-body motion turns them, if they follow their link."""
+    R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
+    return load.forces @ R if load.follows else load.forces

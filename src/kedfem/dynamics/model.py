@@ -398,8 +398,8 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     weights = port_weights(seat, np.array([joints[key].at]))[0]
     extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
     loads = tuple(
-        slider_pattern(links[carrier], x, weights)
-        for x in scene.loads.values()
+        slider_pattern(links[carrier], load, x, weights)
+        for load, x in scene.loads.items()
         if x.link == name and isinstance(x, ForceLoad)
     )
     mass = scene.links[name].mass + extra

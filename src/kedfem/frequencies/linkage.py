@@ -11,11 +11,11 @@ from jaxtyping import Float
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
-from kedfem.dynamics.modes.stiffened import Stiffened
+from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, tangent_warning
+from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.record import Curve, Stop, System
+from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
 from kedfem.frequencies.campbell import Campbell, Crossing, crossed
 from kedfem.links.recovery import stress_recovery
@@ -121,7 +121,7 @@ def frequencies(
     solver: Frozen | Stiffened
     if scene.analysis.stiffening:
         driven = elastic_model(scene, linkage, along=along)
-        _refuse_carried(driven, wanted.free)
+        refuse_carried(driven, wanted.free)
         solver = Stiffened(system, driven, wanted.modes, released)
     else:
         solver = Frozen(system, wanted.modes, released)
@@ -139,7 +139,7 @@ def frequencies(
     over = Campbell(speed * np.array(list(tables)), np.array(list(tables.values())), len(shares) > 1)
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
     crossings = tuple(crossed(over, wanted.harmonics)) if speed else ()
-    warnings = (*assembly_warning(assembly), *_tangents(system), *buckled)
+    warnings = (*assembly_warning(assembly), *tangent_warning(system, "frequencies"), *buckled)
     with claimed(folder or frequencies_folder(scene)) as target:
         done = Frequencies(target, t, angle, values, still, speed, crossings, solver.factorisations, warnings)
         write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
@@ -156,21 +156,6 @@ def frequencies(
             ]
             write_shapes(target, _shapes(system, motion, every, where, wanted.shapes), scene.gravity)
     return done
-
-
-def _refuse_carried(driven: Model, free: bool) -> None:
-    """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
-
-    Raises
-    ------
-    SceneError
-    """
-    if free and driven.carried:
-        names = ", ".join(each.link.name for each in driven.carried)
-        raise SceneError(
-            "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
-            f"not known, got {names}: take fidelity = 'beam' or 'solid' for it"
-        )
 
 
 def _at_speeds(
@@ -246,13 +231,3 @@ def _positions(scene: Scene, count: int) -> Float[np.ndarray, " P"]:
 
 def _slides(scene: Scene) -> bool:
     return any(scene.joints[name].kind == "prismatic" for name in list(scene.driven_joints)[:1])
-
-
-def _tangents(system: System) -> tuple[str, ...]:
-    """Which force laws are not linear."""
-    names = dict.fromkeys(x.name for x in system.constraints if isinstance(x.law, Curve | Stop))
-    if not names:
-        return ()
-    return (
-        f"frequencies: force laws that are not linear enter with their tangent at rest: {', '.join(names)}",
-    )

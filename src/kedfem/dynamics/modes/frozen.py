@@ -19,7 +19,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.layout import as_arrays, coefficients, factored
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import System
+from kedfem.dynamics.system.record import TIME, Curve, Stop, System
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
 from kedfem.dynamics.system.starts.instant import Instant
@@ -97,7 +97,12 @@ class Frozen:
         self.factorisations += len(self.held)
 
     def at(self, motion: RigidMotion) -> Modes:
-        """The lowest modes at a position.
+        """The lowest modes at a position; parameters and errors as in `modes`."""
+        omega, still, x = self.modes(motion)
+        return Modes(omega, self.per_link(x), still)
+
+    def modes(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], int, Float[np.ndarray, "N f"]]:
+        """Natural circular frequencies in rising order, how many are of motions without strain, shapes on coordinates.
 
         Parameters
         ----------
@@ -108,7 +113,7 @@ class Frozen:
         UnstableError
             If a motion away from the position would grow by itself.
         """
-        lowest, shapes = self._modes(motion)
+        lowest, shapes = self._lowest(motion)
         while not self._settled:
             first = lowest[lowest > STILL * self.shift][:1]
             low, high = NEAR
@@ -118,32 +123,39 @@ class Frozen:
             if not self._settled:
                 self.shift = better
                 self._factored()
-                lowest, shapes = self._modes(motion)
+                lowest, shapes = self._lowest(motion)
         nothing = max(STILL * self.shift, TURNED * self.least)
         if (lowest < -nothing).any():
             raise UnstableError("a small push takes away for good", motion)
         still = int((np.abs(lowest) <= nothing).sum())
         end = still + self.count
         omega = np.sqrt(np.where(np.abs(lowest) <= nothing, 0.0, lowest))[:end]
-        bodies = range(len(self.of.parts))
-        per_link = (np.array([rows(self.of, k, x[own(self.of, k)]) for x in shapes.T[:end]]) for k in bodies)
-        return Modes(omega, tuple(per_link), still)
+        return omega, still, shapes[:, :end]
 
-    def _modes(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
-        """ω² in rising order, and shapes on the coordinates of all bodies."""
+    def per_link(self, x: Block) -> tuple[Float[np.ndarray, "f n d"], ...]:
+        """Columns on the coordinates of all bodies as rows of each link."""
+        every = range(len(self.of.parts))
+        return tuple(np.array([rows(self.of, k, each[own(self.of, k)]) for each in x.T]) for k in every)
+
+    def balance(self, motion: RigidMotion) -> tuple[Instant, Balance]:
+        """K + s M with all joints and laws at a position."""
         now = Instant(self.of, lambda t: motion, float(motion.t[0]), self._like)
         self._like = now
-        balance = Balance(self.of, self.held, now.R, asked(now))
+        return now, Balance(self.of, self.held, now.R, asked(now))
+
+    def _lowest(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
+        """ω² in rising order, and shapes on the coordinates of all bodies."""
+        _, balance = self.balance(motion)
 
         def answer(r: Block) -> Block:
             return np.stack([balance.solved(each).x for each in r.T], axis=1)
 
         size = int(self.of.bodies.at[-1])
         block = max(RIGID_MOTIONS, self.free)
-        theta, shapes = lanczos(answer, self._momentum, size, self.count + self.free, block)
+        theta, shapes = lanczos(answer, self.momentum, size, self.count + self.free, block)
         return 1 / theta - self.shift, shapes
 
-    def _momentum(self, x: Block) -> Block:
+    def momentum(self, x: Block) -> Block:
         """M x."""
         out = x.copy()
         for k, (part, link) in enumerate(zip(self.of.parts, self.system.model.links, strict=True)):
@@ -161,6 +173,21 @@ def asked(now: Instant) -> Asked:
     kept = hard | ((stiffness != 0.0) & (np.abs(C).max(axis=1, initial=0.0) > 0.0))
     compliance = np.where(hard, 0.0, 1 / np.where(stiffness != 0.0, stiffness, 1.0))[kept]
     return Asked(C[kept], np.zeros(len(compliance)), compliance, z[0])
+
+
+def tangent_warning(system: System, what: str) -> tuple[str, ...]:
+    """A warning that names force laws that are not linear; `what` asks."""
+    bent = (
+        each.name
+        for each in system.constraints
+        if isinstance(each.law, Stop) or (isinstance(each.law, Curve) and each.law.over != TIME)
+    )
+    names = ", ".join(dict.fromkeys(bent))
+    return (
+        (f"{what}: force laws that are not linear enter with their tangent at rest: {names}",)
+        if names
+        else ()
+    )
 
 
 def _ready(system: System, shift: float) -> Ready:

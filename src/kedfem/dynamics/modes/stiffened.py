@@ -18,7 +18,7 @@ from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.record import System
-from kedfem.errors import SolveError
+from kedfem.errors import SceneError, SolveError
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.motion.newton import cross_matrix
@@ -26,6 +26,7 @@ from kedfem.motion.rigid import RigidMotion
 
 Rigid = tuple[Float[np.ndarray, "k r"], Float[np.ndarray, "r r"]]
 """Rigid motions of a link, and its mass in them."""
+BUCKLES = "buckles under the stresses of its motion"
 AMPLE = 2.0  # times what holds a link that its stresses alone would let turn over
 
 
@@ -50,14 +51,26 @@ class Stiffened:
 
     def at(self, motion: RigidMotion) -> Modes:
         """As `Frozen.at`; stresses may make the linkage buckle there."""
-        system, shift = self.system_at(motion)
+        solver = self.frozen(motion)
         try:
-            solver = Frozen(system, self.count, self.free, shift)
             found = solver.at(motion)
         except SolveError as fault:
-            raise UnstableError("buckles under the stresses of its motion", motion) from fault
+            raise UnstableError(BUCKLES, motion) from fault
         self.factorisations += solver.factorisations
         return found
+
+    def frozen(self, motion: RigidMotion) -> Frozen:
+        """The linkage as it is at a position.
+
+        Raises
+        ------
+        UnstableError
+        """
+        system, shift = self.system_at(motion)
+        try:
+            return Frozen(system, self.count, self.free, shift)
+        except SolveError as fault:
+            raise UnstableError(BUCKLES, motion) from fault
 
     def system_at(self, motion: RigidMotion) -> tuple[System, float]:
         """The system with its links as they are at a position, and s [1/s²] with which K + s M holds each of them."""
@@ -97,3 +110,18 @@ def _unstable(rigid: Rigid, added: sp.csr_array) -> float:
     B, mass = rigid
     lowest = scipy.linalg.eigh(B.T @ (added @ B), mass, eigvals_only=True)[0]
     return max(0.0, -float(lowest))
+
+
+def refuse_carried(driven: Model, free: bool) -> None:
+    """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
+
+    Raises
+    ------
+    SceneError
+    """
+    if free and driven.carried:
+        names = ", ".join(each.link.name for each in driven.carried)
+        raise SceneError(
+            "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
+            f"not known, got {names}: take fidelity = 'beam' or 'solid' for it"
+        )

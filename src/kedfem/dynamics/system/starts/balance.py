@@ -162,16 +162,17 @@ class Balance:
                 "joints: bodies must be held by joints or springs, got some that move freely"
             ) from error
 
-    def solved(self, r: Flat, moved: Flat | None = None) -> Solved:
+    def solved(self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0) -> Solved:
         """All bodies under given right-hand sides.
 
         Parameters
         ----------
         r : (N,) world components
         moved : (N,) what closes the joints together with x
+        more : (k,) forces on the interface beside those that are known
         """
         at, ports = self.of.bodies.at, self.of.bodies.port_at
-        k, f, local, offset = self.of.system.unknowns, self.asked.known.copy(), [], []
+        k, f, local, offset = self.of.system.unknowns, self.asked.known + more, [], []
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             here = slice(int(at[i]), int(at[i + 1]))
             local.append(self.turned(i, r[here], back=True))

@@ -1,29 +1,23 @@
-"""For other programs: an elastic link as matrices (mass, stiffness, modes, ports), the links' rigid motion as a table."""
+"""An elastic link as matrices: mass, stiffness, modes, ports."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
-from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.variants import moved
 from kedfem.dynamics.joints.places import seat_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
-from kedfem.dynamics.nominal import all_motions
-from kedfem.errors import MeshError, OutputError, SceneError
+from kedfem.errors import MeshError, SceneError
+from kedfem.export.files import read_record, write_record
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights, seat_couples
-from kedfem.motion.assembly import assembled, assembly_warning
-from kedfem.motion.counted_turns import require_counted
-from kedfem.output.motion_file import write_motion
-from kedfem.results import replacing
-from kedfem.results.files import reason
+from kedfem.motion.assembly import assembled
 from kedfem.results.modelled import element_words
 from kedfem.scene import Scene, corotational, rayleigh, require_elastic
 
@@ -31,7 +25,6 @@ MOST = 6000
 """Unknowns up to which dense matrices are written: 300 MB each."""
 
 FORMAT = "kedfem link 1"
-ENDINGS = (".npz", ".mat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,23 +92,6 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
     return _exported(scene, name, link)
 
 
-def export_motion(scene: Scene, path: Path) -> tuple[int, tuple[str, ...]]:
-    """Write the rigid-body motion of all links at all time points as comma-separated values; rows, warnings.
-
-    Raises
-    ------
-    KedfemError
-        The file does not end in .csv or cannot be written, the scene has no drive, or the mechanism cannot move so far.
-    """
-    require_ending(path, (".csv",))
-    scene, assembly = assembled(moved(scene))
-    linked, along = moving(scene)
-    require_counted(scene, linked, along)
-    count = write_motion(path, scene, linked, (motion for _, motion in all_motions(scene, linked, along)))
-    free = (f"free motions ({linked.mobility}) are held as drawn",) if linked.mobility else ()
-    return count, (*assembly_warning(assembly), *free)
-
-
 def _exported(scene: Scene, name: str, link: Link) -> ExportedLink:
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     k = link.unknowns
@@ -179,26 +155,7 @@ def write_link(link: ExportedLink, path: Path) -> None:
     OutputError
         The file has another ending, or cannot be written.
     """
-    require_ending(path)
-    data = {each.name: getattr(link, each.name) for each in fields(link)} | {"format": FORMAT}
-    with replacing(path) as part, part.open("wb") as file:
-        if path.suffix == ".npz":
-            np.savez_compressed(file, **data)
-        else:
-            from scipy.io import savemat
-
-            savemat(file, data | {"ports": np.array(link.ports, object)}, do_compression=True)
-
-
-def require_ending(path: Path, endings: Sequence[str] = ENDINGS) -> None:
-    """A file of a kind that is known.
-
-    Raises
-    ------
-    OutputError
-    """
-    if path.suffix not in endings:
-        raise OutputError(f"{path}: must end in {' or '.join(endings)}, got '{path.suffix}'")
+    write_record(link, path, FORMAT)
 
 
 def read_link(path: Path) -> ExportedLink:
@@ -209,23 +166,4 @@ def read_link(path: Path) -> ExportedLink:
     OutputError
         It is not such a file.
     """
-    try:
-        if path.suffix == ".mat":
-            from scipy.io import loadmat
-
-            data = loadmat(path)
-            data |= {key: data[key].ravel()[0] for key in ("name", "model", "format")}
-            data["ports"] = [str(each.ravel()[0]) for each in data["ports"].ravel()]
-            data["damping"] = data["damping"].ravel()
-        else:
-            with np.load(path, allow_pickle=False) as file:
-                data = dict(file)
-        if str(data["format"]) != FORMAT:
-            raise ValueError(f"format '{data['format']}'")
-        texts = {key: str(data[key]) for key in ("name", "model")}
-        ports = {"ports": tuple(map(str, data["ports"])), "turns": data["turns"].astype(bool)}
-        return ExportedLink(**{each.name: data[each.name] for each in fields(ExportedLink)} | texts | ports)
-    except OSError as error:
-        raise OutputError(f"{path}: must be a link that kedfem wrote, got {reason(error)}") from error
-    except Exception as error:
-        raise OutputError(f"{path}: must be a link that kedfem wrote, got another file ({error})") from error
+    return read_record(path, ExportedLink, FORMAT, "a link")

@@ -1,0 +1,156 @@
+"""A linkage frozen at a position as a small linear system: its lowest modes under forces, q'' + Γ q' + Ω² q = Φᵀ F.
+
+What the modes that are left out answer to a constant force, G F, is kept, so that a constant force bends the linkage as
+in full, x = K⁻¹ F. With s the shift of `Frozen`, kept modes as a coarse correction, motions without strain left out,
+
+    y = (K + s M)⁻¹ (F + s M x) − x,   x + y + Φ (s/Ω²) Φᵀ M y → x,   G F = x − Φ Ω⁻² Φᵀ F
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.matrices.dense import work_on
+from kedfem.dynamics.modes.frozen import Frozen
+from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.starts.balance import Balance
+from kedfem.errors import SolveError
+from kedfem.links.record import Link
+from kedfem.motion.rigid import RigidMotion
+
+ENOUGH, MOST = 1e-12, 60  # of the answer: its last change; changes
+ROUNDED = 1e-6  # of the answer: changes that no longer halve may be so large, of beams in space with their stiff hubs
+
+Flat = Float[np.ndarray, " _"]
+Shapes = tuple[Float[np.ndarray, "_ n d"], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """Lowest modes of unit mass, f of them, under i inputs.
+
+    omega : (f,) natural circular frequencies [rad/s]; still : how many are of motions without strain, zero
+    damping : (f, f) Γ [1/s]
+    force : (f, i) Φᵀ F of each input at one [kg^½ m/s²]
+    shapes : per link (f, n, d) Φ, world components [kg^-½]
+    answer : per link (i, n, d) G F of each input [m]
+    turned, answered : (e, f), (e, i) coordinates of the force elements that were asked for, of modes and in G F
+    """
+
+    omega: Float[np.ndarray, " f"]
+    still: int
+    damping: Float[np.ndarray, "f f"]
+    force: Float[np.ndarray, "f i"]
+    shapes: Shapes
+    answer: Shapes
+    turned: Float[np.ndarray, "e f"]
+    answered: Float[np.ndarray, "e i"]
+
+
+def linear_model(
+    frozen: Frozen,
+    motion: RigidMotion,
+    damping: tuple[Rayleigh, Sequence[Link]],
+    loads: Sequence[Sequence[Float[np.ndarray, "n d"]]],
+    elements: Sequence[int],
+) -> LinearModel:
+    """The modes of a frozen linkage under loads and the efforts of force elements, in this order.
+
+    Parameters
+    ----------
+    motion : of one time
+    damping : α M + β K0 and the links whose K0 that is; α damps vibrations, no motion without strain; dampers of joints
+        and force elements damp beside it
+    loads : of each the nodal forces on all links, world components [N]
+    elements : numbers of constraints of the system, whose laws push along their coordinates
+
+    Raises
+    ------
+    UnstableError
+        If a motion away from the position would grow by itself.
+    """
+    omega, still, x = frozen.modes(motion)
+    now, balance = frozen.balance(motion)
+    rest = np.zeros(frozen.system.unknowns)
+    C = now.gradients(rest)
+    count = len(loads) + len(elements)
+    r, f = np.zeros((len(x), count)), np.zeros((len(rest), count))
+    for n, each in enumerate(loads):
+        r[:, n] = _on_coordinates(frozen, each)
+    f[:, len(loads) :] = C[list(elements)].T
+    Mx = frozen.momentum(x)
+    z = (omega**2 + frozen.shift) * _answers(balance, Mx, np.zeros((len(f), len(omega))))[1]
+    answer, answered = _beyond(frozen, balance, (omega, x, z, Mx), (r, f))
+    turned, rates = C @ z, now.forces(now.coordinates(np.stack([rest] * 3)))[:, 2]
+    shapes, (rayleigh, links) = frozen.per_link(x), damping
+    gamma = rayleigh.alpha * np.diag(omega > 0) + rayleigh.beta * _strain(shapes, now.R, links)
+    return LinearModel(
+        omega, still, gamma + turned.T @ (rates[:, None] * turned), x.T @ r + z.T @ f,
+        shapes, frozen.per_link(answer), turned[list(elements)], C[list(elements)] @ answered,
+    )  # fmt: skip
+
+
+def _on_coordinates(frozen: Frozen, forces: Sequence[Float[np.ndarray, "n d"]]) -> Float[np.ndarray, " N"]:
+    every = zip(frozen.of.parts, forces, strict=True)
+    return np.concatenate([work_on(part, each).ravel() for part, each in every])
+
+
+def _answers(
+    balance: Balance, r: Float[np.ndarray, "N i"], f: Float[np.ndarray, "k i"]
+) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:
+    """(K + s M)⁻¹ of columns, and the interface with it."""
+    x, z = np.zeros_like(r), np.zeros_like(f)
+    for n in range(r.shape[1]):
+        found = balance.solved(r[:, n], more=f[:, n])
+        x[:, n], z[:, n] = found.x, found.z
+    return x, z
+
+
+def _beyond(
+    frozen: Frozen,
+    balance: Balance,
+    modes: tuple[Flat, Float[np.ndarray, "N f"], Float[np.ndarray, "k f"], Float[np.ndarray, "N f"]],
+    forces: tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]],
+) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:
+    """G F, and the interface with it.
+
+    Parameters
+    ----------
+    modes : Ω, Φ, the interface with it, M Φ
+    forces : on coordinates and on the interface
+
+    Raises
+    ------
+    SolveError
+    """
+    (omega, x, z, Mx), (r, f), s = modes, forces, frozen.shift
+    soft = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0)[:, None]
+    back = s * soft - (omega == 0)[:, None]  # takes motions without strain away
+    answer, answered = np.zeros_like(r), np.zeros_like(f)
+    last = np.full(r.shape[1], np.inf)
+    for _ in range(MOST):
+        y, w = _answers(balance, r + s * frozen.momentum(answer), f)
+        y, w = y - answer, w - answered
+        share = back * (Mx.T @ y)
+        y, w = y + x @ share, w + z @ share
+        answer, answered = answer + y, answered + w
+        change, size = np.abs(y).max(axis=0, initial=0.0), np.abs(answer).max(axis=0, initial=0.0)
+        if (change <= np.where(change > last / 2, ROUNDED, ENOUGH) * size).all():
+            kept = soft * (x.T @ r + z.T @ f)
+            return answer - x @ kept, answered - z @ kept
+        last = change
+    raise SolveError(
+        "state space: what modes beyond the kept ones answer to a constant force must settle, got changes that do not: "
+        "keep more modes"
+    )
+
+
+def _strain(shapes: Shapes, R: Float[np.ndarray, "L 3 3"], links: Sequence[Link]) -> Float[np.ndarray, "f f"]:
+    """Φᵀ K0 Φ of links."""
+    out = np.zeros((len(shapes[0]),) * 2)
+    for u, each, link in zip(shapes, R, links, strict=True):
+        g = (u @ each[: link.d, : link.d]).reshape(len(u), -1)
+        out += g @ (link.K0 @ g.T)
+    return out

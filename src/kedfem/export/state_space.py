@@ -1,0 +1,292 @@
+"""The mechanism at a position of its drive as a linear system, x' = A x + B u, y = C x + D u."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.prepared import moving
+from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.loads import unit_forces
+from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.modes.frozen import Frozen, tangent_warning
+from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
+from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.record import System
+from kedfem.errors import SceneError
+from kedfem.export.files import read_record, write_record
+from kedfem.links.record import Link
+from kedfem.motion.assembly import assembled, assembly_warning
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.results.probes import probe_channels
+from kedfem.results.recorded import Recorded
+from kedfem.scene import Motor, Scene, path_parameter, time_grid
+
+FORMAT = "kedfem state space 1"
+SMALL = (
+    1e-5  # of a link's size: displacements from whose differences outputs are; exact where these are linear
+)
+NOTHING = 1e-12  # of the largest of its unit: an input so small does nothing
+
+Matrix = Float[np.ndarray, "_ _"]
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpace:
+    """A mechanism about a position: x' = A x + B u, y = C x + D u, all small changes against it.
+
+    A, B, C, D : (2m, 2m), (2m, i), (o, 2m), (o, i); x is m modal coordinates [kg^½ m], then their rates
+    inputs, input_units : (i,) `loads/NAME`, times the load as the scene has it [1]; `motors/NAME/torque` or `force`, and
+        `drive/torque` or `force` of a drive that lets go [N m, N]
+    outputs, output_units : (o,) `probes/NAME/QUANTITY/COLUMN`; `angle` and `speed`, or `travel` and `speed`, of motors
+        and of a drive that lets go
+    frequencies : (m,) natural frequencies, undamped; zero of motions without strain [Hz]
+    time, position : of the mechanism [s]; of its drive, angle [rad] or travel [m]
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+    frequencies: Float[np.ndarray, " m"]
+    time: float
+    position: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Element:
+    """A motor, or what a drive that lets go leaves: its name in the scene and in the file, N m or N."""
+
+    motor: str
+    channel: str
+    turns: bool
+
+    @property
+    def effort(self) -> tuple[str, str]:
+        """Name and unit of what it exerts."""
+        return (f"{self.channel}/torque", "N m") if self.turns else (f"{self.channel}/force", "N")
+
+    @property
+    def moves(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Names and units of its coordinate and of its rate."""
+        what, unit = ("angle", "rad") if self.turns else ("travel", "m")
+        return (f"{self.channel}/{what}", unit), (f"{self.channel}/speed", f"{unit}/s")
+
+
+def state_space(
+    scene: Scene,
+    modes: int = 12,
+    at: float = 0.0,
+    free: bool = False,
+    stage: Callable[[str], None] = lambda name: None,
+) -> tuple[StateSpace, tuple[str, ...]]:
+    """The linear system of a scene's mechanism frozen at a position, and warnings; all links in full.
+
+    Parameters
+    ----------
+    modes : vibrations that are kept, beside motions without strain
+    at : time at which the drive is at the position [s]
+    free : whether the drives let go of their joints, and their torques or forces are inputs; else they hold them
+
+    Raises
+    ------
+    KedfemError
+        With a message for the user.
+    """
+    _require(scene, modes, at, free)
+    scene, assembly = assembled(scene)
+    plan = plan_for(scene, stage)
+    scene = plan.scene if plan else scene
+    stage("mesh and matrices")
+    linkage, along = moving(scene)
+    loose, elements = _let_go(scene) if free else (scene, ())
+    elements = (*_motors(scene), *elements)
+    system = system_of(loose, linkage, along)
+    t = np.array([at])
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    released = linkage.mobility + (len(scene.driven_joints) if free else 0)
+    stage("modes")
+    if scene.analysis.stiffening:
+        driven = elastic_model(scene, linkage, along=along)
+        refuse_carried(driven, free)
+        frozen = Stiffened(system, driven, modes, released).frozen(motion)
+    else:
+        frozen = Frozen(system, modes, released)
+    names = {each.name: n for n, each in enumerate(system.constraints)}
+    found = linear_model(
+        frozen, motion, (system.model.damping, system.model.links),
+        [_unit(system, name, motion) for name in scene.loads], [names[f"motors.{each.motor}"] for each in elements],
+    )  # fmt: skip
+    space = _space(loose, linkage, system.model, motion, found, elements)
+    return space, (*assembly_warning(assembly), *tangent_warning(system, "state space"), *_idle(space))
+
+
+def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
+    """What can be asked of a scene.
+
+    Raises
+    ------
+    SceneError
+    """
+    if modes < 1:
+        raise SceneError(f"--modes: must be at least 1, got {modes}")
+    if free and scene.driven is None:
+        raise SceneError(
+            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
+        )
+    end = time_grid(scene).end if scene.driven else 0.0
+    if not 0 <= at <= end:
+        wanted = f"within the analysis, 0 to {end:.6g} s" if scene.driven else "0 without a drive"
+        raise SceneError(f"--at: must be {wanted}, got {at:.6g} s")
+    if not (free or scene.loads or scene.motors):
+        raise SceneError(
+            "--state-space: must have an input, got a scene without loads and motors: add one, or let the drive go "
+            "by --free"
+        )
+    if not (free or scene.output.probes or scene.motors):
+        raise SceneError(
+            "--state-space: must have an output, got a scene without probes and motors: add [output.probes.NAME]"
+        )
+
+
+def _motors(scene: Scene) -> tuple[_Element, ...]:
+    return tuple(_Element(x, f"motors/{x}", motor.torque is not None) for x, motor in scene.motors.items())
+
+
+def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:
+    """A scene whose drives have become motors that exert nothing."""
+    elements, motors = [], dict(scene.motors)
+    for joint in scene.driven_joints:
+        turns = scene.joints[joint].kind != "prismatic"
+        channel = "drive" if len(scene.driven_joints) == 1 else f"drive/{joint}"
+        element = _Element(f"drive of {joint}", channel, turns)
+        motors[element.motor] = Motor.model_validate({"joint": joint, "torque" if turns else "force": 0.0})
+        elements.append(element)
+    return scene.model_copy(update={"drive": None, "drives": {}, "motors": motors}), tuple(elements)
+
+
+def _unit(system: System, name: str, motion: RigidMotion) -> list[Float[np.ndarray, "n d"]]:
+    """Nodal forces of a load at factor one on all links."""
+    model = system.model
+    every = zip(model.links, model.loads, model.bodies, strict=True)
+    return [unit_forces(link, loads, name, motion, body)[0] for link, loads, body in every]
+
+
+def _space(
+    scene: Scene,
+    linkage: Linkage,
+    model: Model,
+    motion: RigidMotion,
+    found: LinearModel,
+    elements: Sequence[_Element],
+) -> StateSpace:
+    """The matrices from modes: y = U δ + V δ' + W δ'' of probes, coordinates and rates of force elements."""
+    channels = probe_channels(scene, model, linkage)
+    read = _Reader(model, motion, channels)
+    f, m = found.force, len(found.omega)
+    none = np.zeros_like(found.turned)
+    U = np.vstack([read("u", found.shapes), found.turned, none])
+    V = np.vstack([read("v", found.shapes), none, found.turned])
+    W = np.vstack([read("a", found.shapes), none, none])
+    rest = np.vstack([read("u", found.answer), found.answered, np.zeros_like(found.answered)])
+    square = found.omega**2
+    A = np.block([[np.zeros((m, m)), np.eye(m)], [-np.diag(square), -found.damping]])
+    moves = [each.moves for each in elements]
+    outputs = [
+        *((f"{x.channel.name}/{c}", x.channel.unit) for x in channels for c in _columns(x)),
+        *(x for x, _ in moves),
+        *(x for _, x in moves),
+    ]
+    inputs = [*((f"loads/{name}", "1") for name in scene.loads), *(each.effort for each in elements)]
+    return StateSpace(
+        A, np.vstack([np.zeros_like(f), f]), np.hstack([U - W * square, V - W @ found.damping]), W @ f + rest,
+        tuple(x for x, _ in inputs), tuple(x for _, x in inputs), tuple(x for x, _ in outputs),
+        tuple(x for _, x in outputs), found.omega / (2 * np.pi), float(motion.t[0]), float(motion.phi[0]),
+    )  # fmt: skip
+
+
+def _columns(recorded: Recorded) -> list[str]:
+    """Columns of a channel that are linear in small displacements."""
+    return [c for c in recorded.channel.columns if c != "von_mises"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """What probes say of small displacements, rates or accelerations about a position that does not move."""
+
+    model: Model
+    motion: RigidMotion
+    channels: Sequence[Recorded]
+
+    def __call__(self, field: str, shapes: Shapes) -> Matrix:
+        """(o, c) of c columns of a field of all links, each (c, n, d)."""
+        count = len(shapes[0])
+        largest = np.max([np.abs(u).max(axis=(1, 2), initial=0.0) for u in shapes], axis=0)
+        size = SMALL * min(link.size for link in self.model.links)
+        by = size / np.where(largest > 0, largest, 1.0)
+        ahead, back = (self._values(field, [x * u for u in shapes], count) for x in _both(by))
+        return np.asarray((ahead - back) / (2 * by))
+
+    def _values(self, field: str, moved: Sequence[Float[np.ndarray, "c n d"]], count: int) -> Matrix:
+        motion = self.motion.at(np.zeros(count, int))
+        links = [
+            _history(link, motion.R[:, body, : link.d, : link.d], field, u)
+            for link, body, u in zip(self.model.links, self.model.bodies, moved, strict=True)
+        ]
+        block = Block(0, motion, links)
+        rows = [x.rows(block).reshape(count, -1)[:, : len(_columns(x))] for x in self.channels]
+        return np.hstack([np.zeros((count, 0)), *rows]).T
+
+
+def _both(by: Float[np.ndarray, " c"]) -> tuple[np.ndarray, np.ndarray]:
+    return by[:, None, None], -by[:, None, None]
+
+
+def _history(
+    link: Link, R: Float[np.ndarray, "c d d"], field: str, x: Float[np.ndarray, "c n d"]
+) -> LinkHistory:
+    """A link with one of u, v, a and nothing else."""
+    none = np.zeros_like(x)
+    own = LinkHistory(none, none, none, none, R, none, np.zeros((len(x), 0)), np.zeros(len(x)))
+    return replace(own, **({"u": x, "g": x @ R} if field == "u" else {field: x}))
+
+
+def _idle(space: StateSpace) -> tuple[str, ...]:
+    """Warnings of inputs that do nothing, as loads on a link that the drive holds."""
+    size, units = np.abs(space.B).max(axis=0, initial=0.0), np.array(space.input_units)
+    least = np.array([NOTHING * size[units == unit].max() for unit in units])
+    return tuple(
+        f"state space: input {space.inputs[n]} does nothing: what it acts on is held by the drive or the ground"
+        for n in np.flatnonzero(size <= least)
+    )
+
+
+def write_state_space(space: StateSpace, path: Path) -> None:
+    """Write the matrices with names and units as `.npz` of NumPy or `.mat` of MATLAB, version 5.
+
+    Raises
+    ------
+    OutputError
+        The file has another ending, or cannot be written.
+    """
+    write_record(space, path, FORMAT)
+
+
+def read_state_space(path: Path) -> StateSpace:
+    """The linear system of a file that :func:`write_state_space` wrote.
+
+    Raises
+    ------
+    OutputError
+        It is not such a file.
+    """
+    return read_record(path, StateSpace, FORMAT, "a state space")
