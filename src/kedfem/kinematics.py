@@ -27,6 +27,7 @@ from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
+from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
@@ -134,7 +135,10 @@ def _stepped(
     """All time points to the results file, frames to the animation."""
     recorded, forces, links = what
     channels = [channel for channel, _ in recorded.every] + [each.channel for each in forces.every]
-    wanted, frames = set(frame_steps(scene).tolist()), AnimationWriter(folder, STEM)
+    wanted, frames = (
+        set(frame_steps(scene).tolist()),
+        AnimationWriter(folder, STEM, drive_heading(drive_channel(scene))),
+    )
     seen = sights(scene, linked, links)
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(
@@ -146,7 +150,11 @@ def _stepped(
             rows = recorded.rows(motion) | forces.rows(motion, first)
             writer.append(motion.t, motion.phi, rows)
             for k in sorted(wanted & set(range(first, first + len(motion.t)))):
-                frames.add(float(motion.t[k - first]), rigid_fields(seen, motion, k - first))
+                frames.add(
+                    float(motion.t[k - first]),
+                    rigid_fields(seen, motion, k - first),
+                    float(motion.phi[k - first]),
+                )
 
 
 def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:

@@ -177,9 +177,12 @@ def _written(
         )
     else:
         deck.unlink(missing_ok=True)  # of an earlier mesh
-    for number, case in enumerate(cases):
-        write_case(target / f"{link.name}_{number:04d}.vtu", link, case)
-    write_collection(target, link.name, [case.time for case in cases])
+    files = [f"{link.name}_{number:04d}.vtu" for number in range(len(cases))]
+    for name, case in zip(files, cases, strict=True):
+        write_case(target / name, link, case)
+    write_collection(
+        target, link.name, [(x.time, link.name, name) for x, name in zip(cases, files, strict=True)]
+    )
     write_resultants(target / f"{link.name}.csv", link.X, cases, about, drive)
     warnings = [*_elements(link), *_balance(link.name, cases, left), *_differing(scene, link, cases)]
     counts = link.n, len(link.cells)

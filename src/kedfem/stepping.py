@@ -13,8 +13,8 @@ from kedfem.accuracy.estimates import Seen, watcher
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import Model, segments, ways
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import segments, ways
 from kedfem.dynamics.stepping.levels import leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Marks
@@ -23,6 +23,7 @@ from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived
 from kedfem.output.frames import link_fields
+from kedfem.output.joint_frames import joint_field
 from kedfem.output.vtkhdf import AnimationFile
 from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Channel, ResultsWriter
@@ -84,23 +85,21 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     keeper : of states on the disk, if the run can be resumed; it may have one to go on from
     """
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
-    wanted = set(frame_steps(scene).tolist())
-    frames = AnimationWriter(folder, STEM)
-    one = AnimationFile(folder / ONE_FILE, drive_heading(drive_channel(scene))) if _one_file(scene) else None
+    shown = _Frames.of(ready, watched.recoveries, folder)
     envelope = Envelope(model, watched.recoveries, watched.stresses_since, watched.kept_since)
     seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
     marks = Marks.of(len(solvers), keeper is not None)
     memories = {
-        "marks": marks, "frames": frames, "envelope": envelope, "seen": seen, "errors": errors,
+        "marks": marks, "frames": shown.frames, "envelope": envelope, "seen": seen, "errors": errors,
         "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
     }  # fmt: skip
-    memories |= {"one file": one} if one else {}
+    memories |= {"one file": shown.one} if shown.one else {}
     if keeper is not None:
         keeper.prepared(ready)
         keeper.put_back(memories)
-        refuse_without(frames, one)
+        refuse_without(shown.frames, shown.one)
     for each in solvers:
         if not isinstance(each, LiteralSteps):
             each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
@@ -122,11 +121,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
                 watched.passes.add(block)
                 seen.add(block)
                 errors.add(block, values)
-                for k in range(len(block)):
-                    if block.step + k in wanted:
-                        now = block.at(k)
-                        frames.add(now.t, fields(scene, model, watched.recoveries, now))
-                        _append(one, model, watched.recoveries, now)
+                shown.add(block, values)
                 watch("steps", block.step + len(block) - 1, steps)
                 if keeper is not None and keeper.due(envelope.waits):
                     table.flush()
@@ -152,14 +147,39 @@ def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping
     return notes | modelled(ready.scene, ready.linkage, model)
 
 
-def _one_file(scene: Scene) -> bool:
-    return scene.output.animation is not None and scene.output.animation.vtkhdf
+@dataclass
+class _Frames:
+    """The animation: a list of files, and one file if that is wanted.
 
+    wanted : steps that are frames
+    """
 
-def _append(one: AnimationFile | None, model: Model, recoveries: list[StressRecovery], now: Snapshot) -> None:
-    """A frame for the animation in one file, if there is to be one."""
-    if one is not None:
-        one.add(now.t, now.phi, link_fields(model, recoveries, now, 0.0, world=True))
+    ready: Prepared
+    recoveries: list[StressRecovery]
+    frames: AnimationWriter
+    one: AnimationFile | None
+    wanted: set[int]
+
+    @classmethod
+    def of(cls, ready: Prepared, recoveries: list[StressRecovery], folder: FilePath) -> "_Frames":
+        """Of a scene, before its first step."""
+        scene = ready.scene
+        named, animation = drive_heading(drive_channel(scene)), scene.output.animation
+        one = AnimationFile(folder / ONE_FILE, named) if animation is not None and animation.vtkhdf else None
+        frames = AnimationWriter(folder, STEM, named if scene.driven else "")
+        return cls(ready, recoveries, frames, one, set(frame_steps(scene).tolist()))
+
+    def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
+        """The frames among the time points of a block, with what joints exert."""
+        scene, model = self.ready.scene, self.ready.model
+        for k in (k for k in range(len(block)) if block.step + k in self.wanted):
+            now = block.at(k)
+            joints = joint_field(scene, self.ready.linkage, block.motion, values, k)
+            exerted = [joints] if joints else []
+            self.frames.add(now.t, [*fields(scene, model, self.recoveries, now), *exerted], now.phi)
+            if self.one is not None:
+                drawn = link_fields(model, self.recoveries, now, 0.0)
+                self.one.add(now.t, now.phi, [*drawn, *exerted])
 
 
 def refuse_without(*writers: AnimationWriter | AnimationFile | None) -> None:

@@ -32,8 +32,10 @@ from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.period import over_one_period
 from kedfem.motion.rigid import rigid_motion
+from kedfem.output.array_names import DISPLACEMENT, VON_MISES
 from kedfem.results import read_results
 from kedfem.scene import path_parameter, scene_from
+from tests.frames import frames
 from tests.moving import inverted
 from tests.partners import chain
 from tests.scenes import bar, constant_speed, example, four_bar
@@ -382,7 +384,6 @@ def test_the_vibration_that_grows_whirls_with_the_shaft(tmp_path: Path) -> None:
     δ = R y e^{σ t}, σ = ln μ / T. Its stress at the clamped end is that of a cantilever's first mode,
     3.516 E δ / L² times the distance from the axis of bending: that of the farther side at least, of a corner at most.
     """
-    import pyvista as pv
 
     speed, growth, axis = 230.0, 1.769, "oblique"
     raw = spun(axis, speed, (0.012, 0.01))
@@ -395,17 +396,16 @@ def test_the_vibration_that_grows_whirls_with_the_shaft(tmp_path: Path) -> None:
     assert "of link 'shaft'" in run.steady.vibration
     assert run.steady.vibration in run.results.reason
     assert (tmp_path / "out" / "growing.png").stat().st_size > 1000
-    frames_of = sorted((tmp_path / "out").glob("growing_*.vtu"))
-    first, last = (pv.read(x) for x in (frames_of[0], frames_of[-1]))
-    sizes = [np.linalg.norm(x["displacement"], axis=1).max() for x in (first, last)]
+    first, *_, last = frames(tmp_path / "out", "growing")
+    sizes = [np.linalg.norm(x[DISPLACEMENT], axis=1).max() for x in (first, last)]
     assert_allclose(sizes[1], 1e-3, rtol=1e-6)
     span = 1 - 1 / 360  # of the period, from the first step to the last
     assert_allclose(sizes[1] / sizes[0], run.steady.growth**span, rtol=1e-2)
     assert_allclose(run.steady.growth, growth, rtol=1e-2)
-    tip = last["displacement"][np.linalg.norm(last["displacement"], axis=1).argmax()]
+    tip = last[DISPLACEMENT][np.linalg.norm(last[DISPLACEMENT], axis=1).argmax()]
     assert abs(tip @ way) < 0.03 * np.linalg.norm(tip)  # at a corner that turns with the section
     bending = 3.516 * 2.1e11 * 1e-3 / 0.5**2
-    assert 0.98 * 0.005 * bending < last["von_mises"].max() < 1.02 * np.hypot(0.005, 0.006) * bending
+    assert 0.98 * 0.005 * bending < last[VON_MISES].max() < 1.02 * np.hypot(0.005, 0.006) * bending
 
 
 def refused(raw: Raw, **analysis: Any) -> str:

@@ -171,7 +171,7 @@ def unequal(ground: Ground, folder: Path, whole: bool = True) -> str:
 
 def torn(folder: Path) -> str:
     """A frame that is listed and not whole."""
-    for path in (folder / "scene-results").glob("*.vtu"):
+    for path in (folder / "scene-results").rglob("*.vtu"):
         if not PART.fullmatch(path.name) and not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
             return f"{path.name} is not whole"
     return ""

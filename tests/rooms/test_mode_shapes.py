@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose
 
 from kedfem.errors import SceneError
 from kedfem.frequencies import Wanted, frequencies, link_of_scene, part_frequencies
+from kedfem.output.array_names import DISPLACEMENT, VON_MISES
 from kedfem.output.shapes import AMPLITUDE, FRAMES
 from kedfem.scene import scene_from
+from tests.frames import frames
 from tests.scenes import example
 
 ROOT = 4.730040744862704  # cosh x cos x = 1: the first root of a free-free beam
@@ -37,23 +39,23 @@ def free_curvature(x: np.ndarray) -> np.ndarray:
 
 def test_the_shape_of_a_free_beam_and_its_stress(tmp_path: Path) -> None:
     """w and E h/2 w'' for an amplitude of 1 mm; a slender beam, so that shear is little: 0.5 %."""
-    import pyvista
 
     scene = scene_from(beams(), tmp_path)
     found = part_frequencies(link_of_scene(scene, "coupler"), 2, tmp_path / "here", shapes=1)
-    first = pyvista.read(tmp_path / "here" / "shape_1_0000.vtu")
+    cycle = frames(tmp_path / "here", "shape_1")
+    first = cycle[0]
     length, h, E = 0.9144, 0.0254, 7.031e10
-    moved = first.point_data["displacement"]
-    rest = np.asarray(pyvista.read(tmp_path / "here" / f"shape_1_{FRAMES // 4:04}.vtu").points)
+    moved = first.point_data[DISPLACEMENT]
+    rest = np.asarray(cycle[FRAMES // 4].points)
     x = np.linalg.norm(rest - rest[0], axis=1) / length
     size = np.linalg.norm(moved, axis=1)
     assert_allclose(size.max(), AMPLITUDE, rtol=1e-9)
     assert_allclose(size, AMPLITUDE * np.abs(free_beam(x)), atol=5e-3 * AMPLITUDE)
     bending = E * h / 2 * AMPLITUDE / length**2 * np.abs(free_curvature(x))
     middle = np.abs(x - 0.5).argmin()
-    assert_allclose(first.point_data["von_mises"][middle], bending[middle], rtol=0.02)
-    half = pyvista.read(tmp_path / "here" / f"shape_1_{FRAMES // 2:04}.vtu")
-    assert_allclose(half.point_data["displacement"], -moved, atol=1e-9 * AMPLITUDE)
+    assert_allclose(first.point_data[VON_MISES][middle], bending[middle], rtol=0.02)
+    half = cycle[FRAMES // 2]
+    assert_allclose(half.point_data[DISPLACEMENT], -moved, atol=1e-9 * AMPLITUDE)
     listed = (tmp_path / "here" / "shape_1.pvd").read_text()
     assert f'timestep="{(FRAMES - 1) / FRAMES / found.values[0]:.6g}'[:16] in listed
     assert not (tmp_path / "here" / "shape_2.pvd").exists()
@@ -63,7 +65,6 @@ def test_the_shape_of_a_free_beam_and_its_stress(tmp_path: Path) -> None:
 def test_shapes_of_a_linkage_are_those_of_its_softest_position_and_replace_earlier_ones(
     tmp_path: Path,
 ) -> None:
-    import pyvista
     from PIL import Image
 
     scene = scene_from(beams(2), tmp_path)
@@ -72,12 +73,12 @@ def test_shapes_of_a_linkage_are_those_of_its_softest_position_and_replace_earli
     again = frequencies(scene, Wanted(modes=3, positions=4, shapes=1), tmp_path / "here")
     assert_allclose(again.values, done.values)
     assert {path.name for path in (tmp_path / "here").glob("shape_*.p*")} == {"shape_1.pvd", "shape_1.png"}
-    assert len(list((tmp_path / "here").glob("shape_*.vtu"))) == FRAMES
+    assert len(frames(tmp_path / "here", "shape_1")) == FRAMES
     with Image.open(tmp_path / "here" / "shape_1.png") as image:
         assert min(image.size) >= 700
     # joints hold links together in the shape too: no gap between crank and coupler
-    frame = pyvista.read(tmp_path / "here" / "shape_1_0000.vtu")
-    points, moved = np.asarray(frame.points), frame.point_data["displacement"]
+    frame = frames(tmp_path / "here", "shape_1")[0]
+    points, moved = np.asarray(frame.points), frame.point_data[DISPLACEMENT]
     near = np.linalg.norm(moved[:, None] - moved[None], axis=2) < 1e-9 * AMPLITUDE
     touching = (np.linalg.norm(points[:, None] - points[None], axis=2) < 1e-9) & ~np.eye(
         len(points), dtype=bool

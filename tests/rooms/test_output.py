@@ -13,6 +13,7 @@ import pytest
 
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
+from kedfem.output.array_names import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES
 from kedfem.output.bars import THINNEST, bars, heights, shape_functions
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
@@ -23,7 +24,15 @@ from kedfem.output.plots.groups import pictures
 from kedfem.output.plots.overview import shown
 from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
-from kedfem.output.vtu import SECTION, AnimationWriter, LinkField, remove_animation
+from kedfem.output.vtu import (
+    SECTION,
+    AnimationWriter,
+    JointField,
+    LinkField,
+    read_collection,
+    remove_animation,
+    write_frame,
+)
 from kedfem.results import Channel, Results
 from tests.moving import ran
 from tests.spatial_joints import P, pushed
@@ -42,7 +51,8 @@ def filled(name: str, cell_type: str, cells: np.ndarray, points: np.ndarray) -> 
     """A link with numbers that tell node and component."""
     node = np.arange(len(points), dtype=float)
     stress = 1e6 * (node[:, None] + np.arange(6) / 10)
-    return LinkField(name, cell_type, cells, points, 1e-3 * (points + 1), stress, 1e6 * (node + 1))
+    principal = 1e6 * np.c_[node - 1, node + 2]
+    return LinkField(name, cell_type, cells, points, 1e-3 * (points + 1), stress, 1e6 * (node + 1), principal)
 
 
 def warped() -> LinkField:
@@ -77,17 +87,23 @@ def links() -> list[LinkField]:
     return [warped(), brick(), bent(), arch(), rod()]
 
 
+def drawn(folder: Path, fields: list[LinkField]) -> Path:
+    write_frame(folder / "frame.vtu", 0.0, fields)
+    return folder / "frame.vtu"
+
+
 def frame_times(pvd: Path) -> list[tuple[float, str]]:
     return [(float(d.get("timestep", "")), d.get("file", "")) for d in ET.parse(pvd).iter("DataSet")]
 
 
 def test_meshio_reads_what_was_written(tmp_path: Path) -> None:
     written = links()
-    mesh = meshio.read(AnimationWriter(tmp_path, "run").add(0.125, written))
-    for name in ("points", "displacement", "stress", "von_mises"):
-        expected = np.concatenate([getattr(link, name) for link in written])
-        found = mesh.points if name == "points" else mesh.point_data[name]
-        np.testing.assert_array_equal(found, expected)
+    write_frame(tmp_path / "frame.vtu", 0.125, written)
+    mesh = meshio.read(tmp_path / "frame.vtu")
+    np.testing.assert_array_equal(mesh.points, np.concatenate([link.points for link in written]))
+    for name in (DISPLACEMENT, STRESS, VON_MISES, LARGEST, SMALLEST):
+        expected = np.concatenate([link.arrays()[name] for link in written])
+        np.testing.assert_array_equal(mesh.point_data[name], expected)
     first = 0
     for index, (link, block) in enumerate(zip(written, mesh.cells, strict=True)):
         assert block.type == link.cell_type
@@ -102,13 +118,12 @@ def test_vtk_reads_what_was_written(tmp_path: Path) -> None:
     import pyvista
 
     written = links()
-    grid = pyvista.read(AnimationWriter(tmp_path, "run").add(0.125, written))
+    write_frame(tmp_path / "frame.vtu", 0.125, written)
+    grid = pyvista.read(tmp_path / "frame.vtu")
     assert grid.celltypes.tolist() == [29, 12, 25, 21, 21, 3]  # VTK: hexahedra of 27, 8 and 20 nodes, lines
-    np.testing.assert_array_equal(
-        grid.point_data["stress"], np.concatenate([link.stress for link in written])
-    )
+    np.testing.assert_array_equal(grid.point_data[STRESS], np.concatenate([link.stress for link in written]))
     np.testing.assert_array_equal(grid.cell_data["link"], [0, 1, 2, 3, 3, 4])
-    names = [grid.GetPointData().GetArray("stress").GetComponentName(i) for i in range(6)]
+    names = [grid.GetPointData().GetArray(STRESS).GetComponentName(i) for i in range(6)]
     assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]  # ParaView's names of our xx, yy, zz, xy, yz, zx
     assert grid.field_data["TimeValue"] == [0.125]
 
@@ -118,7 +133,7 @@ def test_vtk_takes_quadratic_hexahedra_in_our_order(tmp_path: Path, link: LinkFi
     """The volume by VTK's own shape functions is the exact one, and so is det J at every Gauss point."""
     import pyvista
 
-    cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [link])).GetCell(0)
+    cell = pyvista.read(AnimationWriter(tmp_path, "run").add(0.0, [link])[0]).GetCell(0)
     count = link.cells.shape[1]
     points = np.array([cell.GetPoints().GetPoint(i) for i in range(count)])
     nodes, weights = np.polynomial.legendre.leggauss(3)  # exact for det J, of degree 5 in each coordinate
@@ -139,8 +154,9 @@ def test_the_list_names_whole_frames_in_order_after_each(tmp_path: Path) -> None
         animation.add(time, [rod()])
         listed = frame_times(tmp_path / "run.pvd")
         assert len(listed) == count
-        assert listed[-1] == (time, f"run_{count - 1:04d}.vtu")
-        assert {p.name for p in tmp_path.iterdir()} == {"run.pvd", *(name for _, name in listed)}
+        assert listed[-1] == (time, f"run/rod_{count - 1:04d}.vtu")
+        files = {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+        assert files == {"run.pvd", *(name for _, name in listed)}
 
 
 def test_vtk_reads_the_list(tmp_path: Path) -> None:
@@ -154,40 +170,72 @@ def test_vtk_reads_the_list(tmp_path: Path) -> None:
     assert reader.read()[0].n_cells == 1
 
 
+def test_each_link_is_a_block_with_its_name_and_the_drive_is_known(tmp_path: Path) -> None:
+    """Names that files cannot have, or that differ in capitals alone, keep files of their own."""
+    import pyvista
+
+    named = [replace(rod(), name=name) for name in ("a/b", "a&b", "A_B")]
+    joints = JointField(("J", "K"), np.eye(3)[:2], {"force [N]": np.eye(3)[1:]})
+    animation = AnimationWriter(tmp_path, "run", "drive angle [rad]")
+    for k in range(2):
+        animation.add(0.1 * k, [*named, joints], 0.5 * k)
+    found = [
+        (x.get("timestep"), x.get("part"), x.get("name"), x.get("file"))
+        for x in ET.parse(tmp_path / "run.pvd").iter("DataSet")
+    ]
+    files = ["run/a_b_0001.vtu", "run/a_b1_0001.vtu", "run/A_B2_0001.vtu", "run/joints_0001.vtu"]
+    assert found[4:] == [
+        ("0.1", str(k), name, file)
+        for k, (name, file) in enumerate(zip(["a/b", "a&b", "A_B", "joints"], files, strict=True))
+    ]
+    for k, path in enumerate(files):
+        grid = pyvista.read(tmp_path / path)
+        assert grid.field_data["drive angle [rad]"] == [0.5]
+        assert set(grid.cell_data["link"]) == {k}
+    assert grid.field_data["joint K"] == [1]
+    np.testing.assert_array_equal(grid.point_data["force [N]"], np.eye(3)[1:])
+    assert read_collection(tmp_path / "run.pvd")[1] == (0.1, [(tmp_path / x).resolve() for x in files])
+
+
 def test_frames_of_an_earlier_run_go_and_nothing_else(tmp_path: Path) -> None:
     old = AnimationWriter(tmp_path, "run")
     for time in range(3):
         old.add(time, [rod()])
-    others = ["run_2_0000.vtu", "other_0001.vtu", "run_mesh.vtu", "run_0001.vtu.bak", "run.h5"]
+    others = ["run_2/rod_0000.vtu", "run/rod_0001.vtu.bak", "run/mesh.vtu", "run.h5"]
     for name in others:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
+
+    def files() -> set[str]:
+        return {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+
     new = AnimationWriter(tmp_path, "run")
     assert len(frame_times(tmp_path / "run.pvd")) == 3  # nothing is lost before the first frame
     new.add(7.0, [arch()])
-    assert frame_times(tmp_path / "run.pvd") == [(7.0, "run_0000.vtu")]
-    assert {p.name for p in tmp_path.iterdir()} == {"run_0000.vtu", "run.pvd", *others}
+    assert frame_times(tmp_path / "run.pvd") == [(7.0, "run/arch___co_0000.vtu")]
+    assert files() == {"run/arch___co_0000.vtu", "run.pvd", *others}
     remove_animation(tmp_path, "run")
-    assert {p.name for p in tmp_path.iterdir()} == set(others)
+    assert files() == set(others)
 
 
 def test_a_failing_frame_leaves_the_list_as_it_was(tmp_path: Path) -> None:
     animation = AnimationWriter(tmp_path, "run")
     animation.add(0.0, [rod()])
-    (tmp_path / "run_0001.vtu").mkdir()
+    (tmp_path / "run" / "rod_0001.vtu").mkdir()
     with pytest.raises(
-        OutputError, match=r"run_0001\.vtu: must be a file that can be written, got Is a directory"
+        OutputError, match=r"rod_0001\.vtu: must be a file that can be written, got Is a directory"
     ):
         animation.add(1.0, [rod()])
-    assert frame_times(tmp_path / "run.pvd") == [(0.0, "run_0000.vtu")]
+    assert frame_times(tmp_path / "run.pvd") == [(0.0, "run/rod_0000.vtu")]
     with pytest.raises(
-        OutputError, match=r"free of the frames of an earlier run, got run_0001\.vtu that cannot be"
+        OutputError, match=r"free of the frames of an earlier run, got rod_0001\.vtu that cannot be"
     ):
         remove_animation(tmp_path, "run")
 
 
 @pytest.mark.parametrize("kind", ["animation", "plots", "picture"])
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path, kind: str) -> None:
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
+    (vtu,) = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
     (tmp_path / "taken").touch()
     folder = tmp_path / "taken"
     writers = {
@@ -367,7 +415,7 @@ def test_prefixes(peak: float, unit: str, expected: tuple[float, str]) -> None:
 
 
 def test_a_picture_of_all_kinds_of_links(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, links())
+    vtu = drawn(tmp_path, links())
     title = (
         "Worst frame: σ = 27 MPa at 60°, " + "with a title that is much longer than the picture is wide " * 5
     )
@@ -376,11 +424,11 @@ def test_a_picture_of_all_kinds_of_links(tmp_path: Path, capfd: pytest.CaptureFi
     colours = pixels(tmp_path / "picture.png")
     assert (np.ptp(colours, axis=2) > 60).mean() > 0.01  # stresses are coloured
     assert capfd.readouterr() == ("", "")  # VTK keeps off the terminal
-    assert {p.name for p in tmp_path.iterdir()} == {"run_0000.vtu", "run.pvd", "picture.png"}
+    assert {p.name for p in tmp_path.iterdir()} == {"frame.vtu", "picture.png"}
 
 
 def test_the_colour_bar_is_that_of_the_links(tmp_path: Path) -> None:
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [warped()])  # its edges are drawn last, without colours
+    vtu = drawn(tmp_path, [warped()])  # its edges are drawn last, without colours
     write_picture(vtu, tmp_path / "picture.png", "one link")
     bar = pixels(tmp_path / "picture.png")[:, -200:].reshape(-1, 3)  # right of the links
     for end in ((48, 18, 59), (122, 4, 3)):  # of the colour map "turbo" (Mikhailov 2019)
@@ -388,7 +436,7 @@ def test_the_colour_bar_is_that_of_the_links(tmp_path: Path) -> None:
 
 
 def test_a_picture_without_stress_is_drawn(tmp_path: Path) -> None:
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [replace(rod(), von_mises=np.zeros(2))])
+    vtu = drawn(tmp_path, [replace(rod(), von_mises=np.zeros(2))])
     write_picture(vtu, tmp_path / "picture.png", "unloaded")
     assert_shows_something(tmp_path / "picture.png")
 
@@ -480,7 +528,7 @@ def test_the_highest_stress_is_cut_free_where_no_side_shows_it(tmp_path: Path) -
     below = replace(warped(), von_mises=np.where(np.arange(27) == 0, 1e6, 1e5))
     found = []
     for link in (inside, below):
-        vtu = AnimationWriter(tmp_path, "run").add(0.0, [link])
+        vtu = drawn(tmp_path, [link])
         found.append(view(pyvista.read(vtu), np.zeros(3)))
         write_picture(vtu, tmp_path / "picture.png", "one link")
         red, green, blue = pixels(tmp_path / "picture.png")[:, :-260].reshape(-1, 3).T.astype(int)
@@ -505,7 +553,7 @@ def test_a_corrupt_frame(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the crash")
 def test_a_machine_where_vtk_crashes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
+    (vtu,) = AnimationWriter(tmp_path, "run").add(0.0, [rod()])
     crash = tmp_path / "crash"
     crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
     crash.chmod(0o700)
@@ -531,7 +579,7 @@ def test_what_the_table_calls_nothing_is_not_drawn(tmp_path: Path) -> None:
 def test_gravity_points_down_the_page_unless_it_is_looked_along() -> None:
     grid = SimpleNamespace(
         points=np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0.05]]), length=1.4, celltypes=np.array([3]),
-        point_data={"von_mises": np.zeros(3)}, extract_cells=lambda kept: SimpleNamespace(n_cells=0),
+        point_data={VON_MISES: np.zeros(3)}, extract_cells=lambda kept: SimpleNamespace(n_cells=0),
         cell_data={},
     )  # fmt: skip
     for gravity, up in (((0, 0, 0), (0, 1, 0)), ((-9.8, 0, 0), (1, 0, 0)), ((0, 0, -9.8), (0, 1, 0))):

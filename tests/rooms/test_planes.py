@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,11 +17,13 @@ from kedfem.links.build import bare_links
 from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
+from kedfem.output.array_names import DISPLACEMENT, STRESS, VON_MISES
 from kedfem.output.picture import write_picture
 from kedfem.output.rendering import lifted
-from kedfem.output.vtu import AnimationWriter, LinkField
+from kedfem.output.vtu import LinkField, write_frame
 from kedfem.scene import LinkScene, scene_from
 from kedfem.tables import check_tables
+from tests.frames import frames
 from tests.runs import quick
 
 from .test_dynamics import four_bar, run, slider_crank
@@ -344,11 +345,11 @@ def test_a_run_writes_quadrilaterals_and_the_check_names_them(tmp_path: Path) ->
     scene = scene_from(quick(raw))
     done = analyse(scene)
     assert done.peak is not None
-    mesh = meshio.read(sorted(tmp_path.glob("animation_*.vtu"))[-1])
-    assert {block.type for block in mesh.cells} == {"quad9"}
-    assert not mesh.point_data["displacement"][:, 2].any()
-    assert not mesh.point_data["stress"][:, [2, 4, 5]].any()
-    assert mesh.point_data["von_mises"].max() > 0
+    mesh = frames(tmp_path)[-1]
+    assert set(mesh.celltypes) == {28}  # of 9 nodes
+    assert not mesh.point_data[DISPLACEMENT][:, 2].any()
+    assert not mesh.point_data[STRESS][:, [2, 4, 5]].any()
+    assert mesh.point_data[VON_MISES].max() > 0
     assert (tmp_path / "worst.png").stat().st_size > 10_000
     ready = meshed(scene)
     columns = check_tables(ready, None, None)[0].columns
@@ -365,8 +366,11 @@ def test_vtk_takes_9_nodes_in_our_order(tmp_path: Path) -> None:
 
     flat, _ = both("extrusion")
     stress = np.zeros((len(flat.points), 6))
-    field = LinkField("u", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0])
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [field])
+    field = LinkField(
+        "u", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2]
+    )
+    vtu = tmp_path / "frame.vtu"
+    write_frame(vtu, 0.0, [field])
     grid = pyvista.read(vtu)
     assert set(grid.celltypes) == {28}  # VTK_BIQUADRATIC_QUAD
     surface = grid.extract_surface(nonlinear_subdivision=4, algorithm="dataset_surface")
@@ -381,8 +385,11 @@ def test_plane_links_in_one_plane_are_drawn_one_above_the_other(tmp_path: Path) 
 
     flat, _ = both("bar")
     stress = np.zeros((len(flat.points), 6))
-    one = LinkField("one", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0])
-    vtu = AnimationWriter(tmp_path, "run").add(0.0, [one, replace(one, name="two")])
+    one = LinkField(
+        "one", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2]
+    )
+    vtu = tmp_path / "frame.vtu"
+    write_frame(vtu, 0.0, [one, replace(one, name="two")])
     grid = pyvista.read(vtu)
     z = lifted(grid).points[:, 2].reshape(2, -1)
     assert_allclose(z[0], 0, atol=1e-15)

@@ -20,6 +20,7 @@ from kedfem.analysis import analyse
 from kedfem.cli.reporting import _written
 from kedfem.errors import OutputError, SceneError
 from kedfem.kinematics import kinematics
+from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import bars, heights
 from kedfem.output.words import with_prefix
 from kedfem.report import animated as over_frames
@@ -31,6 +32,7 @@ from kedfem.report.surfaces import placement
 from kedfem.results import read_results
 from kedfem.scene import scene_from
 from tests.browser import Browser, needs_browser
+from tests.frames import frames
 from tests.scenes import arm, bar, cycloidal, four_bar
 
 SCALE = 50.0
@@ -100,7 +102,7 @@ def test_points_on_a_line_stay_in_their_plane(angle: float) -> None:
 
 
 def frames_of(folder: Path) -> list[Any]:
-    return [pyvista.read(path) for path in sorted(folder.glob("animation_*.vtu"))]
+    return frames(folder)
 
 
 def shown(folder: Path) -> Animated:
@@ -118,7 +120,7 @@ def test_solids_are_drawn_where_frames_have_them(solid: Path) -> None:
     for points, stress, grid in zip(placed, surface.stress[1:], written, strict=True):
         distance, near = KDTree(grid.points).query(points)
         assert distance.max() < 1e-9
-        assert_allclose(stress, grid.point_data["von_mises"][near], rtol=1e-9)
+        assert_allclose(stress, grid.point_data[VON_MISES][near], rtol=1e-9)
     envelope = pyvista.read(solid / "envelope.vtu")
     distance, near = KDTree(envelope.points).query(drawn)
     assert distance.max() < 1e-12
@@ -134,7 +136,7 @@ def test_beams_are_drawn_with_their_sections_where_frames_have_them(lines: Path)
     found, written = shown(lines), frames_of(lines)
     assert {each.name for each in found.surfaces} == {"crank", "coupler", "rocker"}
     for k, grid in enumerate(written):
-        grid.point_data["MPa"] = grid.point_data["von_mises"]
+        grid.point_data["MPa"] = grid.point_data[VON_MISES]
         for surface in found.surfaces:
             cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[f"link {surface.name}"][0]))
             part = grid.extract_cells(cells)
@@ -279,13 +281,13 @@ def test_damaged_frames_are_told_in_words_alone(
 ) -> None:
     """Cut off, or with other bytes in the middle; the rest of the page is there, VTK says nothing."""
     folder = Path(shutil.copytree(solid, tmp_path / "r"))
-    frame = folder / "animation_0002.vtu"
+    frame = folder / "animation" / "arm_0002.vtu"
     whole = frame.read_bytes()
     cut = int(part * len(whole))
     for content in (whole[:cut], whole[:cut] + b"%&/()" * 20 + whole[cut + 100 :]):
         frame.write_bytes(content)
         done = write_report(folder)
-        assert all("animation_0002.vtu: must be a file of kedfem's" in text for text in done.warnings)
+        assert all("arm_0002.vtu: must be a file of kedfem's" in text for text in done.warnings)
         assert done.warnings or len(content) == len(whole)
         assert "Highest stress of each link" in page(folder)
     assert capfd.readouterr() == ("", "")

@@ -185,8 +185,8 @@ def test_a_run_tells_segments_and_draws_links(tmp_path: Path) -> None:
     assert done.budget is not None
     assert done.budget.of("frames") is None
     assert done.results.notes["error together, joint forces"] == done.budget.together["joint forces"]
-    text = (tmp_path / "out" / "animation_0001.vtu").read_text(encoding="utf-8", errors="replace")
-    assert text.count('Name="link coupler"') == 1
+    text = (tmp_path / "out" / "animation.pvd").read_text(encoding="utf-8")
+    assert text.count('name="coupler" file="animation/coupler_0001.vtu"') == 1
 
 
 def test_segments_are_drawn_as_one_link_that_holds_together() -> None:

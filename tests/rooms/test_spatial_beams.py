@@ -367,4 +367,4 @@ def test_a_spatial_linkage_is_run_recorded_and_drawn(tmp_path: Path) -> None:
     assert done.peak.stress > side[:, -1].max() > 0
     frame = meshio.read(done.worst)
     assert {block.type for block in frame.cells} == {"hexahedron"}
-    assert np.isfinite(frame.point_data["von_mises"]).all()
+    assert np.isfinite(frame.point_data["von Mises [Pa]"]).all()

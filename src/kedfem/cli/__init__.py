@@ -387,6 +387,7 @@ def _say_where(folder: Path) -> None:
         ("results.csv", "the same as a table"),
         ("results.parquet", "the same for pandas"),
         ("animation.pvd", "animation, open in ParaView"),
+        ("paraview.py", "state for ParaView that opens all of it"),
         ("animation.vtkhdf", "the same in one file"),
         ("plots", "plots"),
         ("envelope.vtu", "highest stresses over all steps, for ParaView"),

@@ -13,6 +13,7 @@ from kedfem.links.recovery import StressRecovery
 from kedfem.output.fatigue_files import FIELD, SPOTS
 from kedfem.output.fatigue_files import POINTS as DAMAGES
 from kedfem.output.frames import link_fields
+from kedfem.output.paraview import STATE, write_state
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.shapes import GROWING, write_growing
@@ -42,6 +43,7 @@ WHOLE = (
     FIELD,
     SPOTS,
     DAMAGES,
+    STATE,
 )
 """Files of a run that the next one replaces."""
 
@@ -94,7 +96,7 @@ def refuse_foreign(folder: Path) -> None:
     OutputError
     """
     file = folder / "results.h5"
-    names = [*WHOLE, f"{STEM}.pvd", f"{STEM}_0000.vtu"]
+    names = [*WHOLE, f"{STEM}.pvd"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]
     if found or foreign(file):
         wanted = f"output.folder: must be a folder of kedfem's results or one without {', '.join(found) or file.name}"
@@ -136,6 +138,8 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
         write_csv(results, folder / TABLE)
     if scene.output.parquet:
         write_parquet(results, folder / PARQUET)
+    if (folder / f"{STEM}.pvd").exists():
+        write_state(scene, results, peak, folder)
 
     def plots() -> None:
         if scene.output.plots:

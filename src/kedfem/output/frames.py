@@ -27,30 +27,24 @@ def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
 def _one(parts: Sequence[LinkField]) -> LinkField:
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     cells = np.concatenate([part.cells + n0 for part, n0 in zip(parts, first, strict=False)])
-    points, displacement, stress, von = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("points", "displacement", "stress", "von_mises")
-    )
-    return LinkField(
-        parts[0].name, parts[0].cell_type, cells, points, displacement, stress, von, parts[0].section
-    )
+    names = ("points", "displacement", "stress", "von_mises", "principal")
+    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return LinkField(parts[0].name, parts[0].cell_type, cells, **whole, section=parts[0].section)
 
 
 def link_fields(
-    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float,
-    world: bool = False,
-) -> list[LinkField]:  # fmt: skip
+    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float
+) -> list[LinkField]:
     """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
 
     Parameters
     ----------
     recoveries : per link, then per carried link
     deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
-    world : whether stresses are in the world's axes; then those of beams, known along their axis alone, are nan
     """
     motion, k = snapshot.motion, snapshot.k
     fields = [
-        link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale, world)
+        link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale)
         for link, body, recovery, state in zip(
             model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
         )
@@ -61,14 +55,15 @@ def link_fields(
         none = np.full((len(X), 6), np.nan)
         name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
         section = _section(carried.link)
-        fields.append(LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], section))
+        fields.append(
+            LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], none[:, :2], section)
+        )
     return _joined(fields) + _blocks(model, snapshot, deformation_scale)
 
 
 def link_field(
-    link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float,
-    world: bool = False,
-) -> LinkField:  # fmt: skip
+    link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float
+) -> LinkField:
     """One elastic link where its displacement takes it, which is exaggerated.
 
     Parameters
@@ -82,10 +77,21 @@ def link_field(
         stress = np.full_like(stress, np.nan)
     points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
     kind, cells = recovery.cell_type, recovery.cells
-    von = von_mises(stress)
-    if world:
-        stress = _in_world(shown, moment, stress)
-    return LinkField(link.name, kind, cells, points, displacement, stress, von, _section(link))
+    von, least_and_most = von_mises(stress), extreme_principal(stress)
+    stress = _in_world(shown, moment, stress)
+    return LinkField(
+        link.name, kind, cells, points, displacement, stress, von, least_and_most, _section(link)
+    )
+
+
+def extreme_principal(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 2"]:
+    """Smallest and largest principal stress; nan where stress is not known."""
+    xx, yy, zz, xy, yz, zx = stress.T
+    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
+    known = np.isfinite(stress).all(axis=1)
+    out = np.full((len(stress), 2), np.nan)
+    out[known] = np.linalg.eigvalsh(S[known])[:, [0, 2]]
+    return out
 
 
 def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 6"]:
@@ -122,5 +128,6 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
         points = place + size / 2 * HEX8 @ frame
         none = np.full((8, 6), np.nan)
         shift = np.tile(moved, (8, 1))
-        out.append(LinkField(slider.name, "hexahedron", np.arange(8)[None], points, shift, none, none[:, 0]))
+        cell = np.arange(8)[None]
+        out.append(LinkField(slider.name, "hexahedron", cell, points, shift, none, none[:, 0], none[:, :2]))
     return out

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import LINES, THINNEST, bars, heights
 from kedfem.processes import end_with_parent
 
@@ -75,7 +76,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     import pyvista
 
     grid: Any = pyvista.read(vtu)
-    grid.point_data["MPa"] = grid.point_data["von_mises"] / 1e6
+    grid.point_data["MPa"] = grid.point_data[VON_MISES] / 1e6
     shown = view(grid, np.array([float(x) for x in gravity or (0, 0, 0)]))
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
@@ -89,7 +90,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
 
 def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
     """Whether something is in front of the highest stress."""
-    stress = grid.point_data["von_mises"]
+    stress = grid.point_data[VON_MISES]
     if not np.isfinite(stress).any():
         return False
     solids = grid.extract_cells(~np.isin(grid.celltypes, list(LINES)))
@@ -137,7 +138,7 @@ def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
     """The view of a linkage, all of it in the picture; from another side where only so the highest stress is seen."""
     direction, upwards = sight(np.ptp(grid.points, axis=0))
     seen = next((each for each in sides(direction) if not hidden(grid, each)), None)
-    cut = grid.points[int(np.nanargmax(grid.point_data["von_mises"]))] if seen is None else None
+    cut = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))] if seen is None else None
     direction = direction if seen is None else seen
     across, up = picture_axes(direction, upwards, gravity)
     drawn = grid.points @ np.column_stack([across, up])

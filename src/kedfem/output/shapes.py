@@ -3,11 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from kedfem.output.picture import write_picture
-from kedfem.output.vtu import AnimationWriter, LinkField, remove_animation
+from kedfem.output.vtu import AnimationWriter, LinkField, remove_animation, write_frame
 
 FRAMES = 24  # over a cycle
 AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses are
@@ -57,7 +58,9 @@ def write_shapes(
             swing = float(np.cos(2 * np.pi * j / FRAMES))
             writer.add(j / FRAMES / shape.frequency, shape.fields(factor * swing, exaggeration))
         title = f"{shape.title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
-        write_picture(folder / f"{name}_0000.vtu", folder / f"{name}.png", title, exaggeration, gravity)
+        _write_picture(
+            shape.fields(factor, exaggeration), folder / f"{name}.png", title, exaggeration, gravity
+        )
 
 
 def write_growing(
@@ -87,7 +90,21 @@ def write_growing(
     for t, fields in frames:
         writer.add(t, fields(AMPLITUDE / (largest[k] or 1.0), exaggeration))
     whole = f"{title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
-    write_picture(folder / f"{GROWING}_{k:04d}.vtu", folder / f"{GROWING}.png", whole, exaggeration, gravity)
+    shown = frames[k][1](AMPLITUDE / (largest[k] or 1.0), exaggeration)
+    _write_picture(shown, folder / f"{GROWING}.png", whole, exaggeration, gravity)
+
+
+def _write_picture(
+    fields: Sequence[LinkField],
+    png: Path,
+    title: str,
+    exaggeration: float,
+    gravity: tuple[float, float, float],
+) -> None:
+    with TemporaryDirectory() as apart:
+        frame = Path(apart) / "frame.vtu"
+        write_frame(frame, 0.0, fields)
+        write_picture(frame, png, title, exaggeration, gravity)
 
 
 def _along(fields: Sequence[LinkField]) -> str:

@@ -9,23 +9,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.errors import OutputError
-from kedfem.output.vtu import LinkField
+from kedfem.output.vtu import JointField, LinkField
 from kedfem.results.files import ready_folder, reason, require_space
 
 VERSION = (2, 3)
 """Of the format: field data over time."""
 
+Blocks = Sequence[LinkField | JointField]
 TYPES = {
-    "line": 3, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25, "quad9": 28, "hexahedron27": 29,
+    "vertex": 1, "line": 3, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25, "quad9": 28,
+    "hexahedron27": 29,
 }  # fmt: skip
 """VTK's numbers of meshio's names."""
 
 SPARE = 1_000_000  # bytes for HDF5's own tables
-STRESS, VON_MISES, DISPLACEMENT = "stress [Pa]", "von Mises [Pa]", "displacement [m]"
-LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress [Pa]"
 
 
 class AnimationFile:
@@ -64,7 +63,7 @@ class AnimationFile:
             there = False
         return None if there else self.path
 
-    def add(self, time: float, angle: float, fields: Sequence[LinkField]) -> None:
+    def add(self, time: float, angle: float, fields: Blocks) -> None:
         """Append a frame.
 
         Parameters
@@ -72,7 +71,7 @@ class AnimationFile:
         time : [s]
         angle : of the drive [rad], or travel [m]
         fields
-            The links in this frame, not exaggerated: points are those of the rigid motion, stresses in the world's axes.
+            The links in this frame, not exaggerated: points are those of the rigid motion; what joints exert.
         """
         import h5py
 
@@ -121,35 +120,22 @@ def _in(group: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {f"{group}/{name}": x for name, x in arrays.items()}
 
 
-def _point_data(fields: Sequence[LinkField]) -> dict[str, np.ndarray]:
-    """What each node has in a frame, all links one after the other."""
-    stress = np.concatenate([field.stress for field in fields])
-    least, most = _principal(stress)
-    return {
-        name: x.astype(np.float32)
-        for name, x in {
-            DISPLACEMENT: np.concatenate([field.displacement for field in fields]),
-            VON_MISES: np.concatenate([field.von_mises for field in fields]),
-            STRESS: stress,
-            LARGEST: most,
-            SMALLEST: least,
-        }.items()
-    }
+def _point_data(fields: Blocks) -> dict[str, np.ndarray]:
+    """What each node has in a frame, all links one after the other; vectors that a block does not have are zero there."""
+    every = [field.arrays() for field in fields]
+    shapes = {name: x.shape[1:] for each in every for name, x in each.items()}
+    out = {}
+    for name, shape in shapes.items():
+        none = 0.0 if shape == (3,) else np.nan
+        parts = [
+            each.get(name, np.full((len(field.points), *shape), none))
+            for field, each in zip(fields, every, strict=True)
+        ]
+        out[name] = np.concatenate(parts).astype(np.float32)
+    return out
 
 
-def _principal(
-    stress: Float[np.ndarray, "p 6"],
-) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
-    """Smallest and largest principal stress; nan where stress is not known."""
-    xx, yy, zz, xy, yz, zx = stress.T
-    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
-    known = np.isfinite(stress).all(axis=1)
-    out = np.full((len(stress), 3), np.nan)
-    out[known] = np.linalg.eigvalsh(S[known])
-    return out[:, 0], out[:, 2]
-
-
-def _laid_out(file: Any, fields: Sequence[LinkField], arrays: dict[str, np.ndarray], drive: str) -> Any:
+def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: str) -> Any:
     """The file without frames: the mesh, and empty arrays that grow."""
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array(VERSION)
@@ -187,9 +173,10 @@ def _laid_out(file: Any, fields: Sequence[LinkField], arrays: dict[str, np.ndarr
     return root
 
 
-def _numbers(fields: Sequence[LinkField]) -> Iterator[tuple[str, int]]:
+def _numbers(fields: Blocks) -> Iterator[tuple[str, int]]:
     """Field data that tell which number of the cell data is which link; "/" would begin a group."""
-    return ((f"link {field.name}".replace("/", "_"), k) for k, field in enumerate(fields))
+    names = (field.name if isinstance(field, JointField) else f"link {field.name}" for field in fields)
+    return ((name.replace("/", "_"), k) for k, name in enumerate(names))
 
 
 def _growing(group: Any, name: str, kind: Any, shape: tuple[int, ...] = (), rows: int = 256) -> None:

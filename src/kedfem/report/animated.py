@@ -15,6 +15,7 @@ from kedfem.errors import OutputError
 from kedfem.output.derived import STEM, WORST
 from kedfem.output.rendering import view
 from kedfem.output.stress_files import ENVELOPE
+from kedfem.output.vtu import read_collection
 from kedfem.report.surfaces import Surface, sources_of
 
 FRAMES = 120
@@ -49,69 +50,67 @@ def animated(folder: Path, deformation_scale: float) -> Animated | None:
     OutputError
         A file is not one that kedfem wrote.
     """
-    files = _frames(folder)
-    count = min(len(files), FRAMES)
-    shown = [files[k] for k in np.linspace(0, len(files) - 1, count).round().astype(int)]
-    drawn = folder / ENVELOPE
-    pattern = shown[0] if shown else folder / WORST if (folder / WORST).exists() else drawn
-    if not pattern.exists():
+    listed = folder / f"{STEM}.pvd"
+    frames = read_collection(listed) if listed.exists() else []
+    count = min(len(frames), FRAMES)
+    shown = [frames[k] for k in np.linspace(0, len(frames) - 1, count).round().astype(int)]
+    drawn, worst = folder / ENVELOPE, folder / WORST
+    pattern = shown[0][1] if shown else [worst if worst.exists() else drawn]
+    if not pattern[0].exists():
         return None
     first = _read(pattern)
-    reference = _read(drawn) if drawn.exists() else None
+    reference = _read([drawn]) if drawn.exists() else None
     sources, thinned = sources_of(first, reference)
     times = []
-    for path in shown:
-        grid = _read(path)
+    for time, files in shown:
+        grid = _read(files)
         if grid.n_points != first.n_points:
             raise OutputError(
-                f"{path}: must have the mesh of {pattern.name}, got another one: run the scene again"
+                f"{files[0]}: must have the mesh of {pattern[0].name}, got another one: run the scene again"
             )
-        times.append(float(grid.field_data["TimeValue"][0]))
+        times.append(time)
         for source in sources:
             source.frame(grid, deformation_scale)
-    if len(shown) < len(files):
-        thinned += (f"{len(shown)} of {len(files)} frames are shown",)
+    if len(shown) < len(frames):
+        thinned += (f"{len(shown)} of {len(frames)} frames are shown",)
     if not sources:
         return None
-    worst = folder / WORST
-    eye = view(_read(worst), np.zeros(3)).direction if worst.exists() else None
+    eye = view(_read([worst]), np.zeros(3)).direction if worst.exists() else None
     return Animated(np.array(times), [source.surface for source in sources], eye, thinned)
 
 
-def _frames(folder: Path) -> list[Path]:
-    """Frames that the animation's list names, in its order."""
-    import xml.etree.ElementTree as ET
-
-    listed = folder / f"{STEM}.pvd"
-    if not listed.exists():
-        return []
-    try:
-        names = [each.attrib["file"] for each in ET.parse(listed).iter("DataSet")]
-    except (ET.ParseError, KeyError, OSError) as error:
-        raise OutputError(f"{listed}: must be a list of frames, got a damaged file") from error
-    return [path for path in (folder / Path(name).name for name in names) if path.exists()]
-
-
-def _read(path: Path) -> Any:
-    """A VTU file.
+def _read(paths: Sequence[Path]) -> Any:
+    """The links of one or several VTU files as one grid.
 
     Raises
     ------
     OutputError
-        It is not one of kedfem's, or damaged.
+        One is not kedfem's, or damaged.
     """
     import pyvista
 
-    wanted = f"{path}: must be a file of kedfem's"
-    with _quiet():
-        try:
-            grid = pyvista.read(path)
-            known = "link" in grid.cell_data and np.isfinite(grid.points).all()
-        except Exception as error:
-            raise OutputError(f"{wanted}, got one that cannot be read") from error
-    if not grid.n_points or not known:
-        raise OutputError(f"{wanted}, got one that is damaged or has no links")
-    return grid
+    grids = []
+    for path in paths:
+        wanted = f"{path}: must be a file of kedfem's"
+        with _quiet():
+            try:
+                grid = pyvista.read(path)
+                known = "link" in grid.cell_data and np.isfinite(grid.points).all()
+            except Exception as error:
+                raise OutputError(f"{wanted}, got one that cannot be read") from error
+        if not grid.n_points or not known:
+            raise OutputError(f"{wanted}, got one that is damaged or has no links")
+        if any(name.startswith("link ") for name in grid.field_data.keys()):  # noqa: SIM118
+            grids.append(grid)
+    if not grids:
+        raise OutputError(f"{paths[0]}: must be a file of kedfem's with links, got none")
+    if len(grids) == 1:
+        return grids[0]
+    whole = pyvista.merge(grids, merge_points=False)
+    for grid in grids:
+        for name in grid.field_data.keys():  # noqa: SIM118
+            whole.field_data[name] = grid.field_data[name]
+    return whole
 
 
 @contextmanager

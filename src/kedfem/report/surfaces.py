@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from kedfem.output.array_names import DISPLACEMENT, VON_MISES
 from kedfem.output.bars import LINES, THINNEST, heights, rims
 from kedfem.output.rendering import LIFT, QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
@@ -72,7 +73,7 @@ class _Source:
 
     def __init__(self, name: str, part: Any, ids: Int[np.ndarray, " m"], X: Places, lift: float) -> None:
         self.part, self.ids, self.X, self.lift = part, ids, X, lift
-        self.elastic = "displacement" in part.point_data
+        self.elastic = DISPLACEMENT in part.point_data
         self.beams = self.elastic and bool(np.isin(part.celltypes, list(LINES)).all())
         self.sizes = heights(part) if self.beams else np.zeros((0, 2))
         self.tube: Places | None = None
@@ -130,8 +131,8 @@ class _Source:
         x = np.asarray(grid.points)[self.ids]
         moved, stress = np.zeros_like(x), np.full(len(x), np.nan)
         if self.elastic:
-            moved = scale * np.asarray(grid.point_data["displacement"])[self.ids]
-            stress = np.asarray(grid.point_data["von_mises"])[self.ids]
+            moved = scale * np.asarray(grid.point_data[DISPLACEMENT])[self.ids]
+            stress = np.asarray(grid.point_data[VON_MISES])[self.ids]
         placed = placement(self.X, x - moved, flat=self.beams)
         self._add(self.X + moved @ placed.R, stress)
         self.surface.placements.append(placed)

@@ -1,0 +1,127 @@
+"""A state for ParaView that opens a run's files: a Python script, which File > Load State takes."""
+
+from pathlib import Path
+from string import Template
+
+import numpy as np
+
+from kedfem.output.array_names import DISPLACEMENT, DRIVE_FORCE, DRIVE_TORQUE, FORCE, JOINTS, VON_MISES
+from kedfem.output.stress_files import ENVELOPE, KINDS
+from kedfem.results import Peak, Results, replacing
+from kedfem.results.data_sets import drive_heading
+from kedfem.scene import Scene
+
+STATE = "paraview.py"
+ARROW = 0.2  # of the mechanism's size: the longest arrow
+TEXT = Template('''"""Opens the results beside this file in ParaView 5.11 or later.
+
+File > Load State, or paraview --script=$state
+"""
+
+import os
+
+import paraview
+from paraview.simple import *
+
+here = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else $folder
+LoadPalette("WhiteBackground")
+view = GetActiveViewOrCreate("RenderView")
+animation = PVDReader(registrationName="animation", FileName=os.path.join(here, "animation.pvd"))
+animation.UpdatePipeline()
+GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
+GetAnimationScene().GoToFirst()
+
+shown = Show(animation, view)
+ColorBy(shown, ("POINTS", "$stress"))
+colours = GetColorTransferFunction("$stress")
+colours.ApplyPreset("Turbo", True)
+colours.RescaleTransferFunction(0.0, $highest)
+colours.NanColor = [0.7, 0.7, 0.7]
+shown.SetScalarBarVisibility(view, True)
+$arrows
+position = $position
+if position:
+    said = PythonAnnotation(registrationName="drive", Input=animation)
+    said.ArrayAssociation = "Field Data"
+    said.Expression = "'%s  %.4g' % ('" + position + "', " + paraview.make_name_valid(position) + "[0])"
+    Show(said, view).FontSize = 16
+time = AnnotateTimeFilter(registrationName="time", Input=animation)
+time.Format = "t = {time:.5g} s"
+Show(time, view).WindowLocation = "Upper Right Corner"
+
+envelope = os.path.join(here, "$envelope")
+if os.path.exists(envelope):  # as drawn; switch it on in the pipeline
+    highest = XMLUnstructuredGridReader(registrationName="envelope, as drawn", FileName=[envelope])
+    ColorBy(Show(highest, view), ("POINTS", "$kind"))
+    Hide(highest, view)
+whole = os.path.join(here, "animation.vtkhdf")
+if os.path.exists(whole) and GetParaViewVersion() >= 5.12:  # not exaggerated: Warp By Vector with the scale you like
+    rigid = VTKHDFReader(registrationName="rigid motion", FileName=whole)
+    warped = WarpByVector(registrationName="deflected", Input=rigid)
+    warped.Vectors = ["POINTS", "$displacement"]
+    Hide(rigid, view)
+    Hide(warped, view)
+ResetCamera(view)
+Render(view)
+''')
+BLOCK = Template("""
+joints = ExtractBlock(registrationName="joints", Input=animation)
+joints.Selectors = ["/Root/$block"]
+low, high = (animation.GetDataInformation().GetBounds()[k::2] for k in (0, 1))
+size = sum((b - a) ** 2 for a, b in zip(low, high)) ** 0.5
+""")
+ARROWS = Template("""
+arrows = Glyph(registrationName="$title", Input=joints, GlyphType="Arrow")
+arrows.OrientationArray = ["POINTS", "$array"]
+arrows.ScaleArray = ["POINTS", "$array"]
+arrows.ScaleFactor = $share * size / $largest
+arrows.GlyphMode = "All Points"
+drawn = Show(arrows, view)
+drawn.ColorArrayName = ["POINTS", ""]
+drawn.AmbientColor = drawn.DiffuseColor = $colour
+""")
+COLOURS = ([0.8, 0.1, 0.1], [0.1, 0.2, 0.8], [0.1, 0.6, 0.2])
+
+
+def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path) -> None:
+    """Write the state beside the animation.
+
+    Parameters
+    ----------
+    peak : highest stress, where the colours end
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    text = TEXT.substitute(
+        state=STATE, folder=repr(str(folder.resolve())), stress=VON_MISES, highest=peak.stress if peak else 1.0,
+        arrows=_arrows(scene, results), position=repr(drive_heading(results.drive) if scene.driven else ""),
+        envelope=ENVELOPE, kind=f"{KINDS[0]} stress [Pa]", displacement=DISPLACEMENT,
+    )  # fmt: skip
+    with replacing(folder / STATE) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def _arrows(scene: Scene, results: Results) -> str:
+    """Arrows of forces of joints and of efforts of drives, the longest of each a share of the mechanism's size."""
+    forces = [f"joints/{name}/force" for name in scene.joints]
+    slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}
+    drives = {
+        array: [name for name in results.channels if name.startswith("drive/") and name.endswith(f"/{what}")]
+        for array, what, there in ((DRIVE_FORCE, "force", True), (DRIVE_TORQUE, "torque", False))
+        if there in slides
+    }
+    out = []
+    for (array, names), colour in zip({FORCE: forces, **drives}.items(), COLOURS, strict=False):
+        values = [results.channels[name][1] for name in names if name in results.channels]
+        largest = max((float(np.linalg.norm(x, axis=1).max()) for x in values), default=0.0)
+        if largest > 0:
+            title = array if array != FORCE else f"joint {FORCE}"
+            out.append(
+                ARROWS.substitute(title=title, array=array, largest=largest, share=ARROW, colour=colour)
+            )
+    if not out:
+        return ""
+    return BLOCK.substitute(block=JOINTS) + "".join(out)
