@@ -1,5 +1,6 @@
 """Loads that turn with links whose frames are their own: as by the oracle, as by elastica, and the work that they do."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,14 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.system.forces.turning_loads import turned
+from kedfem.dynamics.system.march import displacements
+from kedfem.frequencies import Wanted, frequencies
+from kedfem.scene import scene_from
 from tests.laws.test_capabilities import as_a_run
 from tests.moving import beam_in_space, ran, state
-from tests.systems import against_oracle, begun
+from tests.spatial_joints import rigid_in_space
+from tests.systems import against_oracle, begun, marched
 
 ASKEW = Rotation.from_rotvec([0.9, -0.7, 1.3]).as_matrix()
 DRAWN = {"as drawn": np.eye(3), "askew": ASKEW}
@@ -165,3 +171,65 @@ def test_the_work_of_loads_that_turn_is_the_energy_of_a_free_body_to_second_orde
     assert left[0] < 2e-2
     order = np.log2(np.array(left[:-1]) / left[1:])
     assert np.all((order > 1.7) & (order < 2.4)), left
+
+
+def on_a_rigid_end(plane: bool, R: np.ndarray) -> Raw:
+    """A beam on the ground's hinge, undriven, and a rigid bar hinged to it, which a force of its own axes pushes."""
+    if plane:
+        first = arm("beam", np.eye(3))
+        second = {"fidelity": "rigid", "material": "steel"}
+        second["shape"] = {"kind": "bar", "between": [[0.5, 0], [0.7, 0.1]], "width": 0.02, "thickness": 0.02}
+        at, end, push, axis = [0.5, 0.0], [0.7, 0.1], [3.0, 8.0], {}
+    else:
+        first, axis = arm("spatial beam", R), {"axis": (R @ [0.1, -0.2, 1.0]).tolist()}
+        at, end = (R @ [0.5, 0, 0]).tolist(), (R @ [0.7, 0.1, 0.05]).tolist()
+        second = rigid_in_space(np.array(at), np.array(end))
+        push = (R @ [3, 8, 2]).tolist()
+    origin = [0.0] * len(at)
+    return {
+        "links": {"arm": first, "tip": second},
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "arm"], "at": origin, **axis},
+            "B": {"kind": "revolute", "links": ["arm", "tip"], "at": at, **axis},
+        },
+        "loads": {
+            "f": {
+                "kind": "force",
+                "link": "tip",
+                "at": end,
+                "vector": push,
+                "frame": "link",
+                "factor": {"over": "time", "at": [0.0, 0.02], "value": [0.0, 1.0]},
+            }
+        },
+        "analysis": {"end_time": 0.02, "step": 1e-3, "rho_inf": 0.8, "initial": "rest", "accuracy": "quick"},
+    }
+
+
+@pytest.mark.parametrize("drawn", DRAWN)
+@pytest.mark.parametrize("plane", [True, False])
+def test_a_load_turns_with_a_rigid_link(plane: bool, drawn: str, tmp_path: Path) -> None:
+    """As by the oracle; where the link has turned by Q its forces are those as drawn by Q.
+
+    A run, whose rigid links are very stiff ones, moves alike; frequencies are those without the load.
+    """
+    raw = on_a_rigid_end(plane, DRAWN[drawn])
+    of = as_a_run(begun(raw, today=False))
+    assert against_oracle(of, 4) < 1e-7
+    system = of.ready.system
+    k = system.names.index("tip")
+    link, (load,) = system.model.links[k], [x for x in system.model.loads[k] if x.load == "f"]
+    assert load.own
+    Q = Rotation.from_rotvec([0, 0, 0.8] if plane else [0.4, -0.9, 0.7]).as_matrix()[: link.d, : link.d]
+    X = link.X[:, : link.d]
+    u = (X @ Q.T - X)[None]
+    found = turned(link, load, np.eye(3)[None], u, np.array([2.0]))[0]
+    assert_allclose(found, 2 * load.forces @ Q.T, atol=1e-9 * np.abs(load.forces).max())
+    wanted = displacements(of.ready, system.names.index("arm"), marched(of, 20)[1].u)
+    run = state(ran(raw)[1], 0, "u")[1:]
+    assert_allclose(run.reshape(20, -1), wanted.reshape(20, -1), atol=1e-2 * np.abs(wanted).max())
+    loaded, bare = (
+        frequencies(scene_from({**raw, "loads": x}), Wanted(modes=3), tmp_path / str(k)).values
+        for k, x in enumerate((raw["loads"], {}))
+    )
+    assert_allclose(loaded, bare, rtol=1e-9)

@@ -86,7 +86,8 @@ def system_of(
     k = int(model.joints[0].B.shape[1])
     bars = {row.bodies[0] for row in model.rows if row.name.startswith("rigid.")}
     links = tuple(
-        without_stiffness(x) if n in bars else x for x, n in zip(model.links, model.bodies, strict=True)
+        without_stiffness(x, turned=any(load.own for load in loads)) if n in bars else x
+        for x, n, loads in zip(model.links, model.bodies, model.loads, strict=True)
     )
     model = replace(model, links=links)
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
@@ -100,9 +101,10 @@ def spring_law(spring: LineSpring | TorsionSpring) -> Spring:
     return Spring(spring.stiffness, spring.damping, spring.free, factor=partial(load_factor, factor))
 
 
-def without_stiffness(link: Link) -> Link:
-    """A rigid link whose bars hold it: it has no stiffness, and needs no frame of its own."""
-    return replace(link, K0=np.zeros_like(np.asarray(link.K0)), fit=None, frames=())
+def without_stiffness(link: Link, turned: bool = False) -> Link:
+    """A rigid link whose bars hold it: it has no stiffness, and a frame of its own only if that turns its loads."""
+    out = replace(link, K0=np.zeros_like(np.asarray(link.K0)))
+    return out if turned else replace(out, fit=None, frames=())
 
 
 @dataclass

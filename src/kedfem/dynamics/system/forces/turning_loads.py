@@ -98,6 +98,11 @@ def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
     ValueError
         If the link has no frame of its own.
     """
+    if link.fit is None:
+        raise ValueError(f"link {link.name} must have a frame of its own")
+    if link.rigid:  # its field is affine
+        known = np.column_stack([link.one, link.X[:, : 2 if link.planar else 3]])
+        return np.eye(3)[:2], np.linalg.pinv(known)[1:3]
     if link.kind == "beam":
         share = np.abs(forces[:, :2]).sum(axis=1)
         return np.eye(3)[:2], np.stack([share / share.sum(), 0 * share])
@@ -106,8 +111,6 @@ def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
         share = at_stations / at_stations.sum()
         weights = np.stack([share @ link.triples[m::3].toarray() for m in (1, 2)])
         return weights @ link.X, weights
-    if link.fit is None:
-        raise ValueError(f"link {link.name} must have a frame of its own")
     s = 2 if link.planar else 3
     fit = np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])
     return np.eye(3)[:2], fit[:2]
