@@ -134,4 +134,4 @@ def test_what_is_refused(tmp_path: Path, run_kedfem: Command) -> None:
     ):
         done = run_kedfem("export", "scene.toml", *more)
         assert done.code == USER_ERROR
-        assert f"or --motion FILE, got {got}: " in " ".join(done.err.split())
+        assert f"or --gltf FILE, got {got}: " in " ".join(done.err.split())

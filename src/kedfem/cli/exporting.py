@@ -27,6 +27,12 @@ def export(
             metavar="FILE", help="NAME.npz or NAME.mat for the mechanism as a linear system at a position."
         ),
     ] = None,
+    gltf: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="NAME.glb for the links of the scene's run in motion, for 3-D viewers."
+        ),
+    ] = None,
     modes: Annotated[
         int, typer.Option(metavar="N", help="Of the linear system: vibrations that are kept.")
     ] = 12,
@@ -40,21 +46,23 @@ def export(
     ] = False,
     within: Within = False,
 ) -> None:
-    """For other programs: matrices of a link, the mechanism as a linear system, motion of all."""
+    """For other programs: matrices of a link, the mechanism as a linear system, motion of all, moving shapes."""
     from kedfem.errors import SceneError
 
-    given = {"--link": link, "--file": file, "--motion": motion, "--state-space": state_space}
+    given = {"--link": link, "--file": file, "--motion": motion, "--state-space": state_space, "--gltf": gltf}
     got = [key for key, value in given.items() if value is not None]
     if got == ["--motion"] and motion is not None:
         _motion(scene, motion, within)
     elif got == ["--state-space"] and state_space is not None:
         _state_space(scene, state_space, (modes, at, free), within)
+    elif got == ["--gltf"] and gltf is not None:
+        _gltf(scene, gltf, within)
     elif link is not None and set(got) <= {"--link", "--file"}:
         _link(scene, link, file or scene.with_name(f"{link}.npz"), within)
     else:
         raise SceneError(
-            "export: must have --link NAME (with --file FILE, if wanted), --state-space FILE or --motion FILE, got "
-            f"{', '.join(got) or 'none of them'}: export one after the other"
+            "export: must have --link NAME (with --file FILE, if wanted), --state-space FILE, --motion FILE "
+            f"or --gltf FILE, got {', '.join(got) or 'none of them'}: export one after the other"
         )
 
 
@@ -108,3 +116,17 @@ def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: 
         markup=False,
         soft_wrap=True,
     )
+
+
+def _gltf(scene: Path, path: Path, within: bool) -> None:
+    from kedfem.errors import OutputError
+    from kedfem.report import write_gltf
+    from kedfem.scene import read_scene
+
+    folder = read_scene(scene, within=within).results_folder
+    if not (folder / "results.h5").exists():
+        raise OutputError(f"--gltf: must have the results of a run, got none in {folder}: kedfem run {scene}")
+    found = write_gltf(folder, path)
+    show([], found.warnings)
+    links = ", ".join(found.links)
+    out.print(f"{path}  {links} over {found.frames} frames", markup=False, soft_wrap=True)

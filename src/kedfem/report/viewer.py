@@ -100,11 +100,11 @@ def viewer(
 
 def gradient() -> str:
     """The colour scale for a style sheet, from its lower end."""
-    colours = (f"rgb({', '.join(f'{255 * x:.0f}' for x in rgb)}) {100 * part:.0f}%" for part, rgb in _scale())
+    colours = (f"rgb({', '.join(f'{255 * x:.0f}' for x in rgb)}) {100 * part:.0f}%" for part, rgb in scale())
     return ", ".join(colours)
 
 
-def _scale() -> list[tuple[float, tuple[float, ...]]]:
+def scale() -> list[tuple[float, tuple[float, ...]]]:
     """Parts of the highest stress and their red, green and blue."""
     from matplotlib import colormaps
 
@@ -124,7 +124,7 @@ def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
         shade = highest / SHADES
         stress = (np.round(np.nan_to_num(surface.stress[k]) / shade) * shade for k in order)
         look = {"attribute": _series([x.astype(np.float32) for x in stress]), "color_range": [0.0, highest]}
-        look["color_map"] = [x for part, rgb in _scale() for x in (part, *rgb)]
+        look["color_map"] = [x for part, rgb in scale() for x in (part, *rgb)]
     triangles = surface.triangles.astype(np.uint32)
     mesh = k3d.mesh(
         vertices, triangles, flat_shading=False, side="double", roughness=0.9, name=surface.name, **look

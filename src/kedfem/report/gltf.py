@@ -1,0 +1,183 @@
+"""The mechanism in motion as one glTF file, which browsers, office programs and 3-D tools show.
+
+Links move as rigid, in the shape in which they are drawn, coloured by the highest stress of the whole run. glTF has y
+upwards and lengths in metres: a mechanism under gravity is turned so that this points down.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial.transform import Rotation
+
+from kedfem.errors import OutputError
+from kedfem.output.motion_file import continuous_quaternions
+from kedfem.report.animated import animated
+from kedfem.report.surfaces import Surface
+from kedfem.report.viewer import EXTRA, scale
+from kedfem.results import read_results, replacing, results_file
+from kedfem.results.extras import of_extra
+
+GREY = (0.6, 0.6, 0.6)
+ENDING = ".glb"
+KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+GENERATOR = "kedfem"
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanism:
+    """A glTF file that was written: its links, its frames, and what was left out, in words."""
+
+    path: Path
+    links: tuple[str, ...]
+    frames: int
+    warnings: tuple[str, ...]
+
+
+def write_gltf(given: Path, path: Path) -> Mechanism:
+    """Write the links of a run, moving over the frames of its animation, as binary glTF 2.0.
+
+    Parameters
+    ----------
+    given : `results.h5`, or the folder that has it
+    path : a file that ends in .glb
+
+    Raises
+    ------
+    OutputError
+        The results cannot be read or have no links, the file cannot be written, or what is needed is not installed.
+    """
+    of_extra("pygltflib", "--gltf", EXTRA)
+    if path.suffix != ENDING:
+        raise OutputError(f"{path}: must end in {ENDING}, got '{path.suffix}'")
+    file = results_file(Path(given))
+    results = read_results(file)
+    found = animated(file.parent, 1.0)
+    if found is None:
+        raise OutputError(
+            f"{file.parent}: must have links to show, got neither frames nor an envelope: run the scene with "
+            "output.animation"
+        )
+    scene: Mapping[str, Any] = json.loads(results.scene_json)
+    gravity = np.array(scene.get("gravity") or (0.0, 0.0, 0.0), float)
+    highest = max((peak.stress for peak in results.peaks.values()), default=0.0)
+    made = _Made(highest)
+    links = [made.link(surface, found.times) for surface in found.surfaces]
+    whole = made.whole(links, _upwards(gravity), str(scene.get("title") or ""))
+    with replacing(path) as part:
+        part.write_bytes(b"".join(whole.save_to_bytes()))
+    names = tuple(surface.name for surface in found.surfaces)
+    return Mechanism(path, names, len(found.times), found.thinned)
+
+
+def _upwards(gravity: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
+    """The quaternion x, y, z, w that turns up to y; none without gravity."""
+    size = np.linalg.norm(gravity)
+    if size == 0:
+        return np.array([0.0, 0.0, 0.0, 1.0])
+    return np.asarray(Rotation.align_vectors([[0.0, 1.0, 0.0]], [-gravity / size])[0].as_quat())
+
+
+@dataclass
+class _Made:
+    """Arrays of the file while they are collected: one buffer, with views and accessors of it.
+
+    highest : stress at which the colours end [Pa]
+    """
+
+    highest: float
+    data: bytearray = field(default_factory=bytearray)
+    views: list[Any] = field(default_factory=list)
+    accessors: list[Any] = field(default_factory=list)
+    meshes: list[Any] = field(default_factory=list)
+    channels: list[Any] = field(default_factory=list)
+    samplers: list[Any] = field(default_factory=list)
+    times: int | None = None
+
+    def link(self, surface: Surface, times: Float[np.ndarray, " f"]) -> Any:
+        """A node with a link's surface as drawn, and its motion."""
+        import pygltflib as g
+
+        X = surface.points[0]
+        attributes = g.Attributes(
+            POSITION=self.array(X, bounded=True), NORMAL=self.array(normals(X, surface.triangles)),
+            COLOR_0=self.array(self.colours(surface.stress[0])),
+        )  # fmt: skip
+        shape = g.Primitive(attributes=attributes, indices=self.array(surface.triangles.ravel()), material=0)
+        self.meshes.append(g.Mesh(name=surface.name, primitives=[shape]))
+        node, number = g.Node(name=surface.name, mesh=len(self.meshes) - 1), len(self.meshes)
+        if not surface.placements:
+            return node
+        p = np.array([placed.p for placed in surface.placements])
+        R = np.array([placed.R for placed in surface.placements])
+        q = continuous_quaternions(R)[:, [1, 2, 3, 0]]
+        node.translation, node.rotation = p[0].tolist(), q[0].tolist()
+        if len(times) > 1:
+            if self.times is None:
+                self.times = self.array(times - times[0], bounded=True)
+            for what, values in (("translation", p), ("rotation", q)):
+                self.samplers.append(g.AnimationSampler(input=self.times, output=self.array(values)))
+                target = g.AnimationChannelTarget(node=number, path=what)
+                self.channels.append(g.AnimationChannel(sampler=len(self.samplers) - 1, target=target))
+        return node
+
+    def whole(self, links: list[Any], up: Float[np.ndarray, "4"], title: str) -> Any:
+        """The file: node 0 turns up, links are its children."""
+        import pygltflib as g
+
+        root = g.Node(name=title or GENERATOR, children=list(range(1, len(links) + 1)), rotation=up.tolist())
+        material = g.Material(
+            name="links", doubleSided=True,
+            pbrMetallicRoughness=g.PbrMetallicRoughness(metallicFactor=0.1, roughnessFactor=0.6),
+        )  # fmt: skip
+        out = g.GLTF2(
+            asset=g.Asset(version="2.0", generator=GENERATOR), scene=0, scenes=[g.Scene(nodes=[0])],
+            nodes=[root, *links], meshes=self.meshes, materials=[material], accessors=self.accessors,
+            bufferViews=self.views, buffers=[g.Buffer(byteLength=len(self.data))],
+        )  # fmt: skip
+        if self.channels:
+            out.animations = [g.Animation(name="motion", channels=self.channels, samplers=self.samplers)]
+        out.set_binary_blob(bytes(self.data))
+        return out
+
+    def array(self, x: np.ndarray, bounded: bool = False) -> int:
+        """Append an array, of integers for indices; the number of its accessor."""
+        import pygltflib as g
+
+        whole = np.issubdtype(x.dtype, np.integer)
+        x = np.ascontiguousarray(x, np.uint32 if whole else np.float32)
+        rows = x.reshape(len(x), -1)
+        self.views.append(g.BufferView(buffer=0, byteOffset=len(self.data), byteLength=x.nbytes))
+        accessor = g.Accessor(
+            bufferView=len(self.views) - 1, componentType=g.UNSIGNED_INT if whole else g.FLOAT, count=len(x),
+            type=KINDS[rows.shape[1]],
+        )  # fmt: skip
+        if bounded:
+            accessor.min, accessor.max = rows.min(axis=0).tolist(), rows.max(axis=0).tolist()
+        self.accessors.append(accessor)
+        self.data += x.tobytes()
+        return len(self.accessors) - 1
+
+    def colours(self, stress: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
+        """Of the highest stresses, grey where there is none; linear light, as glTF has it."""
+        parts, colours = (np.array(x) for x in zip(*scale(), strict=True))
+        share = np.clip(np.nan_to_num(stress) / (self.highest or 1.0), 0.0, 1.0)
+        shown = np.stack([np.interp(share, parts, c) for c in colours.T], axis=1)
+        shown[~np.isfinite(stress)] = GREY
+        return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+def normals(X: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "t 3"]) -> Float[np.ndarray, "n 3"]:
+    """Unit normals at points, means of their triangles' by area."""
+    a, b, c = (X[triangles[:, k]] for k in range(3))
+    area = np.cross(b - a, c - a)
+    out = np.zeros_like(X)
+    for k in range(3):
+        np.add.at(out, triangles[:, k], area)
+    size = np.linalg.norm(out, axis=1)
+    out[size == 0], size[size == 0] = (0.0, 0.0, 1.0), 1.0
+    return np.asarray(out / size[:, None])
