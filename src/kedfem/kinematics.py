@@ -28,6 +28,7 @@ from kedfem.output.vtu import AnimationWriter, remove_animation
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
 from kedfem.results.data_sets import drive_heading
+from kedfem.results.files import beside
 from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
@@ -48,8 +49,7 @@ class Moved:
 
 def kinematics_folder(scene: Scene) -> FilePath:
     """Where they go: beside the results of a run, which they leave alone."""
-    folder = scene.results_folder
-    return folder.with_name(f"{folder.name.removesuffix('-results')}-kinematics")
+    return beside(scene.results_folder, "kinematics")
 
 
 def kinematics(

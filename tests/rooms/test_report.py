@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.analysis import analyse
 from kedfem.cli.reporting import _written
 from kedfem.errors import OutputError, SceneError
+from kedfem.frequencies import Wanted, frequencies
 from kedfem.kinematics import kinematics
 from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import bars, heights
@@ -30,7 +31,8 @@ from kedfem.report.curves import cursor_places, curve_groups
 from kedfem.report.facts import loads_tables, notes_table, steady_table
 from kedfem.report.surfaces import placement
 from kedfem.results import read_results
-from kedfem.scene import scene_from
+from kedfem.results.frequencies import SUMMARY
+from kedfem.scene import read_scene, scene_from
 from tests.browser import Browser, needs_browser
 from tests.frames import frames
 from tests.scenes import arm, bar, cycloidal, four_bar
@@ -362,3 +364,57 @@ def test_a_browser_draws_moves_and_prints_it(solid: Path) -> None:
             if event["method"] == "Network.requestWillBeSent"
         ]
         assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in asked)
+
+
+FOUR_BAR = """
+drive = { joint = "A", motion = { kind = "constant_speed", speed = "600 rpm" } }
+analysis = { revolutions = 1, steps_per_revolution = 90, accuracy = "quick" }
+output = { plots = false, picture = false, animation = false }
+points = { A = [0, 0], B = [0.1, 0], C = [0.35, 0.2], D = [0.4, 0] }
+
+[links.crank]
+fidelity = "beam"
+material = "steel"
+shape = { kind = "bar", between = ["A", "B"], width = 0.02, thickness = 0.01 }
+
+[links.coupler]
+fidelity = "beam"
+material = "steel"
+shape = { kind = "bar", between = ["B", "C"], width = 0.02, thickness = 0.01 }
+
+[links.rocker]
+fidelity = "beam"
+material = "steel"
+shape = { kind = "bar", between = ["C", "D"], width = 0.02, thickness = 0.01 }
+
+[joints]
+A = { kind = "revolute", links = ["ground", "crank"], at = "A" }
+B = { kind = "revolute", links = ["crank", "coupler"], at = "B" }
+C = { kind = "revolute", links = ["coupler", "rocker"], at = "C" }
+D = { kind = "revolute", links = ["rocker", "ground"], at = "D" }
+"""
+
+
+def test_natural_frequencies_are_shown_where_they_are_of_the_same_scene(tmp_path: Path) -> None:
+    """Those that are found, with their plots; of another text of the scene a word; damaged ones nothing."""
+    path = tmp_path / "scene.toml"
+    path.write_text(FOUR_BAR, encoding="utf-8")
+    folder = analyse(read_scene(path)).folder
+    assert told(folder) == "the mechanism does not move: the run left no animation"
+    assert "Natural frequencies" not in page(folder)
+    found = frequencies(read_scene(path), Wanted(modes=3, positions=4))
+    assert "frequencies" not in told(folder)
+    shown = page(folder)
+    assert shown.count('alt="Natural frequencies"') == 2
+    for end in (found.values.min(axis=0), found.values.max(axis=0)):
+        for value in end:
+            assert f"<td>{with_prefix(value, 'Hz')}</td>".replace(" ", "\u00a0") in shown
+    first = min((x for x in found.crossings if x.mode == 1), key=lambda x: x.harmonic)
+    assert f"1: {60 * first.slowest / (2 * np.pi):,.0f}" in shown
+    path.write_text(FOUR_BAR.replace("600 rpm", "500 rpm"), encoding="utf-8")
+    frequencies(read_scene(path), Wanted(modes=3, positions=4))
+    assert "in scene-frequencies are left out, as they are of another text of the scene" in told(folder)
+    assert 'alt="Natural frequencies"' not in page(folder)
+    for text in ("", "{}", '{"scene": 1}', "[1, 2]", (found.folder / SUMMARY).read_text()[:-9]):
+        (found.folder / SUMMARY).write_text(text, encoding="utf-8")
+        assert "scene-frequencies" not in told(folder)

@@ -27,7 +27,15 @@ from kedfem.output.shapes import Shape, write_shapes
 from kedfem.output.vtu import LinkField
 from kedfem.output.words import clock, moment
 from kedfem.results import claimed
-from kedfem.results.frequencies import write_frequencies
+from kedfem.results.files import beside
+from kedfem.results.frequencies import (
+    CAMPBELL,
+    FREQUENCIES,
+    OVER_TURN,
+    Summary,
+    write_frequencies,
+    write_summary,
+)
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
 
 Watch = Callable[[str, int, int], None]
@@ -80,8 +88,7 @@ class Frequencies:
 
 def frequencies_folder(scene: Scene) -> FilePath:
     """Where they go: beside the results of a run, which they leave alone."""
-    folder = scene.results_folder
-    return folder.with_name(f"{folder.name.removesuffix('-results')}-frequencies")
+    return beside(scene.results_folder, FREQUENCIES)
 
 
 def frequencies(
@@ -142,12 +149,7 @@ def frequencies(
     warnings = (*assembly_warning(assembly), *tangent_warning(system, "frequencies"), *buckled)
     with claimed(folder or frequencies_folder(scene)) as target:
         done = Frequencies(target, t, angle, values, still, speed, crossings, solver.factorisations, warnings)
-        write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
-        if len(t) > 1:
-            write_over_turn(target / "frequencies.png", t, angle, values, bool(speed))
-        if speed:
-            x = np.linspace(0.0, (max(found) if over.varies else SPEEDS[-1]) * speed, POINTS)
-            write_campbell(target / "campbell.png", x, *over.bands(x), speed, wanted.harmonics)
+        _write_files(target, scene, wanted, done, over, max(found) * speed)
         if wanted.shapes:
             watch("mode shapes", 0, 0)
             where = [
@@ -156,6 +158,36 @@ def frequencies(
             ]
             write_shapes(target, _shapes(system, motion, every, where, wanted.shapes), scene.gravity)
     return done
+
+
+def _write_files(
+    target: FilePath, scene: Scene, wanted: Wanted, done: Frequencies, over: Campbell, fastest: float
+) -> None:
+    """The table, what a report shows, and the plots; those of an earlier command go.
+
+    Parameters
+    ----------
+    fastest : speed of the drive up to which frequencies were found [rad/s]
+    """
+    t, angle, values, speed = done.time, done.angle, done.values, done.speed
+    write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
+    write_summary(target, _summary(done, scene.source, wanted))
+    for name in (OVER_TURN, CAMPBELL):
+        (target / name).unlink(missing_ok=True)
+    if len(t) > 1:
+        write_over_turn(target / OVER_TURN, t, angle, values, bool(speed))
+    if speed:
+        x = np.linspace(0.0, fastest if over.varies else SPEEDS[-1] * speed, POINTS)
+        write_campbell(target / CAMPBELL, x, *over.bands(x), speed, wanted.harmonics)
+
+
+def _summary(done: Frequencies, source: str | None, wanted: Wanted) -> Summary:
+    """What a report shows of them."""
+    every = done.values[:, ~np.isnan(done.values).any(axis=0)]
+    rpm = 60 / (2 * np.pi)
+    met = [(x.mode, x.harmonic, rpm * x.slowest, rpm * x.fastest) for x in done.crossings]
+    lowest, highest = (f(every, axis=0).tolist() for f in (np.min, np.max))
+    return Summary(source, len(done.time), wanted.free, done.still, lowest, highest, rpm * done.speed, met)
 
 
 def _at_speeds(

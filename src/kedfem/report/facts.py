@@ -9,6 +9,7 @@ import numpy as np
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
 from kedfem.output.words import number_in, place_of, with_prefix
 from kedfem.results import Fatigue, Peak, Results
+from kedfem.results.frequencies import Summary
 
 Rows = list[tuple[str, ...]]
 STEADY = "steady "
@@ -194,6 +195,36 @@ def fatigue_table(found: Fatigue) -> Table:
     """Life and utilisation at the places of the highest damage."""
     note = " ".join(fatigue_notes(found))
     return Table("Fatigue: life and utilisation", FATIGUE_HEAD, fatigue_rows(found, 3), note)
+
+
+def frequencies_table(found: Summary) -> Table:
+    """Range of each natural frequency over the positions, and where harmonics of the drive meet it."""
+    head = ("mode", "lowest", "highest", "met by harmonics of the drive")
+    rows: Rows = []
+    for mode, (low, high) in enumerate(zip(found.lowest, found.highest, strict=True), start=1):
+        met = [f"{k}: {_rpm(slow, fast)}" for m, k, slow, fast in found.crossings if m == mode]
+        ends = (with_prefix(x, "Hz").replace(" ", "\u00a0") for x in (low, high))
+        rows.append((str(mode), *ends, "; ".join(met) or "none"))
+    held = "let go of" if found.free else "hold"
+    said = f"The mechanism frozen at {found.positions} positions, drives {held} their joints."
+    if found.still:
+        said += f" {found.still} motions without strain are left out."
+    if found.speed:
+        said += f" The scene's drive turns at {found.speed:.4g} rpm."
+    return Table(
+        "Natural frequencies",
+        head if found.speed else head[:3],
+        [r if found.speed else r[:3] for r in rows],
+        said,
+    )
+
+
+def _rpm(slowest: float, fastest: float) -> str:
+    """A range of speeds."""
+    low, high = (f"{x:.4g}" if x < 1e4 else f"{x:,.0f}" for x in (slowest, fastest))
+    if not np.isfinite(fastest):
+        return f"from {low} rpm"
+    return f"{low} rpm" if low == high else f"{low} to {high} rpm"
 
 
 def loads_tables(

@@ -21,6 +21,7 @@ from kedfem.report.facts import (
     budget_table,
     facts,
     fatigue_table,
+    frequencies_table,
     joints_table,
     links_table,
     loads_tables,
@@ -32,6 +33,8 @@ from kedfem.report.facts import (
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
 from kedfem.results.extras import of_extra
+from kedfem.results.files import beside
+from kedfem.results.frequencies import CAMPBELL, FREQUENCIES, OVER_TURN, read_summary
 from kedfem.scene import scene_from
 
 
@@ -112,6 +115,7 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
         "picture": b64encode(picture.read_bytes()).decode() if picture.exists() else "",
         "peaks": [peaks_table(results, moment)] if results.peaks else [],
         "fatigue": [fatigue_table(results.fatigue)] if results.fatigue else [],
+        "frequencies": _frequencies(results, folder, missing),
         "modelled": [links_table(scene, results), joints_table(scene)],
         "loads": loads,
         "groups": curve_groups(results) | ({"Bearing loads": polars} if polars else {}),
@@ -119,6 +123,23 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
         "seconds": [named_table("Seconds", results.seconds.items())] if results.seconds else [],
         "scene": results.scene_toml or json.dumps(scene, indent=1),
     }
+
+
+def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str, Any] | None:
+    """Table and plots of `kedfem frequencies`, where these are of the same text of the scene."""
+    known = beside(folder, FREQUENCIES)
+    found = read_summary(known)
+    if found is None:
+        return None
+    if found.scene is None or found.scene != results.scene_toml:
+        missing.append(
+            f"natural frequencies in {known.name} are left out, as they are of another text of the scene: run "
+            "kedfem frequencies again"
+        )
+        return None
+    plots = [known / name for name in (OVER_TURN, CAMPBELL)]
+    pictures = [b64encode(path.read_bytes()).decode() for path in plots if path.exists()]
+    return {"tables": [frequencies_table(found)], "pictures": pictures}
 
 
 def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:

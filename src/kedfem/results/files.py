@@ -24,6 +24,11 @@ def results_file(given: Path) -> Path:
     return given / "results.h5" if given.is_dir() else given
 
 
+def beside(folder: Path, what: str) -> Path:
+    """The folder of another command beside that of a run's results, which leaves these alone: NAME-frequencies."""
+    return folder.with_name(f"{folder.name.removesuffix('-results')}-{what}")
+
+
 def ready_folder(folder: Path) -> Path:
     """A folder that exists and takes files; made where it is missing, with its parents.
 

@@ -1,11 +1,61 @@
-"""Natural frequencies over positions, and of single links, as tables for spreadsheets."""
+"""Natural frequencies over positions, and of single links, as tables for spreadsheets; what a report tells of them."""
 
+import json
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.results.files import replacing
 from kedfem.results.table import text_file, write_numbers
+
+FREQUENCIES = "frequencies"
+"""Name of their folder beside that of a run: `results.files.beside`."""
+OVER_TURN, CAMPBELL, SUMMARY = "frequencies.png", "campbell.png", "frequencies.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """Natural frequencies of a linkage in short.
+
+    scene : its text; none of a scene made in Python
+    positions, free, still : how many; whether drives let go of their joints; motions without strain
+    lowest, highest : of each mode over all positions [Hz]
+    speed : of the drive [rpm]; 0 of one that does not go on turning
+    crossings : mode, harmonic of the drive, slowest and fastest speed at which they meet [rpm]
+    """
+
+    scene: str | None
+    positions: int
+    free: bool
+    still: int
+    lowest: list[float]
+    highest: list[float]
+    speed: float
+    crossings: list[tuple[int, int, float, float]]
+
+
+def write_summary(folder: Path, summary: Summary) -> None:
+    """Write what a report shows of them.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with replacing(folder / SUMMARY) as part:
+        part.write_text(json.dumps(asdict(summary)), encoding="utf-8")
+
+
+def read_summary(folder: Path) -> Summary | None:
+    """What :func:`write_summary` wrote; None where there is none, or another program's."""
+    try:
+        found = Summary(**json.loads((folder / SUMMARY).read_text(encoding="utf-8")))
+        numbers = np.array([*found.lowest, *found.highest, *np.ravel(found.crossings)], float)
+    except (OSError, ValueError, TypeError):
+        return None
+    return found if not np.isnan(numbers).any() else None
 
 
 def write_frequencies(
