@@ -28,7 +28,7 @@ def test_an_arm_has_the_same_frequencies_all_around_and_its_critical_speeds(tmp_
     table = np.loadtxt(tmp_path / "out" / "frequencies.csv", delimiter=",", skiprows=1)
     assert_allclose(table, np.column_stack([found.time, found.angle, found.values]), rtol=5e-9)  # nine digits
     assert {x.name for x in (tmp_path / "out").iterdir()} == {
-        "frequencies.csv", "frequencies.png", "campbell.png"
+        "frequencies.csv", "frequencies.json", "frequencies.png", "campbell.png"
     }  # fmt: skip
     assert [table.row_count for table in frequencies_tables(scene, found)] == [4, 2]
     one = frequencies(scene, Wanted(2, 1), tmp_path / "one")
