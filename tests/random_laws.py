@@ -77,7 +77,9 @@ def motors(d: Drawing, moved: set[str]) -> Raw:
         if sliding and "ground" not in made["links"] and d.frames == "rigid-body":
             sliding = False
         over = d.one(("time", "speed"))
-        table = {"over": over, "at": [-1.0, 1.0], "value": [-4.0, 6.0]}
+        # a torque that rises with speed by so much would have several solutions within a step
+        value = [-4.0, 6.0] if over == "time" else [6.0, -4.0]
+        table = {"over": over, "at": [-1.0, 1.0], "value": value}
         if turning or sliding:
             out[f"m{name}"] = {"joint": name, "torque" if turning else "force": table}
     return out
