@@ -216,6 +216,27 @@ def test_stiffening_changes_frequencies_as_told_by_frequencies(tmp_path: Path) -
     assert_allclose(ends, stiff.frequencies, rtol=1e-6)
 
 
+def test_a_constant_load_is_answered_alike_whatever_modes_are_kept() -> None:
+    """Twelve arms of nearly one length, so that what is left out is hardly stiffer than what is kept."""
+    links: Raw = {"hub": bar("beam", (0, 0), (0.1, 0), 1)}
+    joints: Raw = {"A": {"kind": "revolute", "links": ["ground", "hub"], "at": [0, 0]}}
+    for k, length in enumerate(1.0 + 0.01 * np.arange(12)):
+        end = length * np.array([np.cos(np.pi * k / 6), np.sin(np.pi * k / 6)]) + [0.1, 0]
+        links[f"arm{k}"] = bar("beam", (0.1, 0), end.tolist(), 3)
+        joints[f"W{k}"] = {"kind": "weld", "links": ["hub", f"arm{k}"], "at": [0.1, 0]}
+    at = links["arm0"]["shape"]["between"][1]
+    raw = {
+        "links": links, "joints": joints, "drive": turning("60 rpm"),
+        "loads": {"f": {"kind": "force", "link": "arm0", "at": at, "vector": [0, 1.0]}},
+        "output": {"probes": {"p": {"link": "arm0", "at": at, "quantity": "displacement"}}},
+        "analysis": {"revolutions": 1, "steps_per_revolution": 90, "accuracy": "quick"},
+    }  # fmt: skip
+    few, many = (at_rest(state_space(scene_from(raw), modes)[0])[1, 0] for modes in (1, 14))
+    assert few == pytest.approx(many, rel=1e-10)
+    bending = 1 / (3 * 2.1e11 * 0.02 * 0.03**3 / 12)  # of an arm that is held
+    assert bending < many < 1.5 * bending
+
+
 @pytest.mark.parametrize("ending", [".npz", ".mat"])
 def test_files_are_read_back_alike(ending: str, tmp_path: Path) -> None:
     space, _ = state_space(scene_from(swinging()), 3)

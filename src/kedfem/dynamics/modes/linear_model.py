@@ -1,9 +1,10 @@
 """A linkage frozen at a position as a small linear system: its lowest modes under forces, q'' + Γ q' + Ω² q = Φᵀ F.
 
 What the modes that are left out answer to a constant force, G F, is kept, so that a constant force bends the linkage as
-in full, x = K⁻¹ F. With s the shift of `Frozen`, kept modes as a coarse correction, motions without strain left out,
+in full, x = K⁻¹ F. With s the shift of `Frozen` and A = K + s M, which is factored there, conjugate gradients in the
+product of M find x in a few steps, motions without strain left out,
 
-    y = (K + s M)⁻¹ (F + s M x) − x,   x + y + Φ (s/Ω²) Φᵀ M y → x,   G F = x − Φ Ω⁻² Φᵀ F
+    (1 − s A⁻¹ M) x = A⁻¹ F,   G F = x − Φ Ω⁻² Φᵀ F
 """
 
 from collections.abc import Sequence
@@ -20,8 +21,7 @@ from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
-ENOUGH, MOST = 1e-12, 60  # of the answer: its last change; changes
-ROUNDED = 1e-6  # of the answer: changes that no longer halve may be so large, of beams in space with their stiff hubs
+ENOUGH, MOST = 1e-12, 200  # of the right-hand side, in the norm of M: what is left of it; steps
 
 Flat = Float[np.ndarray, " _"]
 Shapes = tuple[Float[np.ndarray, "_ n d"], ...]
@@ -82,7 +82,10 @@ def linear_model(
     f[:, len(loads) :] = C[list(elements)].T
     Mx = frozen.momentum(x)
     z = (omega**2 + frozen.shift) * _answers(balance, Mx, np.zeros((len(f), len(omega))))[1]
-    answer, answered = _beyond(frozen, balance, (omega, x, z, Mx), (r, f))
+    soft = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0)[:, None]
+    kept = soft * (x.T @ r + z.T @ f)
+    whole, moved = _constant(frozen, balance, (x[:, omega == 0], z[:, omega == 0]), (r, f))
+    answer, answered = whole - x @ kept, moved - z @ kept
     turned, rates = C @ z, now.forces(now.coordinates(np.stack([rest] * 3)))[:, 2]
     shapes, (rayleigh, links) = frozen.per_link(x), damping
     gamma = rayleigh.alpha * np.diag(omega > 0) + rayleigh.beta * _strain(shapes, now.R, links)
@@ -108,42 +111,52 @@ def _answers(
     return x, z
 
 
-def _beyond(
+def _constant(
     frozen: Frozen,
     balance: Balance,
-    modes: tuple[Flat, Float[np.ndarray, "N f"], Float[np.ndarray, "k f"], Float[np.ndarray, "N f"]],
+    still: tuple[Float[np.ndarray, "N m"], Float[np.ndarray, "k m"]],
     forces: tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]],
 ) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:
-    """G F, and the interface with it.
+    """What constant forces bend, without motions without strain, and the interface with it.
 
     Parameters
     ----------
-    modes : Ω, Φ, the interface with it, M Φ
+    still : motions without strain, and the interface with them
     forces : on coordinates and on the interface
 
     Raises
     ------
     SolveError
     """
-    (omega, x, z, Mx), (r, f), s = modes, forces, frozen.shift
-    soft = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0)[:, None]
-    back = s * soft - (omega == 0)[:, None]  # takes motions without strain away
-    answer, answered = np.zeros_like(r), np.zeros_like(f)
-    last = np.full(r.shape[1], np.inf)
+    size, s = len(forces[0]), frozen.shift
+    Mx = frozen.momentum(still[0]) if still[0].size else still[0]
+    without = np.vstack(still)
+
+    def bent(r: Float[np.ndarray, "N i"], f: Float[np.ndarray, "k i"]) -> Float[np.ndarray, "a i"]:
+        """A⁻¹ of columns above the interface with it."""
+        found = np.vstack(_answers(balance, r, f))
+        return np.asarray(found - without @ (Mx.T @ found[:size]))
+
+    def product(x: Float[np.ndarray, "a i"], Mx: Float[np.ndarray, "N i"]) -> Flat:
+        return np.asarray((x[:size] * Mx).sum(axis=0))
+
+    r = bent(*forces)
+    x, p, M_r = np.zeros_like(r), r, frozen.momentum(r[:size])
+    square = product(r, M_r)
+    enough = ENOUGH**2 * square
     for _ in range(MOST):
-        y, w = _answers(balance, r + s * frozen.momentum(answer), f)
-        y, w = y - answer, w - answered
-        share = back * (Mx.T @ y)
-        y, w = y + x @ share, w + z @ share
-        answer, answered = answer + y, answered + w
-        change, size = np.abs(y).max(axis=0, initial=0.0), np.abs(answer).max(axis=0, initial=0.0)
-        if (change <= np.where(change > last / 2, ROUNDED, ENOUGH) * size).all():
-            kept = soft * (x.T @ r + z.T @ f)
-            return answer - x @ kept, answered - z @ kept
-        last = change
+        if (square <= enough).all():
+            return x[:size], x[size:]
+        M_p = frozen.momentum(p[:size])
+        Tp = p - s * bent(M_p, np.zeros_like(forces[1]))
+        along = product(Tp, M_p)
+        step = np.divide(square, along, out=np.zeros_like(square), where=along > 0)
+        x, r = x + step * p, r - step * Tp
+        M_r, before = frozen.momentum(r[:size]), square
+        square = product(r, M_r)
+        p = r + np.divide(square, before, out=np.zeros_like(square), where=before > 0) * p
     raise SolveError(
-        "state space: what modes beyond the kept ones answer to a constant force must settle, got changes that do not: "
-        "keep more modes"
+        "state space: what a constant input bends must be found, got steps that do not settle: take another position"
     )
 
 
