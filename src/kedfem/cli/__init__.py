@@ -13,7 +13,7 @@ from kedfem.cli.frequencies import frequencies
 from kedfem.cli.loading import loads
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
 from kedfem.cli.reporting import WRITTEN, report, view
-from kedfem.cli.screen import err, out, progress, show
+from kedfem.cli.screen import err, out, progress, show, stages
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted, interruption_asked
@@ -110,11 +110,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
 
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(_quick(read) if quick else read)
-    with progress() as watch:
-
-        def stage(name: str) -> None:
-            watch(name, 0, 0)
-
+    with stages() as stage:
         plan = plan_for(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
     found = sizes(loaded, ready.model)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from kedfem.cli.options import ScenePath, Within
-from kedfem.cli.screen import out, progress, show
+from kedfem.cli.screen import out, show, stages
 
 
 def export(
@@ -72,11 +72,7 @@ def _link(scene: Path, link: str, path: Path, within: bool) -> None:
 
     require_ending(path)
     loaded = read_scene(scene, within=within)
-    with progress() as watch:
-
-        def stage(name: str) -> None:
-            watch(name, 0, 0)
-
+    with stages() as stage:
         found = exported_link(loaded, link, stage)
     write_link(found, path)
     size, ports = len(found.mass), ", ".join(found.ports) or "none"
@@ -103,11 +99,7 @@ def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: 
 
     require_ending(path)
     loaded = read_scene(scene, within=within)
-    with progress() as watch:
-
-        def stage(name: str) -> None:
-            watch(name, 0, 0)
-
+    with stages() as stage:
         found, warnings = state_space(loaded, *how, stage=stage)
     write_state_space(found, path)
     show([], warnings)

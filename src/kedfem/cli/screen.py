@@ -1,6 +1,7 @@
 """What the commands print on: the two streams, tables, warnings, progress bars."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from kedfem.terminal import terminal
@@ -63,3 +64,10 @@ class progress:  # noqa: N801
     _stage: str
     _task: Any
     _once: Any
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str], None]]:
+    """Shows names of stages while they take their time."""
+    with progress() as watch:
+        yield lambda name: watch(name, 0, 0)

@@ -12,7 +12,7 @@ from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.modes.frozen import Frozen, tangent_warning
+from kedfem.dynamics.modes.frozen import Frozen, require_drive, tangent_warning
 from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
 from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
 from kedfem.dynamics.system.build import system_of
@@ -139,10 +139,7 @@ def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
     """
     if modes < 1:
         raise SceneError(f"--modes: must be at least 1, got {modes}")
-    if free and scene.driven is None:
-        raise SceneError(
-            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
-        )
+    require_drive(scene, free)
     end = time_grid(scene).end if scene.driven else 0.0
     if not 0 <= at <= end:
         wanted = f"within the analysis, 0 to {end:.6g} s" if scene.driven else "0 without a drive"

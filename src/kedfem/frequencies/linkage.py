@@ -12,7 +12,7 @@ from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, tangent_warning
+from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
 from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import System
@@ -113,10 +113,7 @@ def frequencies(
             raise SceneError(f"--{name}: must be at least 1, got {value}")
     if not 0 <= wanted.shapes <= wanted.modes:
         raise SceneError(f"--shapes: must be between 0 and --modes ({wanted.modes}), got {wanted.shapes}")
-    if wanted.free and scene.driven is None:
-        raise SceneError(
-            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
-        )
+    require_drive(scene, wanted.free)
     scene, assembly = assembled(scene)
     plan = plan_for(scene, lambda name: watch(name, 0, 0))
     scene = plan.scene if plan else scene

@@ -24,9 +24,10 @@ from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal import own, rows
-from kedfem.errors import SolveError
+from kedfem.errors import SceneError, SolveError
 from kedfem.links.reduced import wave_frequency
 from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import Scene
 
 RIGID_MOTIONS = 6  # of a free body: so many equal frequencies must be found, at the least
 STILL = 1e-8  # ω²/s below which a motion has no strain: free chains of tests/laws/test_frozen.py leave less
@@ -173,6 +174,19 @@ def asked(now: Instant) -> Asked:
     kept = hard | ((stiffness != 0.0) & (np.abs(C).max(axis=1, initial=0.0) > 0.0))
     compliance = np.where(hard, 0.0, 1 / np.where(stiffness != 0.0, stiffness, 1.0))[kept]
     return Asked(C[kept], np.zeros(len(compliance)), compliance, z[0])
+
+
+def require_drive(scene: Scene, free: bool) -> None:
+    """A drive, where one is to let go of its joint.
+
+    Raises
+    ------
+    SceneError
+    """
+    if free and scene.driven is None:
+        raise SceneError(
+            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
+        )
 
 
 def tangent_warning(system: System, what: str) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ Shapes = tuple[Float[np.ndarray, "_ n d"], ...]
 class LinearModel:
     """Lowest modes of unit mass, f of them, under i inputs.
 
-    omega : (f,) natural circular frequencies [rad/s]; still : how many are of motions without strain, zero
+    omega : (f,) natural circular frequencies [rad/s], zero of motions without strain
     damping : (f, f) Γ [1/s]
     force : (f, i) Φᵀ F of each input at one [kg^½ m/s²]
     shapes : per link (f, n, d) Φ, world components [kg^-½]
@@ -40,7 +40,6 @@ class LinearModel:
     """
 
     omega: Float[np.ndarray, " f"]
-    still: int
     damping: Float[np.ndarray, "f f"]
     force: Float[np.ndarray, "f i"]
     shapes: Shapes
@@ -71,7 +70,7 @@ def linear_model(
     UnstableError
         If a motion away from the position would grow by itself.
     """
-    omega, still, x = frozen.modes(motion)
+    omega, _, x = frozen.modes(motion)
     now, balance = frozen.balance(motion)
     rest = np.zeros(frozen.system.unknowns)
     C = now.gradients(rest)
@@ -90,7 +89,7 @@ def linear_model(
     shapes, (rayleigh, links) = frozen.per_link(x), damping
     gamma = rayleigh.alpha * np.diag(omega > 0) + rayleigh.beta * _strain(shapes, now.R, links)
     return LinearModel(
-        omega, still, gamma + turned.T @ (rates[:, None] * turned), x.T @ r + z.T @ f,
+        omega, gamma + turned.T @ (rates[:, None] * turned), x.T @ r + z.T @ f,
         shapes, frozen.per_link(answer), turned[list(elements)], C[list(elements)] @ answered,
     )  # fmt: skip
 
