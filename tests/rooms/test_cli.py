@@ -179,7 +179,13 @@ def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
     assert long in "".join(re.findall(r"^│ (\S+) +│", said.out, re.MULTILINE))  # folded, not cut
     assert "Arm [bold]nose[/nose]" in said.out  # a title is text, not markup
     named = re.findall(r"^(\S*arm-results/\S+)  ", said.out, re.MULTILINE)
-    assert {Path(name).name for name in named} == {"results.h5", "animation.pvd", "envelope.vtu", "peaks.csv"}
+    assert {Path(name).name for name in named} == {
+        "results.h5",
+        "animation.pvd",
+        "paraview.py",
+        "envelope.vtu",
+        "peaks.csv",
+    }
     results = read_results(arm.with_name("arm-results") / "results.h5")
     assert (results.status, len(results.time)) == ("complete", 361)
 
