@@ -1,5 +1,6 @@
 """Every example of the scene reference is valid, within a whole scene, and every table has one."""
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from kedfem.scene import scene_from
+from kedfem.scene import Scene, read_scene, scene_from
 from kedfem.scene.reference import SECTIONS
 from kedfem.scene.reference_examples import EXAMPLES
 from tests.rooms.test_bad_scenes import BEAMS, FREE, GOOD
@@ -15,6 +16,7 @@ from tests.rooms.test_bad_scenes import BEAMS, FREE, GOOD
 UNDRIVEN = ("motor", "spring", "initial_motions")
 SLIDE = "S"
 PART = "The file of a part"
+SCENES = Path(__file__).parents[2] / "examples"
 
 
 def base(text: str) -> str:
@@ -37,6 +39,16 @@ def merged(scene: dict[str, object], change: Mapping[str, object]) -> dict[str, 
     return scene
 
 
+def survives_storage(scene: Scene) -> None:
+    """Results keep their scene as text: reports and loads read it again."""
+    assert scene_from(json.loads(scene.model_dump_json()), scene.folder).model_dump() == scene.model_dump()
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.glob("*/*.toml")), ids=lambda path: str(path.parent.name))
+def test_the_scene_of_an_example_survives_storage(path: Path) -> None:
+    survives_storage(read_scene(path))
+
+
 def test_every_table_of_the_reference_has_an_example() -> None:
     assert list(EXAMPLES) == [heading for heading, _, _ in SECTIONS]
 
@@ -48,7 +60,7 @@ def test_an_example_of_the_reference_is_valid_in_a_whole_scene(heading: str, tmp
     if heading == PART:
         (tmp_path / "part.toml").write_text(text)
         text = '[links.rocker.shape]\nkind = "part"\nfile = "part.toml"\nbetween = ["C", "D"]\n'
-    scene_from(merged(tomllib.loads(base(text)), tomllib.loads(text)), tmp_path)
+    survives_storage(scene_from(merged(tomllib.loads(base(text)), tomllib.loads(text)), tmp_path))
     keys = re.sub(r"\[([\w.]+)\.NAME(.*)\]", r"[\1.", heading)
     if heading.startswith("["):
         assert keys.rstrip("]") in text, "the example shows the table"

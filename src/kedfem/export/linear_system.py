@@ -11,10 +11,10 @@ from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
-from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.modes.frozen import Frozen, require_drive, tangent_warning
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.modes.frozen import require_drive, tangent_warning
 from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
-from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
+from kedfem.dynamics.modes.stiffened import frozen_linkage
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
@@ -24,7 +24,7 @@ from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.probes import probe_channels
-from kedfem.results.recorded import Recorded
+from kedfem.results.recorded import Recorded, drive_prefix
 from kedfem.scene import Motor, Scene, path_parameter, time_grid
 
 FORMAT = "kedfem state space 1"
@@ -113,14 +113,8 @@ def state_space(
     system = system_of(loose, linkage, along)
     t = np.array([at])
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    released = linkage.mobility + (len(scene.driven_joints) if free else 0)
     stage("modes")
-    if scene.analysis.stiffening:
-        driven = elastic_model(scene, linkage, along=along)
-        refuse_carried(driven, free)
-        frozen = Stiffened(system, driven, modes, released).frozen(motion)
-    else:
-        frozen = Frozen(system, modes, released)
+    frozen = frozen_linkage(scene, system, linkage, along, modes, free).frozen(motion)
     names = {each.name: n for n, each in enumerate(system.constraints)}
     found = linear_model(
         frozen, motion, (system.model.damping, system.model.links),
@@ -164,7 +158,7 @@ def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:
     elements, motors = [], dict(scene.motors)
     for joint in scene.driven_joints:
         turns = scene.joints[joint].kind != "prismatic"
-        channel = "drive" if len(scene.driven_joints) == 1 else f"drive/{joint}"
+        channel = drive_prefix(scene, joint).removesuffix("/")
         element = _Element(f"drive of {joint}", channel, turns)
         motors[element.motor] = Motor.model_validate({"joint": joint, "torque" if turns else "force": 0.0})
         elements.append(element)

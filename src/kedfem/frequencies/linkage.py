@@ -11,9 +11,8 @@ from jaxtyping import Float
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
-from kedfem.dynamics.modes.stiffened import Stiffened, refuse_carried
+from kedfem.dynamics.modes.stiffened import Stiffened, frozen_linkage
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
@@ -121,14 +120,7 @@ def frequencies(
     linkage, along = moving(scene)
     loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene
     system = system_of(loose, linkage, along)
-    released = linkage.mobility + (len(scene.driven_joints) if wanted.free else 0)
-    solver: Frozen | Stiffened
-    if scene.analysis.stiffening:
-        driven = elastic_model(scene, linkage, along=along)
-        refuse_carried(driven, wanted.free)
-        solver = Stiffened(system, driven, wanted.modes, released)
-    else:
-        solver = Frozen(system, wanted.modes, released)
+    solver = frozen_linkage(scene, system, linkage, along, wanted.modes, wanted.free)
     t = _positions(scene, wanted.positions)
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0

@@ -11,6 +11,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.array_names import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT
 from kedfem.output.vtu import JointField
+from kedfem.results.recorded import drive_prefix
 from kedfem.scene import Scene
 
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
@@ -36,11 +37,9 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
         force[n] = rows[f"joints/{name}/force"][k]
         moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
         if name in scene.driven_joints:
-            axis, head = motion.R[k, j] @ joint_axis(joint), "drive"
-            if len(scene.driven_joints) > 1:
-                head = f"drive/{name}"
+            axis, prefix = motion.R[k, j] @ joint_axis(joint), drive_prefix(scene, name)
             for what, out in (("force", push), ("torque", torque)):
-                if (found := rows.get(f"{head}/{what}")) is not None:
+                if (found := rows.get(f"{prefix}{what}")) is not None:
                     out[n] = found[k] * axis
     vectors = {FORCE: force, MOMENT: moment}
     slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}

@@ -18,6 +18,7 @@ from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.audit import Account
+from kedfem.results.recorded import drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import Scene, without_vibration
 
@@ -82,8 +83,7 @@ class _Drive:
     @classmethod
     def of(cls, scene: Scene, linkage: Linkage, known: Collection[str], name: str) -> "_Drive":
         joint = scene.joints[name]
-        several = f"{name}/" if len(scene.driven_joints) > 1 else ""
-        names = (f"drive/{several}{what}" for what in ("torque", "force"))
+        names = (f"{drive_prefix(scene, name)}{what}" for what in ("torque", "force"))
         one, other = (linkage.bodies.index(link) for link in moving_pair(joint)[:2])
         effort = next((each for each in names if each in known), "")
         return cls(effort, (one, other), np.asarray(joint.at), joint_axis(joint), joint.kind == "prismatic")

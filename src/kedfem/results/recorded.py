@@ -21,6 +21,11 @@ class Recorded:
     rows: Callable[[Block], Rows]
 
 
+def drive_prefix(scene: Scene, driven: str) -> str:
+    """How channels of the drive of a joint begin: `drive/`, or `drive/JOINT/` where there are several."""
+    return f"drive/{driven}/" if len(scene.driven_joints) > 1 else "drive/"
+
+
 def drive_channel(scene: Scene) -> Channel:
     """What the position of a scene's drive is called; of several drives that of the first."""
     names = list(scene.driven_joints)

@@ -90,7 +90,8 @@ class FatigueData(Record):
             if getattr(self, key) is None:
                 yield (key,), f"is required with {kind}, got nothing"
         for key in foreign[kind]:
-            if key in self.model_fields_set and getattr(self, key) is not None:
+            # what has its default value may be written: a stored scene has every key
+            if getattr(self, key) != type(self).model_fields[key].default:
                 yield (key,), f"must be left out with {kind}, got one"
 
     def _impossible(self) -> Iterator[Fault]:

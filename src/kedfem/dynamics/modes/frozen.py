@@ -97,6 +97,10 @@ class Frozen:
         self._like: Instant | None = None
         self.factorisations += len(self.held)
 
+    def frozen(self, motion: RigidMotion) -> "Frozen":
+        """Itself: its stiffness does not depend on the motion."""
+        return self
+
     def at(self, motion: RigidMotion) -> Modes:
         """The lowest modes at a position; parameters and errors as in `modes`."""
         omega, still, x = self.modes(motion)

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.matrices.substructure import mass_matrix
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.stiffening import stiffening
@@ -21,8 +21,11 @@ from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
+from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import Scene
 
 Rigid = tuple[Float[np.ndarray, "k r"], Float[np.ndarray, "r r"]]
 """Rigid motions of a link, and its mass in them."""
@@ -112,7 +115,30 @@ def _unstable(rigid: Rigid, added: sp.csr_array) -> float:
     return max(0.0, -float(lowest))
 
 
-def refuse_carried(driven: Model, free: bool) -> None:
+def frozen_linkage(
+    scene: Scene, system: System, linkage: Linkage, along: Path, count: int, free: bool
+) -> Frozen | Stiffened:
+    """What finds the modes of a scene's system at positions.
+
+    Parameters
+    ----------
+    count : vibrations that are wanted
+    free : whether the drives have let go of their joints in the system
+
+    Raises
+    ------
+    SceneError
+        Stiffening of a link that a drive which lets go has carried.
+    """
+    released = linkage.mobility + (len(scene.driven_joints) if free else 0)
+    if not scene.analysis.stiffening:
+        return Frozen(system, count, released)
+    driven = elastic_model(scene, linkage, along=along)
+    _refuse_carried(driven, free)
+    return Stiffened(system, driven, count, released)
+
+
+def _refuse_carried(driven: Model, free: bool) -> None:
     """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
 
     Raises

@@ -7,6 +7,7 @@ import numpy as np
 from kedfem.dynamics.model import Model
 from kedfem.results.forces.constraint_forces import shared_rows
 from kedfem.results.forces.joint_forces import INDETERMINATE, rows_of_joint
+from kedfem.results.recorded import drive_prefix
 from kedfem.scene import GROUND, Scene
 
 
@@ -23,9 +24,9 @@ def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[
             if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
                 out[f"joints/{name}/{what}"] = _reason(scene, model, name)
     for name in scene.driven_joints:
-        several = f"{name}/" if len(scene.driven_joints) > 1 else ""
-        if not any(f"drive/{several}{what}" in channels for what in ("torque", "force")):
-            out[f"drive/{several}torque"] = _reason(scene, model, name)
+        prefix = drive_prefix(scene, name)
+        if not any(f"{prefix}{what}" in channels for what in ("torque", "force")):
+            out[f"{prefix}torque"] = _reason(scene, model, name)
     return out
 
 

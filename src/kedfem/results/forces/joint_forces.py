@@ -18,7 +18,7 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.results.forces.constraint_forces import ConstraintForces, known, of_joint
 from kedfem.results.forces.force_elements import Measured
-from kedfem.results.recorded import Recorded, Rows
+from kedfem.results.recorded import Recorded, Rows, drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, Scene
 
@@ -368,12 +368,7 @@ def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
     slide = scene.joints[driven].kind == "prismatic"
     quantity, unit = ("force", "N") if slide else ("torque", "N m")
     text = f"{quantity} of the drive on link {on}"
-    return Channel(f"drive/{_of_several(scene, driven)}{quantity}", (quantity,), unit, "world", text)
-
-
-def _of_several(scene: Scene, driven: str) -> str:
-    """Part of a channel's name where there are several drives."""
-    return f"{driven}/" if len(scene.driven_joints) > 1 else ""
+    return Channel(f"{drive_prefix(scene, driven)}{quantity}", (quantity,), unit, "world", text)
 
 
 def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:

@@ -18,6 +18,7 @@ from kedfem.motion.path import Path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.forces.force_elements import Measured
+from kedfem.results.recorded import drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
@@ -166,8 +167,7 @@ def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
     link = moving_pair(joint)[0]
     what, unit = ("force", "N") if joint.kind == "prismatic" else ("torque", "N m")
     text = f"{what} of the drive on link {link} were all links rigid"
-    several = f"{name}/" if len(scene.driven_joints) > 1 else ""
-    channel = Channel(f"drive/{several}rigid_{what}", (what,), unit, "world", text)
+    channel = Channel(f"{drive_prefix(scene, name)}rigid_{what}", (what,), unit, "world", text)
     return Borne(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
