@@ -41,7 +41,7 @@ def bench_fatigue(folder: Path, quick: bool) -> None:
 def _look(recovery: StressRecovery, kept: Kept, criterion: str) -> Look:
     data = FatigueData.model_validate({"group": "steel", "tensile_strength": 8e8})
     asked = Fatigue.model_validate({"materials": {"steel": data}, "criterion": criterion})
-    of = Stressed(recovery, kept, [""] * recovery.points, [])
+    of = Stressed(recovery, kept, [""] * recovery.points)
     return Look(of, strength_of(data, 2.1e11), asked, Period(PERIOD, 2 * PERIOD, before=True))
 
 

@@ -200,7 +200,9 @@ def keys(name: str, link: Segments) -> list[str]:
 def _shared(name: str, link: Segments) -> list[SharedCut]:
     key = keys(name, link)
     return [
-        SharedCut((key[a], key[b]), cut.points, cut.weights) for cut in link.cuts for a, b in [cut.segments]
+        SharedCut((key[a], key[b]), cut.points, cut.weights, () if cut.even else cut.facets)
+        for cut in link.cuts
+        for a, b in [cut.segments]
     ]
 
 

@@ -1,18 +1,16 @@
 """Points at the surface of a link with the surface's axes there: where cracks begin."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
 from kedfem.links.surfaces.surface import boundary, surface
 
 ROUNDING = 1e-9  # of a function whose largest value is one
-SAME = 1e-6  # of a link's size: facets of two segments at the same place are the sides of a cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,28 +25,23 @@ class FreeSurface:
     axes: Float[np.ndarray, "k 3 3"]
 
 
-def free_surface(recovery: StressRecovery, beside: Sequence[Link] = ()) -> FreeSurface:
+def free_surface(recovery: StressRecovery) -> FreeSurface:
     """Places at a link's surface.
 
     Of solids the nodes of boundary facets, with the mean normal of these; of plane links all nodes, z being the normal;
     of beams all places of their sections: the first tangent is the beam's, the second that of the shear by torsion.
-
-    Parameters
-    ----------
-    beside : other segments of the same link, whose cuts with this one are not surface
     """
     link = recovery.link
     if link.kind == "solid":
-        return _of_solid(link, beside)
+        return _of_solid(link)
     axes = np.tile(np.eye(3), (recovery.stressed, 1, 1))
     if link.kind == "spatial_beam":
         axes = _of_sections(recovery.matrices[1], recovery.matrices[2])
     return FreeSurface(np.arange(recovery.stressed), axes)
 
 
-def _of_solid(link: Link, beside: Sequence[Link]) -> FreeSurface:
-    facets, corners, _ = boundary(link)
-    facets = facets[~_cut(link, corners.mean(axis=1), beside)]
+def _of_solid(link: Link) -> FreeSurface:
+    facets, _, _ = boundary(link)
     of = surface(link, facets)
     on = (np.abs(of.N) > ROUNDING).any(axis=1)  # (f, m) functions of nodes on a facet: others are zero there
     normals = np.zeros((link.n, 3))
@@ -57,17 +50,6 @@ def _of_solid(link: Link, beside: Sequence[Link]) -> FreeSurface:
         np.add.at(normals, of.dofs[on[:, m], m], mean[on[:, m]])
     places = np.unique(of.dofs[on])
     return FreeSurface(places, surface_axes(normals[places]))
-
-
-def _cut(link: Link, centres: Float[np.ndarray, "f 3"], beside: Sequence[Link]) -> Bool[np.ndarray, " f"]:
-    """Which boundary facets of a segment are those of another one, too."""
-    from scipy.spatial import cKDTree
-
-    cut = np.zeros(len(centres), bool)
-    for other in beside:
-        others = boundary(other)[1].mean(axis=1)
-        cut |= cKDTree(others).query(centres)[0] < SAME * link.size
-    return cut
 
 
 def surface_axes(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:

@@ -6,21 +6,19 @@ one than the element's own. Their difference in the energy norm, of the whole, i
     η² = ∫ (σ* − σ_h) : C⁻¹ : (σ* − σ_h) / (∫ σ_h : C⁻¹ : σ_h + the same)
 
 A displacement under the loads, that is a compliance, errs by η². At an edge that points inwards without a fillet, and
-under a force at a point, the exact stress has no bound: nothing converges there, which `singular_edges` tells.
+under a force at a point, the exact stress has no bound: nothing converges there, which `re_entrant` tells.
 """
 
 from dataclasses import dataclass
-from itertools import combinations
-from typing import Any
 
 import numpy as np
 import skfem
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, nodal_state
+from kedfem.links.singular_stress import re_entrant
 
-SHARP = 0.35  # rad that a surface must turn inwards at an edge: facets of a bore, 24 of them, turn by 0.26
 NEAR_PEAK = 0.5  # of the highest density of the error: an edge there is worth a word
 
 
@@ -67,8 +65,8 @@ def indicator(link: Link, g: Float[np.ndarray, "n d"]) -> Indicator:
     mean = (error.sum() + energy.sum()) / volume.sum()
     density = error / volume
     elements = np.sqrt(density / mean) if mean else np.zeros_like(density)
-    worst = np.flatnonzero(density >= NEAR_PEAK * density.max(initial=0.0))
-    singular = bool(mean) and bool(np.isin(worst, singular_elements(link)).any())
+    worst = density >= NEAR_PEAK * density.max(initial=0.0)
+    singular = bool(mean) and bool(re_entrant(link)[link.cells[worst]].any())
     return Indicator(elements, float(error.sum()), float(energy.sum()), singular)
 
 
@@ -77,42 +75,3 @@ def _density(link: Link, H: Float[np.ndarray, "d d e q"]) -> Float[np.ndarray, "
     lam, mu = link.lame
     strain = (H + H.swapaxes(0, 1)) / 2
     return np.asarray(lam * np.einsum("iieq->eq", strain) ** 2 + 2 * mu * (strain**2).sum(axis=(0, 1)))
-
-
-def singular_elements(link: Link) -> Int[np.ndarray, " k"]:
-    """Elements that touch an edge (in a plane, a corner) where the surface turns inwards by more than SHARP."""
-    mesh = link.basis.mesh
-    facets = mesh.boundary_facets()
-    corners = mesh.facets[:, facets]  # (c, f), not in order around the facet
-    middles, normals = _outward(mesh, facets, mesh.p[:, corners])
-    if link.d == 2:
-        ends = corners
-    else:
-        pairs = np.array(list(combinations(range(len(corners)), 2)))
-        ends = _key(np.sort(corners[pairs], axis=1), mesh.p.shape[1])  # (6 or 3, f)
-        ends = np.where(np.isin(ends, _key(np.sort(mesh.edges, axis=0)[None], mesh.p.shape[1])), ends, -1)
-    key, facet = ends.ravel(), np.tile(np.arange(len(facets)), len(ends))
-    order = np.argsort(key, kind="stable")
-    key, facet = key[order], facet[order]
-    met = np.flatnonzero((key[1:] == key[:-1]) & (key[1:] >= 0))
-    one, other = facet[met], facet[met + 1]
-    turn = np.arccos(np.clip((normals[one] * normals[other]).sum(axis=1), -1, 1))
-    inwards = (turn > SHARP) & ((normals[one] * (middles[other] - middles[one])).sum(axis=1) > 0)
-    found = key[met][inwards]
-    nodes = found if link.d == 2 else np.concatenate(np.divmod(found, mesh.p.shape[1]))
-    return np.flatnonzero(np.isin(mesh.t, nodes).any(axis=0))
-
-
-def _key(pairs: Int[np.ndarray, "k 2 f"], n: int) -> Int[np.ndarray, "k f"]:
-    """One number for each pair of nodes."""
-    return np.asarray(pairs[:, 0].astype(np.int64) * n + pairs[:, 1])
-
-
-def _outward(
-    mesh: Any, facets: Int[np.ndarray, " f"], points: Float[np.ndarray, "d c f"]
-) -> tuple[Float[np.ndarray, "f d"], Float[np.ndarray, "f d"]]:
-    """Middles of facets, and unit normals that point away from the element behind each."""
-    middles = points.mean(axis=1).T
-    normals = np.linalg.svd((points - middles.T[:, None]).transpose(2, 1, 0))[2][:, -1]
-    inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1).T
-    return middles, normals * np.sign(((middles - inside) * normals).sum(axis=1))[:, None]

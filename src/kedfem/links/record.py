@@ -5,7 +5,7 @@ matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)].
 no third dimension.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -118,6 +118,7 @@ class Link:
     element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
     faces : those with names, of a solid from CAD or from a mesh file with groups
     way : how the mesh of a part from CAD was made, in words; else empty
+    cuts : (c,) facets of the basis at which a segment ends and another one begins: no surface of the link
     """
 
     name: str
@@ -146,6 +147,7 @@ class Link:
     element: BeamElement | None = None
     faces: tuple[LinkFace, ...] = ()
     way: str = ""
+    cuts: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def n(self) -> int:

@@ -22,12 +22,18 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.coupling_surfaces import facet_seat, joint_seat, port_weights
+from kedfem.links.surfaces.surface import boundary
 from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import Material
 
 SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
+LEANS = np.radians(
+    10
+)  # against the direction that cuts are across: facets of a cylinder along it lean by less
+TRIED = 64  # places for cuts, in the length of a link
+NEAR = 0.4  # of a segment's length: so far a cut goes to where the link is a prism
 Interval = tuple[float, float]
 
 
@@ -38,11 +44,16 @@ class Cut:
     segments : their numbers
     points : (k, 3) in the reference position [m]
     weights : (k, n) of each
+    facets : of each, of a mesh
+    even : whether the link is a prism around the cut, where an affine field is all that it must carry: stresses near it
+        are those of the whole link
     """
 
     segments: tuple[int, int]
     points: Float[np.ndarray, "k 3"]
     weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]
+    facets: tuple[Int[np.ndarray, " f"], ...] = ()
+    even: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,41 +99,83 @@ def segmented(
         return Segments((corotational(link),), functions=(np.arange(link.n),))
     e = along(link, ends)
     s = link.X[link.cells] @ e  # (e, m)
-    places = _places(count, ends @ e if len(ends) > 1 else s, whole)
+    places, even = _places(count, ends @ e if len(ends) > 1 else s, whole, _Shape(link, e))
     slice_of = _smoothed(link, np.searchsorted(places, s.mean(axis=1)), count)
     found = [np.flatnonzero(slice_of == k) for k in range(count)]
     parts = [_slice(link, material, elements) for elements in found if len(elements)]
-    cuts = [_cut(a, b, k) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
+    cuts = [_cut(a, b, e, k, even[k]) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
     if len(parts) < count or None in cuts:
         fewer = sum(cut is not None for cut in cuts) + 1
         raise MeshError(
             f"links.{link.name}.segments: must be at most {min(fewer, count - 1)} for this mesh, whose elements cannot "
             f"be divided into more slices across the link, got {count}; take a finer mesh"
         )
+    kept = tuple(cut for cut in cuts if cut)
     return Segments(
-        tuple(corotational(part) for part, _ in parts),
-        tuple(cut for cut in cuts if cut),
+        tuple(replace(corotational(part), cuts=_facets_on(kept, k)) for k, (part, _) in enumerate(parts)),
+        kept,
         tuple(n for _, n in parts),
     )
 
 
+def _facets_on(cuts: Sequence[Cut], number: int) -> Int[np.ndarray, " c"]:
+    """Facets of a segment that are sides of cuts."""
+    sides = [cut.facets[cut.segments.index(number)] for cut in cuts if number in cut.segments]
+    return np.unique(np.concatenate(sides, dtype=np.int64))
+
+
 def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
-    """Unit vector across which a link is cut: between the two joints furthest apart, else where it is longest."""
+    """Unit vector across which a link is cut: between the two joints furthest apart, else its longest axis of inertia."""
     if len(ends) > 1:
         distance = np.linalg.norm(ends[:, None] - ends, axis=2)
         a, b = np.unravel_index(distance.argmax(), distance.shape)
         if distance[a, b] > 0.1 * link.size:
             return np.asarray((ends[b] - ends[a]) / distance[a, b])
-    return np.asarray(np.linalg.svd(link.X - link.X.mean(axis=0), full_matrices=False)[2][0])
+    X = link.X - np.outer(link.one, link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    return np.asarray(np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1])
 
 
-def _places(count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval]) -> Float[np.ndarray, " c"]:
-    """Where to cut: evenly, moved out of ranges that stay whole."""
+class _Shape:
+    """Where a link is a prism along a direction: no surface around leans by more than LEANS, ends apart."""
+
+    def __init__(self, link: Link, e: Float[np.ndarray, "3"]) -> None:
+        _, corners, normals = boundary(link)
+        self.s, along = link.X @ e, corners @ e
+        across = link.X - np.outer(self.s, e)
+        self.across = across - across.mean(axis=0)
+        rounding = SAME * link.size
+        end = (along.max(axis=1) < self.s.min() + rounding) | (along.min(axis=1) > self.s.max() - rounding)
+        leaning = (np.abs(normals @ e) > np.sin(LEANS)) & ~end
+        self.low, self.high = along[leaning].min(axis=1), along[leaning].max(axis=1)
+
+    def even(self, place: float) -> bool:
+        """Whether it is one around a place, as far as half of its width there: what is not affine dies away so fast."""
+        reach = np.ptp(self.s) / TRIED
+        here = self.across[np.abs(self.s - place) < reach]
+        half = np.linalg.norm(here - here.mean(axis=0), axis=1).max() if len(here) else 0.0
+        return not ((self.low < place + half) & (self.high > place - half)).any()
+
+
+def _places(
+    count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval], shape: _Shape
+) -> tuple[Float[np.ndarray, " c"], list[bool]]:
+    """Where to cut: evenly, but where the link is a prism if there is such a place near, never in ranges that stay whole.
+
+    Returns also whether it is one around each place.
+    """
     places = np.linspace(s.min(), s.max(), count + 1)[1:-1]
+    tried = np.linspace(s.min(), s.max(), TRIED + 1)[1:-1]
+    free = [x for x in tried if shape.even(x) and not any(low < x < high for low, high in whole)]
+    even = [shape.even(x) for x in places]
+    for k, place in enumerate(places):
+        held = any(low < place < high for low, high in whole)
+        near = min(free, key=lambda x: abs(x - place), default=np.inf)
+        if (held or not even[k]) and abs(near - place) < NEAR * np.ptp(s) / count:
+            places[k], even[k] = near, True
     for low, high in whole:
         inside = (places > low) & (places < high)
         places[inside] = np.where(places[inside] - low < high - places[inside], low, high)
-    return places
+    return places, even
 
 
 def _smoothed(link: Link, slice_of: Int[np.ndarray, " e"], count: int) -> Int[np.ndarray, " e"]:
@@ -178,7 +231,7 @@ def _slice_faces(
     return tuple(faces)
 
 
-def _cut(a: Link, b: Link, number: int) -> Cut | None:
+def _cut(a: Link, b: Link, e: Float[np.ndarray, "3"], number: int, even: bool) -> Cut | None:
     """The ports of the facets that two slices share, None if they share none: its middle, and points off it within it."""
     from scipy.spatial import cKDTree
 
@@ -187,14 +240,13 @@ def _cut(a: Link, b: Link, number: int) -> Cut | None:
     here = np.flatnonzero(distance <= SAME * max(a.size, b.size))
     if not len(here):
         return None
-    seats = [
-        facet_seat(part, part.basis.mesh.boundary_facets()[facets])
-        for part, facets in ((a, here), (b, nearest[here]))
-    ]
+    one, other = (part.basis.mesh.boundary_facets()[sides] for part, sides in ((a, here), (b, nearest[here])))
+    seats = facet_seat(a, one, e), facet_seat(b, other, e)
     first = seats[0]
     off = first.spread[: a.d - 1, None] * first.directions[: a.d - 1]
     points = first.origin + np.concatenate([np.zeros((1, 3)), off])
-    return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))
+    weights = (port_weights(seats[0], points), port_weights(seats[1], points))
+    return Cut((number, number + 1), weights[0] @ a.X, weights, (one, other), even)
 
 
 def _facet_middles(part: Link) -> Float[np.ndarray, "f d"]:

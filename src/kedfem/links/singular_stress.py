@@ -7,7 +7,7 @@ from kedfem.links.record import Link
 from kedfem.links.surfaces.surface import boundary, neighbours, surface
 
 SHARP = np.cos(
-    np.radians(30)
+    np.radians(20)
 )  # between facets at their common edge; those of rounds differ by a few degrees there
 
 

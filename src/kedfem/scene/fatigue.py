@@ -139,7 +139,7 @@ class Fatigue(Record):
     required_life: PositiveTime | None = None
     """for which utilisations hold, such as `"20000 h"`; endless if not given"""
     near_joints: StrictBool = False
-    """whether points near corners, point forces and surfaces held by joints count, where stress is not what it seems"""
+    """whether points near corners, point forces, surfaces held by joints and cuts count, where stress is uncertain"""
 
     @model_validator(mode="after")
     def _some_data(self) -> Self:

@@ -37,8 +37,12 @@ class Attachment:
 
 @dataclass(frozen=True, slots=True)
 class SharedCut:
-    """Where two segments of a link meet: their keys, the points of the cut (k, 3) and each one's weights (k, n)."""
+    """Where two segments of a link meet: their keys, the points of the cut (k, 3) and each one's weights (k, n).
+
+    uneven : facets of each where the link is no prism around the cut, so that stresses there are not those of the whole
+    """
 
     keys: tuple[str, str]
     points: Float[np.ndarray, "k 3"]
     weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]
+    uneven: tuple[Int[np.ndarray, " f"], ...] = ()

@@ -246,13 +246,26 @@ def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coup
     )
 
 
-def facet_seat(link: Link, facets: Int[np.ndarray, " f"]) -> CouplingSurface:
-    """The coupling surface that some boundary facets of a meshed link make."""
+def facet_seat(
+    link: Link, facets: Int[np.ndarray, " f"], across: Float[np.ndarray, "3"] | None = None
+) -> CouplingSurface:
+    """The coupling surface that some boundary facets of a meshed link make.
+
+    Parameters
+    ----------
+    across : unit vector; facets count with their area across it, and the field is affine over a plane across it. So what
+        it bears is spread as the tension and bending of a prism would be over facets that are no plane
+    """
     on = surface(link, facets)
     x, dA = on.x.transpose(2, 0, 1), on.dA  # (3, f, q), (f, q)
+    if across is not None:
+        dA = dA * (on.normals @ across)
+        dA *= np.sign(dA.sum())
     area = dA.sum()
     origin = np.einsum("kfq,fq->k", x, dA) / area
     r = x - origin[:, None, None]
+    if across is not None:
+        r -= np.einsum("k,j,jfq->kfq", across, across, r)
     spread, directions = _principal(np.einsum("ifq,jfq,fq->ij", r, r, dA) / area, link.d)
     phi = np.concatenate([np.ones((1, *dA.shape)), np.einsum("ij,jfq->ifq", directions, r)])
     moments = np.zeros((4, link.n))

@@ -103,9 +103,9 @@ def _facet_rule(elem: skfem.Element) -> tuple[np.ndarray, np.ndarray]:
 def boundary(
     link: Link,
 ) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f c 3"], Float[np.ndarray, "f 3"]]:
-    """Boundary facets with their corners and outward unit normals."""
+    """Facets at the surface with their corners and outward unit normals; cuts of a segment are none."""
     mesh = link.basis.mesh
-    facets = mesh.boundary_facets()
+    facets = np.setdiff1d(mesh.boundary_facets(), link.cuts)
     corners = link.X[mesh.facets[:, facets]].transpose(1, 0, 2)
     inner = link.X[mesh.t[: link.basis.elem.refdom.nnodes, mesh.f2t[0, facets]]].mean(axis=0)
     edges = corners[:, 1:] - corners[:, :1]

@@ -80,12 +80,11 @@ def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
 
 
 def _stressed(model: Model, envelope: Envelope, near: Sequence[Sequence[str]], k: int) -> Stressed:
-    """A link or segment with its history, and the other segments of the same link."""
-    kept, name = envelope.kept(k), model.links[k].name
+    """A link or segment with its history."""
+    kept = envelope.kept(k)
     if kept is None:
-        raise TypeError(f"{name}: has no history")
-    beside = [j for j, link in enumerate(model.links) if j != k and link.name == name]
-    return Stressed(envelope.recoveries[k], kept, near[k], [envelope.recoveries[j].link for j in beside])
+        raise TypeError(f"{model.links[k].name}: has no history")
+    return Stressed(envelope.recoveries[k], kept, near[k])
 
 
 def _doubt(scene: Scene, period: Period, repeats: float) -> str:

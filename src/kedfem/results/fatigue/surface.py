@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.links.free_surface import FreeSurface, free_surface
-from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
 from kedfem.processes import threads
 from kedfem.results.fatigue.planes import (
@@ -94,13 +93,11 @@ class Stressed:
     """A link or segment with the history of its stress.
 
     near : what each of its points is near to, in words
-    beside : other segments of the same link
     """
 
     recovery: StressRecovery
     kept: Kept
     near: Sequence[str]
-    beside: Sequence[Link]
 
 
 class Look:
@@ -116,7 +113,7 @@ class Look:
         self.recovery, self.near, self.parts = of.recovery, of.near, of.kept.parts
         self.name = of.recovery.link.name
         self.C, self.gone = period.of(of.kept)
-        whole = free_surface(of.recovery, of.beside)
+        whole = free_surface(of.recovery)
         words = np.array([bool(word) for word in of.near])[whole.places % self.recovery.points]
         out = words & (not asked.near_joints)
         self.left_out = int(out.sum())

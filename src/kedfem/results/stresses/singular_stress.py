@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.places import on_part, part_seat
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, link_keys
 from kedfem.errors import KedfemError
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery, point_rows
@@ -17,7 +17,9 @@ from kedfem.scene import ForceLoad, Scene
 CORNER = "a sharp re-entrant corner"
 GROWS = "stress there depends on the mesh and grows when it is refined"
 CONTACT = "the contact itself is not modelled"
-AWAY = "corners, point forces and surfaces held by joints"
+CUT = "a cut between two segments where the link is no prism"
+AFFINE = "the cut lets go of all but an affine field; links.NAME.segments = 1 or another number shows how much that is"
+AWAY = "corners, point forces, surfaces held by joints and cuts"
 
 
 def doubtful(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -> list[list[str]]:
@@ -47,6 +49,11 @@ def doubtful(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -
     for k, link in full.items():
         if link.meshed and not link.rigid:
             words[int(k)][around(link, link.X[re_entrant(link)])] = CORNER
+    names = link_keys(model)
+    for cut in model.cuts:
+        for key, facets in zip(cut.keys, cut.uneven, strict=False):
+            link = full[str(number := names.index(key))]
+            words[number][around(link, link.X[link.basis.mesh.facets[:, facets].ravel()])] = CUT
     return [list(each) for each in words]
 
 
@@ -56,4 +63,6 @@ def _place(where: str, at: Float[np.ndarray, "3"], link: Link) -> Float[np.ndarr
 
 def reason(near: str) -> str:
     """Why stress near such a place is not what it seems."""
+    if near == CUT:
+        return AFFINE
     return CONTACT if near.startswith("the surface") else GROWS
