@@ -8,11 +8,13 @@ import pytest
 import pyvista
 from numpy.testing import assert_allclose
 
+from kedfem.accuracy.plan import plan_for
 from kedfem.analysis import Run, analyse
+from kedfem.links.surfaces.coupling_surfaces import is_flat, joint_seat
 from kedfem.scene import scene_from
 from tests.laws.test_limits import AXES
 from tests.rooms.cad_files import written
-from tests.verification.concentrations import bored_bar, shaft
+from tests.verification.concentrations import bored_bar, meshed, shaft
 
 LENGTH, PULL = 0.1, 1e6
 VON_MISES = "highest von Mises stress [Pa]"
@@ -69,6 +71,37 @@ def test_a_peak_beside_a_cut_is_that_of_the_whole_link(draw: Any, tmp_path: Path
         assert np.abs(moment).max() < 1e-6 * np.abs(force).max()
         assert not any("a cut" in warning for warning in run.warnings)
     assert_allclose(found[1], found[0], rtol=0.05)
+
+
+@pytest.mark.parametrize("angle", [45, 30, 22.5, 15, 10, 7.5])
+def test_a_weld_at_a_shafts_end_sits_there_however_fine_its_fillet_is(angle: float) -> None:
+    """A ring of a fillet is at one distance from a point on the axis, too, but no ball about it."""
+    link = meshed(shaft, None, fillet_angle=float(np.radians(angle)))
+    for end in (0.0, 0.1):
+        seat = joint_seat(link, "joints.W", np.array([end, 0, 0]), None)
+        assert_allclose(seat.origin, [end, 0, 0], atol=1e-12)
+        assert is_flat(seat)
+
+
+@pytest.mark.parametrize(("accuracy", "angle"), [("quick", None), (0.2, 45.0), (0.05, 22.5), (0.02, 15.0)])
+def test_an_accuracy_divides_fillets_of_parts_with_or_without_a_drive(
+    accuracy: Any, angle: float | None, tmp_path: Path
+) -> None:
+    written(tmp_path, "part", bored_bar, ("step",))
+    part = {"material": "steel", "fidelity": "solid", "shape": {"kind": "cad", "file": "part.step"}}
+    raw = {
+        "links": {"bar": part},
+        "joints": {"W": {"kind": "weld", "links": ["ground", "bar"], "at": [0, 0, 0.002]}},
+        "analysis": {"kind": "static", "accuracy": accuracy},
+    }
+    plan = plan_for(scene_from(raw, tmp_path))
+    if angle is None:
+        assert plan is None
+    else:
+        assert plan is not None
+        assert plan.scene.links["bar"].mesh.fillet_angle == pytest.approx(np.radians(angle))
+    stated = {**raw, "links": {"bar": part | {"mesh": {"elements_across": 2}}}}
+    assert plan_for(scene_from(stated, tmp_path)) is None
 
 
 def test_a_peak_at_a_cut_through_a_bore_is_said_to_be_one(tmp_path: Path) -> None:

@@ -328,7 +328,7 @@ class TestCusps:
             with pytest.raises(
                 OtherWayError, match="must meet at angles of at least 6°, got two that touch at"
             ):
-                plan_mesh("part", plan, 0.1, math.pi / 4)
+                plan_mesh("part", plan, 0.1, Sizing())
         assert any(place in words for words in found)
 
 

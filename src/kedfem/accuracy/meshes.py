@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from kedfem.accuracy.choices import elastic, open_step
 from kedfem.accuracy.estimates import Strained, link_errors, mesh_errors
 from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import refinable, refined, shortened, with_links
-from kedfem.scene import MeshFile, Scene, time_grid
+from kedfem.accuracy.variants import filleted, refinable, refined, shortened, with_links
+from kedfem.scene import Cad, MeshFile, Scene, time_grid
 
 MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
 FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
+FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # degrees an element turns, by accuracy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced unasked
 
@@ -23,6 +26,17 @@ def open_meshes(scene: Scene) -> list[str]:
         if (elastic(link, "solid") or elastic(link, "plane")) and "mesh" not in link.model_fields_set
         and not isinstance(link.shape, MeshFile)
     ]  # fmt: skip
+
+
+def with_fillets(scene: Scene, asked: float) -> Scene:
+    """The scene with fillets and free bores of parts from CAD divided as their stress needs, where meshes are open."""
+    angle = np.radians(next((angle for least, angle in FILLETS if asked >= least), FINEST_FILLET))
+    links = {
+        name: filleted(link, float(angle))
+        for name, link in scene.links.items()
+        if isinstance(link.shape, Cad) and link.fidelity != "rigid" and "mesh" not in link.model_fields_set
+    }
+    return with_links(scene, links) if links else scene
 
 
 def open_modes(scene: Scene) -> list[str]:

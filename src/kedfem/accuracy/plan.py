@@ -25,7 +25,7 @@ from kedfem.accuracy.choices import (
     open_step,
     with_beams,
 )
-from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_modes
+from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_fillets, with_modes
 from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
@@ -90,8 +90,8 @@ class Plan:
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     """The plan of a scene that leaves something open; None of one that asks for plain defaults.
 
-    Of solid and plane links that move freely the step alone: they are not reduced; each trial is as dear as a run. The
-    plan of a steady motion is that of the motion from the start on, over its period.
+    Of solid and plane links that move freely the step alone, and how finely fillets are divided: they are not reduced;
+    each trial is as dear as a run. The plan of a steady motion is that of the motion from the start on, over its period.
 
     Raises
     ------
@@ -103,9 +103,12 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     if scene.analysis.kind == "steady":
         plan = plan_for(with_analysis(scene, kind="transient"), stage)
         return plan and replace(plan, scene=with_analysis(plan.scene, kind="steady"))
+    finer = with_fillets(scene, scene.analysis.accuracy)
     if not scene.driven_joints and not beams_only(scene) and not open_step(scene):
-        return None
-    return planned(scene, stage)
+        if finer is scene:
+            return None
+        return Plan(with_analysis(finer, accuracy="quick"), scene.analysis.accuracy, 1.0, (), ())
+    return planned(finer, stage)
 
 
 def anything_open(scene: Scene) -> bool:

@@ -77,7 +77,16 @@ def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkSce
     """The link meshed in another way, with the usual element and mesh of that way."""
     gone = CHOSEN if family in {"plane", "solid"} else CHOSEN | {"segments"}
     given = {key: getattr(link, key) for key in link.model_fields_set - gone}
-    return LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
+    other = LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
+    return other if link.mesh.fillet_angle is None else filleted(other, link.mesh.fillet_angle)
+
+
+def filleted(link: LinkScene, angle: float) -> LinkScene:
+    """The link with fillets divided by an angle [rad]; its mesh is as open or as stated as it was."""
+    changed = link.model_copy(update={"mesh": link.mesh.model_copy(update={"fillet_angle": angle})})
+    if "mesh" not in link.model_fields_set:
+        changed.model_fields_set.discard("mesh")
+    return changed
 
 
 def families(link: LinkScene) -> tuple[Family, ...]:

@@ -124,9 +124,11 @@ def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
 
 def sizing(mesh: Meshing) -> Sizing:
     """What the keys of a link's mesh ask for."""
+    hollow = np.pi / 4 if mesh.fillet_angle is None else mesh.fillet_angle
     return Sizing(
-        size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers, ignore=mesh.defeature_size
-    )
+        size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers, ignore=mesh.defeature_size,
+        hollow=hollow,
+    )  # fmt: skip
 
 
 def _wanted(link: LinkScene, shape: Cad, kept_whole: KeptWhole) -> Sizing:

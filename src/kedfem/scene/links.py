@@ -64,6 +64,11 @@ class Meshing(Record):
     defeature_size: PositiveLength | None = None
     """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
     then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""
+    fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = (
+        None
+    )
+    """a part from CAD that is swept: most that an element turns along a fillet, or a bore without a joint; 45° if not
+    given, and where `analysis.accuracy` leaves the mesh open 15° to 45°"""
     kind: Literal["hexahedra"] | None = None
     """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
 

@@ -1,5 +1,6 @@
 """What was chosen for an accuracy, and what it is expected to cost."""
 
+import numpy as np
 from rich.table import Table
 from rich.text import Text
 
@@ -40,7 +41,8 @@ def _step(scene: Scene) -> str:
 
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
-    mesh = ", ".join(f"{key} {value}" for key, value in link.mesh if value is not None) if link.shape else ""
+    sizes = ((key, value) for key, value in link.mesh if value is not None)
+    mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
     kind = f"{link.element} " if link.element and link.fidelity != "rigid" else ""
     return (
@@ -48,6 +50,10 @@ def _chosen(link: LinkScene) -> str:
         + (f" ({mesh})" if mesh else "")
         + segments
     )
+
+
+def _size(key: str, value: object) -> object:
+    return f"{np.degrees(value):.3g}°" if key == "fillet_angle" and isinstance(value, float) else value
 
 
 def reduction_table(reduction: Reduction) -> Table:

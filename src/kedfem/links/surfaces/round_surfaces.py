@@ -24,6 +24,7 @@ CLOSED = (
 LEVEL = 1e-3  # of a cylinder's length and radius: places along the axis that are the same
 MANY = 12  # facets at one distance from a point are not so by chance
 SUNK = 0.1  # of a cylinder's radius: how far within it its facets may sink; those of a prism of six sides sink by 0.13
+ALL_WAYS = 0.01  # least variance of the normals of a ball in any direction; a zone of it of 30° has 0.02
 DOMED = (
     0.1  # of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
 )
@@ -124,9 +125,9 @@ def ball(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
     mean = radius.mean(axis=1)
     round_ = np.ptp(radius, axis=1) <= CYLINDER_TOLERANCE * mean
     for same in _of_one_radius(np.flatnonzero(round_), mean):
-        # a cylinder's facets at one height are equidistant too, but their normals lie in a plane
-        spread = np.linalg.eigvalsh(normals[same].T @ normals[same] / len(same))
-        if spread[0] > 0.05 and (len(same) >= MANY or _domed(link, facets[same], point).all()):
+        # a ring of a cylinder, cone or fillet is equidistant too, but its normals end on a plane
+        spread = np.linalg.eigvalsh(np.cov(normals[same].T, ddof=0))
+        if spread[0] > ALL_WAYS and (len(same) >= MANY or _domed(link, facets[same], point).all()):
             return np.asarray(facets[same])
     return facets[:0]
 

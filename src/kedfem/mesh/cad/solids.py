@@ -70,6 +70,8 @@ class Sizing:
     across : hexahedra across the smallest width, where no size is given
     layers : least number through each thickness of a part made of layers
     turn : most that an element turns along a curved face [rad]
+    hollow : the same along a concave one of a part swept along or about a line, where stress is highest: fillets, and
+        bores that are around none of the places
     ignore : blends smaller than that may be left out [m]; None: convex ones that are very small
     kept, named : places (in the part's frame [m]) and faces where none may
     """
@@ -78,6 +80,7 @@ class Sizing:
     across: int = 2
     layers: int = 1
     turn: float = np.pi / 4
+    hollow: float = np.pi / 4
     ignore: float | None = None
     kept: tuple[tuple[float, float, float], ...] = ()
     named: tuple[str, ...] = ()

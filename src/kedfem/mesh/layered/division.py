@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from kedfem.mesh.cad.solids import Sizing
 from kedfem.mesh.layered.mapping import Mapping, mappings
@@ -14,6 +14,7 @@ _GROWTH = 0.4  # of an element's length by the distance
 _SLENDER = 1.5  # an element's length along a rib by the rib's width
 _FINEST = 0.2  # of the size: no arc asks for less to be exact
 _THINNEST = 0.05  # of the size: no rib asks for less
+_AROUND = 0.3  # of a bore's radius: a place so near its middle is in it
 _LOST = 1e-5  # of the volume: what parabolas may lose of a whole circle
 _LOST_AT_45 = 2.44e-3  # of R²: area of a circle less that inside eight parabolas, θ = 45° each:
 # 8 ((θ − sin θ) / 2 − 4/3 sin(θ/2) (1 − cos(θ/2))); it goes with θ⁴
@@ -53,11 +54,11 @@ def plan_size(plan: Plan, sizing: Sizing) -> float:
     return max(2 * area / perimeter / sizing.across, float(np.sqrt(area / _MOST)))
 
 
-def divided(plan: Plan, size: float, turn: float) -> tuple[Division, tuple[Mapping | None, ...]]:
+def divided(plan: Plan, size: float, sizing: Sizing) -> tuple[Division, tuple[Mapping | None, ...]]:
     """Nodes on all curves, and of each region how it can be mapped with them.
 
-    Elements are `size` long, shorter along thin ribs and where a curve turns by `turn` or by so much that a
-    parabola misses it; from there they grow with the distance. Their numbers are even on each curve, so that
+    Elements are `size` long, shorter along thin ribs and where a curve turns by the sizing's `turn` or `hollow` or by so
+    much that a parabola misses it; from there they grow with the distance. Their numbers are even on each curve, so that
     quadrilaterals can fill any region, and those of opposite sides are made equal where that costs little.
 
     Parameters
@@ -66,20 +67,48 @@ def divided(plan: Plan, size: float, turn: float) -> tuple[Division, tuple[Mappi
         Within its context.
     size : float [-]
         By the solid's extent.
-    turn : float [rad]
-        Most that an element turns along a curve.
+    sizing : Sizing
+        Its `turn`, `hollow` and `kept` places.
     """
-    sizes = _sizes(plan, size, turn)
+    sizes = _sizes(plan, size, _turns(plan, sizing))
     measures = [_measure(curve, local) for curve, local in zip(plan.curves, sizes, strict=True)]
     counts = [2 * max(1, int(np.ceil(measure[-1] / 2 - 0.25))) for measure in measures]
     fitting = mappings(plan, counts)
     return _nodes(plan, counts, measures, fitting), fitting
 
 
-def _sizes(plan: Plan, size: float, turn: float) -> list[Float[np.ndarray, " m"]]:
+def _turns(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
+    """Most that an element turns at the samples of each curve [rad]: less along walls that are hollow."""
+    out = [np.full(len(curve.samples), sizing.turn) for curve in plan.curves]
+    if sizing.hollow >= sizing.turn:
+        return out
+    held = ((np.array(sizing.kept).reshape(-1, 3) - plan.origin) @ plan.axes.T)[:, :2] / plan.extent
+    sides: list[list[Bool[np.ndarray, " slabs"]]] = [[] for _ in plan.curves]
+    runs = [(region, i, way) for region in plan.regions for loop in region.loops for i, way in loop]
+    for region, i, _ in runs:
+        sides[i].append(region.material)
+    for region, i, forward in runs:
+        wall = region.material.copy()
+        for other in sides[i]:
+            wall &= (other is region.material) | ~other
+        if not wall.any():
+            continue
+        points, inwards = _points_and_normals(plan.curves[i], forward)
+        along = np.stack([inwards[:, 1], -inwards[:, 0]], axis=1)
+        bends = plan.curves[i].bends if forward else plan.curves[i].bends[::-1]
+        radii = 1 / np.maximum(bends, 1e-9)
+        centres = points - radii[:, None] * inwards
+        off = np.linalg.norm(centres[:, None] - held, axis=2).min(axis=1, initial=np.inf)
+        hollow = ((np.gradient(along, axis=0) * inwards).sum(axis=1) < 0) & (off > _AROUND * radii)
+        turns = np.where(hollow & (bends > 0), sizing.hollow, sizing.turn)
+        out[i] = np.minimum(out[i], turns if forward else turns[::-1])
+    return out
+
+
+def _sizes(plan: Plan, size: float, turns: list[Float[np.ndarray, " m"]]) -> list[Float[np.ndarray, " m"]]:
     """Wanted length of the elements at the samples of each curve."""
     wanted = []
-    for curve, gap, height in zip(plan.curves, _gaps(plan), plan.wall_heights, strict=True):
+    for curve, gap, height, turn in zip(plan.curves, _gaps(plan), plan.wall_heights, turns, strict=True):
         radii = 1 / np.maximum(curve.bends, 1e-9)
         share = _LOST * plan.volume / (_LOST_AT_45 * radii**2 * max(height, 1e-9))
         exact = np.maximum(radii * np.pi / 4 * share**0.25, _FINEST * size)

@@ -165,7 +165,7 @@ def _mesh_along(
     with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
         size = share * plan_size(plan_with_cusps, sizing)
         plan, filled = without_cusps(plan_with_cusps, size)
-        flat = plan_mesh(solid.name, plan, size, sizing.turn)
+        flat = plan_mesh(solid.name, plan, size, sizing)
     layers = np.maximum(np.rint(np.diff(plan.heights) / size).astype(int), max(1, sizing.layers))
     words = _way_in_words(direction, flat, plan, int(layers.sum()))
     _check_count(solid, words, flat, plan, layers, sizing)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.cad.solids import OtherWayError
+from kedfem.mesh.cad.solids import OtherWayError, Sizing
 from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided
 from kedfem.mesh.layered.fills import Rim, mapped
@@ -41,7 +41,7 @@ class PlanMesh:
     settings: tuple[int, ...]
 
 
-def plan_mesh(where: str, plan: Plan, size: float, turn: float) -> PlanMesh:
+def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
     """The mesh of a plan, the nodes and middles of sides on its curves exactly there.
 
     Raises
@@ -50,7 +50,7 @@ def plan_mesh(where: str, plan: Plan, size: float, turn: float) -> PlanMesh:
         A region has a cusp, or quadrilaterals do not fill it; with its place.
     """
     _check_cusps(where, plan)
-    division, fitting = divided(plan, size, turn)
+    division, fitting = divided(plan, size, sizing)
     rims = [_rim(division, region) for region in plan.regions]
     fills = [
         _filled(where, plan, region, rim[1], fit)

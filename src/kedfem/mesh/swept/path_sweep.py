@@ -51,7 +51,7 @@ def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     def mesh_of(share: float) -> SolidMesh:
         with _section_plan(gmsh, solid, legs) as plan:
             size = share * plan_size(plan, sizing)
-            flat = plan_mesh(solid.name, plan, size, sizing.turn)
+            flat = plan_mesh(solid.name, plan, size, sizing)
         counts = [_count(leg, size * solid.extent, sizing) for leg in legs]
         frames = [legs[0].start, *(leg.at(k / (2 * n)) for leg, n in zip(legs, counts, strict=True)
                                    for k in range(1, 2 * n + 1))]  # fmt: skip

@@ -71,7 +71,7 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float) -> SolidMesh:
     """The mesh swept about the axis, in the solid's place."""
     with _meridian(gmsh, solid, turn, sizing, share) as meridian:
-        flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing.turn)
+        flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing)
         around = _elements_around(meridian, sizing)
         mesh = _turned(flat, around)
         for region in meridian.inside:
