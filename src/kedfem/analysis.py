@@ -15,6 +15,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.rounding import IDLE, unstressed
+from kedfem.accuracy.segments import stubby_warning
 from kedfem.accuracy.shared_modes import ALONE, Neighbours
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
@@ -161,7 +162,7 @@ def _analysed(
     scene = plan.scene if plan else scene
     ready, reduction = prepared(scene, clock.stage, beside.ends)
     plain = sizes(scene, ready.model)
-    notices = [*size_warnings(scene, plain), *assembly_warning(assembly)]
+    notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
     account = Account(ready.model, measured_actions(scene, ready.model))
     recorded = clock.timed(

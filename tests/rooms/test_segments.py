@@ -161,6 +161,37 @@ def test_an_accuracy_chooses_segments_that_its_share_allows() -> None:
     assert worst(errors) <= 1.2 * share.error
 
 
+def stubby(folder: Path, **link: Any) -> dict[str, Any]:
+    """A plate little longer than it is wide that a drive turns, with a force across it at its end."""
+    shape = {"kind": "bar", "between": [[0, 0], [0.1, 0]], "width": 0.08, "thickness": 0.01}
+    soft = {"youngs_modulus": 2e8, "poisson_ratio": 0.3, "density": 2000}
+    probe = {"link": "arm", "at": [0.05, 0], "quantity": "displacement"}
+    return {
+        "materials": {"soft": soft},
+        "links": {"arm": {"material": "soft", "fidelity": "plane", "frames": "co-rotational", "shape": shape, **link}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "300 rpm"}},
+        "loads": {"P": {"kind": "force", "link": "arm", "at": [0.1, 0], "vector": [0, 400], "frame": "link"}},
+        "analysis": {"kind": "quasi-static", "steps_per_revolution": 12, "accuracy": 0.02},
+        "output": {"folder": str(folder), "plots": False, "picture": False, "animation": False, "probes": {"P": probe}},
+    }  # fmt: skip
+
+
+def test_an_accuracy_cuts_no_stubby_link_into_softer_slices(tmp_path: Path) -> None:
+    """Ever thinner slices let go of ever more: trials of more segments would never settle."""
+    found = []
+    for given, folder in (({}, "open"), ({"segments": 1}, "one")):
+        run = analyse(scene_from(stubby(tmp_path / folder, **given)))
+        assert run.results.notes["segments of arm"] == 1
+        found.append(np.abs(run.results.channels["probes/P/displacement"][1]).max())
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+
+
+def test_slices_shorter_than_their_link_is_wide_are_told(tmp_path: Path) -> None:
+    run = analyse(scene_from(stubby(tmp_path / "12", segments=12, mesh={"elements": [24, 16]})))
+    assert any("links arm (12 segments: at most 1)" in warning for warning in run.warnings)
+
+
 # -- told, stored, drawn ------------------------------------------------------------------------------------
 
 

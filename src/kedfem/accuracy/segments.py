@@ -1,10 +1,16 @@
 """How many segments solid and plane links with co-rotational frames need for an accuracy, by trial runs."""
 
+from collections.abc import Mapping
 from itertools import pairwise
+
+import numpy as np
 
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_links
+from kedfem.dynamics.model import Model, segments
 from kedfem.errors import KedfemError
+from kedfem.links.build import most_segments
+from kedfem.links.segments import most_slices
 from kedfem.scene import Scene, link_frames
 
 COUNTS = (3, 4, 6, 8, 12, 16, 24)  # tried
@@ -20,10 +26,12 @@ def open_segments(scene: Scene) -> list[str]:
 
 
 def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene with the fewest segments whose error is allowed, the same number in all links, and that error."""
-    names, error = open_segments(scene), 0.0
+    """The scene with the fewest segments whose error is allowed, the same number in all links that are not stubby, and
+    that error."""
+    most = {name: most_segments(scene, name) for name in open_segments(scene)}
+    error = 0.0
     for count, more in pairwise(COUNTS):
-        now, finer = (_segmented(scene, names, each) for each in (count, more))
+        now, finer = (_segmented(scene, most, each) for each in (count, more))
         try:
             change = search.difference(now, finer)
         except KedfemError as fault:
@@ -36,10 +44,30 @@ def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, 
             return finer, beyond
         error = beyond
     search.notes.append(f"as many as {COUNTS[-1]} segments still leave an error of {error:.2g}")
-    return _segmented(scene, names, COUNTS[-1]), error
+    return _segmented(scene, most, COUNTS[-1]), error
 
 
-def _segmented(scene: Scene, names: list[str], count: int) -> Scene:
-    return with_links(
-        scene, {name: scene.links[name].model_copy(update={"segments": count}) for name in names}
+def _segmented(scene: Scene, most: Mapping[str, int], count: int) -> Scene:
+    """Links in segments, none in more than do not soften it."""
+    links = {
+        name: scene.links[name].model_copy(update={"segments": min(count, least)})
+        for name, least in most.items()
+    }
+    return with_links(scene, links)
+
+
+def stubby_warning(model: Model) -> tuple[str, ...]:
+    """A warning of links that are cut into slices shorter than they are wide, which soften them."""
+    stubby = []
+    for name, parts in segments(model).items():
+        if len(parts) > 1 and parts[0].meshed:
+            X = [(part.full or part).X for part in parts]
+            e = X[-1].mean(axis=0) - X[0].mean(axis=0)
+            if len(parts) > (most := most_slices(np.concatenate(X), e / np.linalg.norm(e))):
+                stubby.append(f"{name} ({len(parts)} segments: at most {most})")
+    if not stubby:
+        return ()
+    return (
+        f"segments shorter than their link is wide make it too soft: links {', '.join(stubby)}; leave "
+        "links.NAME.segments out, or give fewer",
     )

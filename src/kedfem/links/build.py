@@ -18,6 +18,7 @@ from kedfem.links.segments import (
     along,
     beam_segments,
     corotational,
+    most_slices,
     segmented,
     space_segments,
 )
@@ -134,12 +135,22 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case "spatial_beam":
             return space_segments(link, _axis(scene, name), material)
         case _:
-            joints = [joint for joint in scene.joints.values() if name in joint.links]
-            ends = np.array([joint.at for joint in joints]).reshape(-1, 3)
+            ends = _ends(scene, name)
             whole = _whole(scene, name, link, along(link, ends))
             if given.segments is not None:
                 return segmented(link, material, given.segments, ends, whole)
             return _usual_segments(link, material, ends, whole)
+
+
+def _ends(scene: Scene, name: str) -> Float[np.ndarray, "p 3"]:
+    """Joints of a link, as drawn [m]."""
+    return np.array([x.at for x in scene.joints.values() if name in x.links]).reshape(-1, 3)
+
+
+def most_segments(scene: Scene, name: str) -> int:
+    """How many segments of a solid or plane link do not soften it: none shorter than the link is wide."""
+    link = bare_link(scene, name)
+    return most_slices(link.X, along(link, _ends(scene, name)))
 
 
 def _usual_segments(
@@ -152,10 +163,7 @@ def _usual_segments(
     Their error falls with the square of their number: 6 leave 1 to 2 % of the peak stress of links that bend by 2 % of
     their length (docs/theory/links.md).
     """
-    e = along(link, ends)
-    length, across = np.ptp(link.X @ e), link.X - np.outer(link.X @ e, e)
-    width = np.ptp(across @ np.linalg.svd(across - across.mean(axis=0), full_matrices=False)[2][0])
-    for count in range(min(SEGMENTS, int(length / width)), 1, -1):
+    for count in range(min(SEGMENTS, most_slices(link.X, along(link, ends))), 1, -1):
         try:
             return segmented(link, material, count, ends, whole)
         except MeshError:

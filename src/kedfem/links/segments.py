@@ -156,6 +156,19 @@ class _Shape:
         return not ((self.low < place + half) & (self.high > place - half)).any()
 
 
+def most_slices(X: Float[np.ndarray, "n 3"], e: Float[np.ndarray, "3"]) -> int:
+    """How many slices across a direction are none of them shorter than the link is wide: stubbier ones soften it.
+
+    Parameters
+    ----------
+    X : (n, 3) its nodes [m]
+    """
+    s = X @ e
+    across = X - np.outer(s, e)
+    widest = np.linalg.svd(across - across.mean(axis=0), full_matrices=False)[2][0]
+    return max(1, int(np.ptp(s) / np.ptp(across @ widest) + 1e-9))
+
+
 def _places(
     count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval], shape: _Shape
 ) -> tuple[Float[np.ndarray, " c"], list[bool]]:
