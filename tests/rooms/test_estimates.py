@@ -1,10 +1,12 @@
 """The budget of a run: what each source costs, against finer runs; what is not claimed; what is warned of."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.indicator import judged
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy import estimates
@@ -152,3 +154,12 @@ def test_kinds_sums_and_warnings_of_a_budget() -> None:
     )
     empty = Histories(np.zeros(1), {})
     assert relative_errors(empty, empty) == {}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["plate_with_chamfered_bores", "pipe_tee"])
+def test_the_indicator_is_between_half_and_twice_the_error_of_parts(name: str, tmp_path: Path) -> None:
+    """Swept hexahedra and tetrahedra; the other parts are in docs/performance/indicator.md."""
+    found = judged(name, tmp_path)
+    assert 0.02 < found.true < 0.12
+    assert 0.5 < found.effectivity < 2.0
