@@ -31,7 +31,7 @@ SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
 LEANS = np.radians(
     10
-)  # against the direction that cuts are across: facets of a cylinder along it lean by less
+)  # of a surface against the link's direction: facets of a cylinder along it lean by less
 TRIED = 64  # places for cuts, in the length of a link
 NEAR = 0.4  # of a segment's length: so far a cut goes to where the link is a prism
 Interval = tuple[float, float]
