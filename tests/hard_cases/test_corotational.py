@@ -48,6 +48,7 @@ def driven(
 # -- against geometrically exact beams, see tests/exact/cases.py --------------------------------------------
 
 
+@pytest.mark.long
 def test_a_shallow_arch_snaps_through() -> None:
     """Two bars 0.5 m long that rise by 20 mm, 1 kg at the apex, 500 N put on at once: down to −38 mm."""
     size = (0.02, 0.01)

@@ -129,6 +129,7 @@ def test_a_short_crank_far_from_the_origin_is_still_right() -> None:
     assert_allclose(x, wanted, atol=1e-11)
 
 
+@pytest.mark.long
 def test_a_chain_of_many_loops_is_followed() -> None:
     """Eight four-bars one behind the other: the rocker of each is the crank of the next, and closes at all times."""
     joints = dict(four_bar(0.3, 0.95, 0.35, 1.0, 1.2))

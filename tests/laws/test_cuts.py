@@ -56,7 +56,7 @@ def test_a_uniform_tension_stays_uniform_through_cuts_of_any_facets(
     assert_allclose(got[VON_MISES][away], PULL, rtol=1e-4)
 
 
-@pytest.mark.parametrize("draw", [bored_bar, shaft])
+@pytest.mark.parametrize("draw", [bored_bar, pytest.param(shaft, marks=pytest.mark.long)])
 def test_a_peak_beside_a_cut_is_that_of_the_whole_link(draw: Any, tmp_path: Path) -> None:
     """Two segments, whose cut goes where the part is a prism; the weld holds the part's end and not a cut."""
     written(tmp_path, "part", draw, ("step",))

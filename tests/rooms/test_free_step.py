@@ -86,10 +86,8 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("name", "asked"),
-    [("pendulum, yz", 0.05), *(pytest.param(name, ASKED, marks=pytest.mark.long) for name in SCENES)],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "asked"), [("pendulum, yz", 0.05), *((name, ASKED) for name in SCENES)])
 def test_the_step_of_what_nothing_drives_is_within_the_accuracy_or_told(name: str, asked: float) -> None:
     """Against steps four times shorter than the chosen, in which at most a quarter or so of the error is left."""
     scene, search = scene_from(SCENES[name]), Trials(asked, lambda text: None)
@@ -102,6 +100,7 @@ def test_the_step_of_what_nothing_drives_is_within_the_accuracy_or_told(name: st
         assert true < 3 * expected + 1e-9
 
 
+@pytest.mark.long
 def test_a_chaotic_motion_is_told_and_not_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_step, "FIRST", 100)
     monkeypatch.setattr(free_step, "MOST", 800)

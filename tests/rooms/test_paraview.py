@@ -107,9 +107,12 @@ SaveScreenshot({str(tmp_path / "a.png")!r}, g["view"], ImageResolution=[800, 600
         encoding="utf-8",
     )
     screen = ["xvfb-run", "-a", "-s", "-screen 0 1280x1024x24 +extension GLX"]
-    done = subprocess.run(
-        [*screen, "pvpython", str(shown)], capture_output=True, text=True, timeout=200, check=False
-    )
+    for _ in range(3):  # a window that a busy machine's X server does not give ends ParaView at once
+        done = subprocess.run(
+            [*screen, "pvpython", str(shown)], capture_output=True, text=True, timeout=200, check=False
+        )
+        if "CreateAWindow" not in done.stderr:
+            break
     assert done.returncode == 0, done.stderr[-2000:]
     assert "Traceback" not in done.stderr
     assert "['arm', 'joints']" in done.stdout

@@ -395,6 +395,7 @@ D = { kind = "revolute", links = ["rocker", "ground"], at = "D" }
 """
 
 
+@pytest.mark.long
 def test_natural_frequencies_are_shown_where_they_are_of_the_same_scene(tmp_path: Path) -> None:
     """Those that are found, with their plots; of another text of the scene a word; damaged ones nothing."""
     path = tmp_path / "scene.toml"

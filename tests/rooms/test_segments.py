@@ -172,7 +172,7 @@ def stubby(folder: Path, **link: Any) -> dict[str, Any]:
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "300 rpm"}},
         "loads": {"P": {"kind": "force", "link": "arm", "at": [0.1, 0], "vector": [0, 400], "frame": "link"}},
-        "analysis": {"kind": "quasi-static", "steps_per_revolution": 12, "accuracy": 0.02},
+        "analysis": {"kind": "quasi-static", "steps_per_revolution": 4, "accuracy": 0.02},
         "output": {"folder": str(folder), "plots": False, "picture": False, "animation": False, "probes": {"P": probe}},
     }  # fmt: skip
 
@@ -188,7 +188,7 @@ def test_an_accuracy_cuts_no_stubby_link_into_softer_slices(tmp_path: Path) -> N
 
 
 def test_slices_shorter_than_their_link_is_wide_are_told(tmp_path: Path) -> None:
-    run = analyse(scene_from(stubby(tmp_path / "12", segments=12, mesh={"elements": [24, 16]})))
+    run = analyse(scene_from(stubby(tmp_path / "12", segments=12, mesh={"elements": [12, 8]})))
     assert any("links arm (12 segments: at most 1)" in warning for warning in run.warnings)
 
 

@@ -125,14 +125,18 @@ def _facets_on(cuts: Sequence[Cut], number: int) -> Int[np.ndarray, " c"]:
 
 
 def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
-    """Unit vector across which a link is cut: between the two joints furthest apart, else its longest axis of inertia."""
+    """Unit vector across which a link is cut: between the two joints furthest apart, else, from its joint on, its longest
+    axis of inertia."""
     if len(ends) > 1:
         distance = np.linalg.norm(ends[:, None] - ends, axis=2)
         a, b = np.unravel_index(distance.argmax(), distance.shape)
         if distance[a, b] > 0.1 * link.size:
             return np.asarray((ends[b] - ends[a]) / distance[a, b])
-    X = link.X - np.outer(link.one, link.one @ link.mX / (link.one @ link.m1[:, 0]))
-    return np.asarray(np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1])
+    centre = link.one @ link.mX / (link.one @ link.m1[:, 0])
+    X = link.X - np.outer(link.one, centre)
+    e = np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1]
+    away = (centre - ends).sum(axis=0) @ e
+    return np.asarray(e * np.sign(away if abs(away) > SAME * link.size else e[np.abs(e).argmax()]))
 
 
 class _Shape:
