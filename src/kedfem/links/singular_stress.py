@@ -6,9 +6,7 @@ from jaxtyping import Bool, Float
 from kedfem.links.record import Link
 from kedfem.links.surfaces.surface import boundary, neighbours, surface
 
-SHARP = np.cos(
-    np.radians(20)
-)  # between facets at their common edge; those of rounds differ by a few degrees there
+SHARP = np.cos(np.radians(20))  # between facets at their edge; those of rounds differ by a few degrees there
 
 
 def re_entrant(link: Link) -> Bool[np.ndarray, " n"]:
