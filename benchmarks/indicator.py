@@ -11,23 +11,21 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import scipy.sparse as sp
-from geometry.catalogue import UNITS, written
+from geometry.catalogue import meshed, written
 from jaxtyping import Float
 
 from benchmarks.pages import script, table, write_page
+from benchmarks.parts import STEEL
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.links.indicator import indicator
 from kedfem.links.record import Link
+from kedfem.links.segments import longest_axis
 from kedfem.links.solid import solid_link
-from kedfem.mesh.cad.model import CadKeys
-from kedfem.mesh.methods import made_mesh
-from kedfem.scene import Cad, Material, link_from
 
 PARTS = (
     "plate_with_chamfered_bores", "lever_with_rounded_edges", "casting", "ribbed_bell_crank", "bent_bracket", "pipe_tee",
     "crossing_bores", "housing", "forged_rocker", "angled_arm",
 )  # fmt: skip
-STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)
 MOST = 150_000  # unknowns of the fine mesh
 SOFT = 1e-8  # of (E/ρ) / L²: what holds rigid motions, to which the load does nothing
 
@@ -48,11 +46,12 @@ class Judged:
         return self.indicated / self.true
 
 
-def judged(name: str, folder: Path, element: str | None = None) -> Judged:
+def judged(name: str, folder: Path) -> Judged:
     """The indicator of a part at its default sizes beside the error."""
     file, _ = written(name, folder)
-    coarse = _link(file, element)
-    fine = _link(file, element, min(8 * coarse.unknowns, MOST))
+    coarse = solid_link(name, meshed(file), STEEL, np.eye(3))
+    unknowns = min(8 * coarse.unknowns, MOST)
+    fine = solid_link(name, meshed(file, unknowns=unknowns), STEEL, np.eye(3))
     found = []
     for link in (coarse, fine):
         u, compliance = pulled_apart(link)
@@ -62,22 +61,10 @@ def judged(name: str, folder: Path, element: str | None = None) -> Judged:
     return Judged(name, coarse.way.split(";")[0], coarse.unknowns, eta, true)
 
 
-def _link(file: Path, element: str | None, unknowns: int | None = None) -> Link:
-    shape = {"kind": "cad", "file": file.name} | ({"scale": UNITS[file.stem]} if file.stem in UNITS else {})
-    raw = {"shape": shape, "material": "steel"} | ({"element": element} if element else {})
-    link = link_from(raw | ({"mesh": {"unknowns": unknowns}} if unknowns else {}))
-    if not isinstance(link.shape, Cad):
-        raise TypeError("a part of the catalogue comes from CAD")
-    made = made_mesh(CadKeys(file.name, "solid"), file.stem, link, link.shape, file)
-    return solid_link(file.stem, made, STEEL, np.eye(3))
-
-
 def pulled_apart(link: Link) -> tuple[Float[np.ndarray, "n 3"], float]:
     """The state of a free part under ρ s e along its longest axis of inertia e, s from its centre, and its compliance."""
-    mass = link.mass[0]
-    X = link.X - np.outer(link.one, link.one @ link.mX / (link.one @ link.m1[:, 0]))
-    e = np.linalg.eigh(X.T @ (mass @ X))[1][:, -1]
-    force = np.outer(mass @ (X @ e), e)
+    mass, e = link.mass[0], longest_axis(link)
+    force = np.outer(mass @ (link.X @ e - link.one * (link.centre @ e)), e)
     held = SOFT * STEEL.youngs_modulus / STEEL.density / link.size**2
     u = Cholesky(sp.csr_array(link.K0 + held * sp.kron(mass, sp.eye_array(3))), "K0").solve(force.ravel())
     return u.reshape(-1, 3), float(force.ravel() @ u)

@@ -683,10 +683,10 @@ def written(name: str, folder: Path) -> tuple[Path, float]:
     return file, volume
 
 
-def meshed(file: Path) -> SolidMesh:
-    """The mesh of a part's file at default sizes, in this process."""
+def meshed(file: Path, **keys: object) -> SolidMesh:
+    """The mesh of a part's file, in this process: at default sizes unless keys of the link's mesh ask for others."""
     shape = {"kind": "cad", "file": file.name} | ({"scale": UNITS[file.stem]} if file.stem in UNITS else {})
-    link = link_from({"shape": shape, "material": "steel"})
+    link = link_from({"shape": shape, "material": "steel"} | ({"mesh": keys} if keys else {}))
     if not isinstance(link.shape, Cad):
         raise TypeError("a part of the catalogue comes from CAD")
     return made_mesh(CadKeys(file.name, "solid"), file.stem, link, link.shape, file)

@@ -13,6 +13,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.links.surfaces.coupling_surfaces import is_flat, joint_seat
 from kedfem.scene import scene_from
 from tests.laws.test_limits import AXES
+from tests.laws.test_positions import across
 from tests.rooms.cad_files import written
 from tests.verification.concentrations import bored_bar, meshed, shaft
 
@@ -41,8 +42,7 @@ def test_a_uniform_tension_stays_uniform_through_cuts_of_any_facets(
 ) -> None:
     """Cuts through tetrahedra zigzag: what they bear is spread by the area of their facets across the link."""
     n = AXES[axis]
-    other = np.cross(n, [0.3, 0.5, 0.9])
-    other /= np.linalg.norm(other)
+    other = across(n)
     R = np.column_stack([n, other, np.cross(n, other)])
 
     def prism(occ: Any) -> None:

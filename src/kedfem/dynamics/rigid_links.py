@@ -51,7 +51,7 @@ def _thickened(link: Link) -> Link:
     second = _second_moments(link)
     if second[0] >= 2 * LAMINA * second[-1] or link.d < 3 or link.kind == "beam":
         return link
-    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    centre = link.centre
     return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
 
 

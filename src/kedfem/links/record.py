@@ -175,6 +175,11 @@ class Link:
         return float(np.ptp((self.full or self).nodes, axis=0).max())
 
     @property
+    def centre(self) -> Float[np.ndarray, "3"]:
+        """Centre of mass as drawn, attached bodies among it [m]."""
+        return np.asarray(self.one @ self.mX / (self.one @ self.m1[:, 0]))
+
+    @property
     def planar(self) -> bool:
         """Whether the link moves in a plane z = constant only."""
         return self.kind in {"plane", "beam"}

@@ -29,9 +29,7 @@ from kedfem.scene import Material
 
 SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
-LEANS = np.radians(
-    10
-)  # of a surface against the link's direction: facets of a cylinder along it lean by less
+LEANS = np.radians(10)  # of a surface against the link: facets of a cylinder along it lean by less
 TRIED = 64  # places for cuts, in the length of a link
 NEAR = 0.4  # of a segment's length: so far a cut goes to where the link is a prism
 Interval = tuple[float, float]
@@ -74,8 +72,7 @@ def corotational(link: Link) -> Link:
 
     Meant for links without attached bodies: a heavy one would pull the frame to it.
     """
-    centre = (link.one @ link.mX) / float(link.one @ link.m1[:, 0])
-    return replace(link, fit=link.mX - np.outer(link.m1[:, 0], centre))
+    return replace(link, fit=link.mX - np.outer(link.m1[:, 0], link.centre))
 
 
 def segmented(
@@ -132,11 +129,15 @@ def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
         a, b = np.unravel_index(distance.argmax(), distance.shape)
         if distance[a, b] > 0.1 * link.size:
             return np.asarray((ends[b] - ends[a]) / distance[a, b])
-    centre = link.one @ link.mX / (link.one @ link.m1[:, 0])
-    X = link.X - np.outer(link.one, centre)
-    e = np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1]
-    away = (centre - ends).sum(axis=0) @ e
+    e = longest_axis(link)
+    away = (link.centre - ends).sum(axis=0) @ e
     return np.asarray(e * np.sign(away if abs(away) > SAME * link.size else e[np.abs(e).argmax()]))
+
+
+def longest_axis(link: Link) -> Float[np.ndarray, "3"]:
+    """Unit vector, either way, along which the mass of a meshed link is furthest from its centre."""
+    X = link.X - np.outer(link.one, link.centre)
+    return np.asarray(np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1])
 
 
 class _Shape:

@@ -139,7 +139,7 @@ def can_be_bars(link: Link) -> bool:
 
 def rigid_points(link: Link, key: str, ways: Ways) -> tuple[ConstraintJoint, list[Own | None]]:
     """Four points of a rigid link, its centre of mass and one along each axis, as a joint without rows."""
-    centre = np.asarray(link.one @ link.mX / (link.one @ link.m1[:, 0]))
+    centre = link.centre
     seat, length = rigid_seat(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     weights = seat.fit[0] + length * np.concatenate([np.zeros((1, link.n)), seat.fit[1:]])
