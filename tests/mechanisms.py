@@ -116,11 +116,14 @@ WITHIN = {"monolithic": 1e-7, "run": 1e-10, "turned": 1e-7, "momentum": 1e-8}
 
 
 def outcome(seed: int, most: int = 12) -> tuple[str, dict[str, float]]:
-    """Fine, differs, or does not converge (at this step, by the march or the oracle), and how far it is from each law."""
+    """Fine, differs, does not converge (at this step, by the march or the oracle), or has a start that its joints do not
+    allow; and how far it is from each law."""
     try:
         found = checked(seed, most)
-    except SolveError:
-        return "does not converge", {}
+    except SolveError as error:
+        return f"does not converge: {error}", {}
+    except MotionError:
+        return "no mechanism", {}
     return "fine" if all(x < WITHIN[key] for key, x in found.items()) else "differs", found
 
 

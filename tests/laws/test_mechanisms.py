@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from kedfem.errors import MotionError
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
@@ -16,7 +17,7 @@ from tests.mechanisms import (
     mechanism,
     outcome,
 )
-from tests.moving import beam_in_space
+from tests.moving import beam_in_space, turned
 from tests.partners import joint
 
 
@@ -50,6 +51,29 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
     assert_allclose(omega[1:], np.tile(spin["angular_velocity"], (2, 1)), atol=1e-12)
     at_centre = v[1:] + np.cross(omega[1:], linked.centre)
     assert np.abs(at_centre).max() < 1e-12  # m/s: nothing is asked of it
+
+
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.7, -1.1, 0.4], [2.0, 0.5, -0.3]])
+def test_speeds_that_nobody_asked_for_are_the_same_in_a_scene_that_is_turned(turn: list[float]) -> None:
+    """One joint of a loop has a speed; slides and rotations share what it leaves open by their size, a length."""
+    R, shift, raw = (
+        Rotation.from_rotvec(turn).as_matrix(),
+        np.array([0.3, -0.2, 0.5]),
+        mechanism(2039, most=6),
+    )
+    one, other = (scene_from(each) for each in (raw, turned(raw, R, shift)))
+    (v, omega), (v2, omega2) = (initial_twists(scene, linkage(scene)) for scene in (one, other))
+    assert np.abs(omega).max() > 1.0
+    assert_allclose(omega2, omega @ R.T, atol=1e-12)
+    assert_allclose(v2 + np.cross(omega2, shift), v @ R.T, atol=1e-12)
+
+
+@pytest.mark.parametrize(("seed", "unit"), [(2041, "m/s"), (2120, "rad/s")])
+def test_a_speed_that_a_loop_does_not_allow_is_refused(seed: int, unit: str) -> None:
+    """A sphere that closes the loop holds the joint; rounding of what it leaves must not be taken for a motion."""
+    scene = scene_from(mechanism(seed, most=6))
+    with pytest.raises(MotionError, match=f"initial_speeds.J0 = 2 {unit} .closest possible 0."):
+        initial_twists(scene, linkage(scene))
 
 
 CHEAP = (

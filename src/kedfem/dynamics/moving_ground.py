@@ -11,9 +11,10 @@ from kedfem.links.reduced import rigid
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.mesh import link_mesh
+from kedfem.motion.linkage import scene_size
 from kedfem.scene import Bar, LinkScene, Material, Scene
 
-EDGE = 0.02  # of the cube that is drawn for one, of the extent of all joints; nothing is computed from it
+EDGE = 0.02  # of the cube that is drawn for one, of the scene's size; nothing is computed from it
 ANY = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.0)
 
 
@@ -25,7 +26,7 @@ def moving_ground(scene: Scene, name: str, hub: str) -> Link:
     hub : the driven joint
     """
     at = np.asarray(scene.joints[hub].at, float)
-    edge = EDGE * (float(np.ptp([joint.at for joint in scene.joints.values()], axis=0).max()) or 1.0)
+    edge = EDGE * scene_size(scene)
     x, y, z = at.tolist()
     ends = ((x - edge / 2, y, z), (x + edge / 2, y, z))
     cube = LinkScene(fidelity="rigid", material="any", shape=Bar(between=ends, width=edge, thickness=edge))

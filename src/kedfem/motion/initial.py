@@ -59,10 +59,11 @@ def initial_twists(
     if any(each.value for each in asked):
         column = np.tile([size, size, size, 1.0, 1.0, 1.0], bodies - 1)
         A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.value for each in asked])
+        sizes = np.linalg.norm(A, axis=1)
         free = _allowed(linkage)
         other = [row for name in scene.joints if name not in scene.analysis.initial_speeds
                  for row in joint_free_rows(scene, name, linkage.bodies)]  # fmt: skip
-        q = free @ _least(A @ free, b, drawn_jacobian(other, bodies, size) @ free)
+        q = free @ _least(A / sizes[:, None] @ free, b / sizes, drawn_jacobian(other, bodies, size) @ free)
         _check_reached(asked, A @ q)
         twists[1:] = (q * column).reshape(-1, 6)
     v, omega = twists[:, :3], twists[:, 3:]
@@ -72,10 +73,8 @@ def initial_twists(
 def _least(
     A: Float[np.ndarray, "w f"], b: Float[np.ndarray, " w"], C: Float[np.ndarray, "c f"]
 ) -> Float[np.ndarray, " f"]:
-    """x nearest to A x = b, of these the least |C x|, of these the least |x|."""
-    scale = np.abs(A).max(axis=1, initial=0.0)
-    scale[scale == 0.0] = 1.0
-    A, b = A / scale[:, None], b / scale
+    """x nearest to A x = b, of these the least |C x|, of these the least |x|; rows of A are near 1 or as good as zero."""
+    A = np.where(np.linalg.norm(A, axis=1, keepdims=True) > RANK_TOLERANCE, A, 0.0)
     x = scipy.linalg.lstsq(A, b, cond=RANK_TOLERANCE)[0]
     Z = scipy.linalg.null_space(A, rcond=RANK_TOLERANCE)
     if Z.shape[1] and len(C):

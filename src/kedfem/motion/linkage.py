@@ -166,9 +166,9 @@ def resting_poses(times: int, bodies: int) -> Poses:
 
 
 def scene_size(scene: Scene) -> float:
-    """Characteristic length [m]: the longest side of the box of all joints."""
+    """Characteristic length [m]: from joint to joint, the farthest; the same however the scene is turned."""
     points = joint_points(scene)
-    return (float(np.ptp(points, axis=0).max()) if len(points) else 0.0) or 1.0
+    return float(max((np.linalg.norm(points - point, axis=1).max() for point in points), default=0.0)) or 1.0
 
 
 def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
