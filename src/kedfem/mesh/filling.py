@@ -6,17 +6,18 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.faces import joined_faces
 from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
-from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import node_numbers
-from kedfem.mesh.elements.simplices import EDGES, TET10
+from kedfem.mesh.elements.simplices import TET10
 from kedfem.mesh.elements.tetrahedra import edge_middles
+from kedfem.mesh.elements.unfolding import unfolded
+from kedfem.mesh.hollows import USUAL, finer_hollows
 from kedfem.mesh.session import gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
@@ -29,17 +30,13 @@ _COUNT = (
 _TURN = np.pi / 6  # that an element's edge turns along a curved face, where the least size lets it
 _FINEST = 4.0  # the size over the least size that curvature asks for
 _PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser
+_MOST = 90_000  # unknowns to which finer fillets may bring it
 _STEPS = 5  # times that it is
 _COARSEST = 4.0  # the most by which it may be: curvature and the finest size follow
 _BAD = 0.03  # scaled Jacobian below which curved elements are optimised, else straightened, and other settings tried
 _FEW = 0.02  # share of bad elements that optimisation can help
 #: gmsh's optimisation of curved elements takes minutes where it finds no way.
 _BRIEF: dict[str, float] = {"Mesh.HighOrderIterMax": 25, "Mesh.HighOrderPassMax": 5}
-_BLENDS = (
-    0.4,
-    0.7,
-    1.0,
-)  # how far edges of bad elements are straightened, those of folded ones in the end wholly
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +63,8 @@ def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     sizing : Sizing
         How fine. Without a size: `across` elements in twice the mean wall 2 V/A, which is the thickness of a plate, the
         radius of a rod, the wall of a tube, but at least some thousand elements; 12 to a circle, as far as that is not
-        finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step.
+        finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step. Hollow
+        faces are finer where `hollow` asks for it, in any case.
 
     Returns
     -------
@@ -80,21 +78,47 @@ def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """
     said: list[str] = []
     found: SolidMesh | None = None
-    coarser = 1.0
+    plain, taken, coarser = replace(sizing, hollow=USUAL), 1.0, 1.0
     for _ in range(_STEPS):
-        mesh = _best_of_settings(gmsh, solid, sizing, coarser, said)
+        mesh = _best_of_settings(gmsh, solid, plain, coarser, said)
         if mesh is not None and (found is None or len(mesh.points) < len(found.points)):
-            found = mesh
+            found, taken = mesh, coarser
         plenty = found is None or 3 * len(found.points) > _PLENTY
         if sizing.size is not None or found is None or not plenty or coarser >= _COARSEST:
             break
         ratio = (3 * len(found.points) / _PLENTY) ** 0.5
         coarser = min(coarser * np.clip(1.05 * ratio, 1.15, 2.0), _COARSEST)
+    if found is not None:
+        found = _with_hollows(gmsh, solid, sizing, (taken, found), said)
     gmsh.model.mesh.clear()
     if found is None:
         reasons = "; ".join(dict.fromkeys(said)) or "none at all"
         raise OtherWayError(f"{solid.name}: gmsh makes no tetrahedra of it: {reasons}")
     return found
+
+
+def _with_hollows(
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, usual: tuple[float, SolidMesh], said: list[str]
+) -> SolidMesh:
+    """The mesh with hollow faces as fine as asked for, elsewhere as the usual one, which is so much coarser than asked.
+
+    They are coarser where elements would be bad, or, without a size, more than 90,000 unknowns; the mesh says so then.
+    """
+    coarser, found = usual
+    least, angle = min(_BAD, _least_jacobian(found)), sizing.hollow
+    while angle < USUAL:
+        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, said, _MOST)
+        ratio = 1.0 if mesh is None or sizing.size is not None else 3 * len(mesh.points) / _MOST
+        if mesh is not None and ratio <= 1 and _least_jacobian(mesh) >= least:
+            found = mesh
+            break
+        angle *= max(1.2, ratio**0.5)
+    if angle == sizing.hollow:
+        return found
+    words = "no finer" if angle >= USUAL else f"by {np.degrees(angle):.3g}° an element"
+    return replace(
+        found, way=f"{found.way}; fillets and free bores {words}, as others would be bad or too many"
+    )
 
 
 def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
@@ -131,17 +155,21 @@ def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
 
 
 def _best_of_settings(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str]
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str], plenty: int = _PLENTY
 ) -> SolidMesh | None:
-    """The first mesh that is good enough, else the best."""
+    """The first mesh that is good enough, or has too many unknowns, else the best."""
     best: tuple[float, SolidMesh] | None = None
     for mesh in _tried(gmsh, solid, sizing, coarser, said):
-        least = float(scaled_jacobian(mesh.points, mesh.cells).min())
+        least = _least_jacobian(mesh)
         if best is None or least > best[0]:
             best = least, mesh
-        if best[0] >= _BAD or (sizing.size is None and 3 * len(mesh.points) > _PLENTY):
+        if best[0] >= _BAD or (sizing.size is None and 3 * len(mesh.points) > plenty):
             break
     return best and best[1]
+
+
+def _least_jacobian(mesh: SolidMesh) -> float:
+    return float(scaled_jacobian(mesh.points, mesh.cells).min())
 
 
 def _tried(
@@ -150,9 +178,10 @@ def _tried(
     """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
     size = coarser * tetrahedron_size(solid, sizing)
     turn = min(_TURN * coarser, np.pi / 3) * min(1.0, 4 * sizing.turn / np.pi)
+    finest = size * min(1.0, coarser / _FINEST)
     for setting in SETTINGS:
-        numbers = _options(size, turn, size * min(1.0, coarser / _FINEST), setting)
-        with gmsh_options(gmsh, numbers):
+        numbers = _options(size, turn, finest, setting)
+        with gmsh_options(gmsh, numbers), finer_hollows(gmsh, solid, sizing, turn, finest):
             mesh = _generated(gmsh, solid, said)
         if mesh is not None:
             yield mesh
@@ -210,14 +239,14 @@ def _generated(gmsh: ModuleType, solid: Solid, said: list[str]) -> SolidMesh | N
         sides = {face.tag: _sides(gmsh, face.tag) for face in solid.faces}
     if not len(cells) or not sides:
         return None
-    unfolded = _unfolded(points, cells)
-    if unfolded is None:
+    straightened = unfolded(points, cells, _BAD)
+    if straightened is None:
         said.append("flat elements")
         return None
     used, numbers = np.unique(cells, return_inverse=True)
     faces = joined_faces(gmsh, solid, {tag: np.searchsorted(used, each) for tag, each in sides.items()})
     way = f"{len(cells):,} tetrahedra of 10 nodes"
-    return SolidMesh(unfolded[used], numbers.reshape(cells.shape), faces, way)
+    return SolidMesh(straightened[used], numbers.reshape(cells.shape), faces, way)
 
 
 def _worth_optimising(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]) -> bool:
@@ -248,32 +277,3 @@ def _sides(gmsh: ModuleType, face: int) -> Int[np.ndarray, "f 3"]:
     if not len(kinds):
         return np.zeros((0, 3), dtype=np.int64)
     return np.asarray(np.searchsorted(ranked, nodes[0]).reshape(-1, 6)[:, :3])
-
-
-def _unfolded(
-    points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]
-) -> Float[np.ndarray, "n 3"] | None:
-    """The nodes, edges made straighter where elements are bad, until none is folded; None if straight ones are.
-
-    Elements with straight edges are valid if their corners are in order, so that there is an end to it.
-    """
-    bent, straight = points, points.copy()
-    straight[cells[:, 4:]] = edge_middles(points, cells)
-    moved = np.zeros(len(points))
-    for _ in range(len(_BLENDS) * len(EDGES)):
-        folded = ~valid_everywhere(points, cells)
-        bad = scaled_jacobian(points, cells) < _BAD
-        nodes = np.union1d(cells[folded, 4:], cells[bad, 4:][moved[cells[bad, 4:]] < _BLENDS[-2]])
-        if not len(nodes):
-            return points
-        if (moved[nodes] == 1.0).all():
-            return None
-        moved[nodes] = _next(moved[nodes])
-        points = bent + moved[:, None] * (straight - bent)
-    return None
-
-
-def _next(blend: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """The next of the blends."""
-    step: Bool[np.ndarray, "b n"] = np.array(_BLENDS)[:, None] > blend
-    return np.where(step.any(axis=0), np.array(_BLENDS)[step.argmax(axis=0)], 1.0)

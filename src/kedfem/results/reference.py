@@ -69,8 +69,8 @@ CHANNELS: dict[str, tuple[Told, ...]] = {
     ),
     "Joints": (
         Told("joints/NAME/force|rigid_force", XYZ, "N", "world",
-             "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid; it may "
-             "lack components that statics leave open."),
+             "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid, in "
+             "scenes whose drives move all of them; it may lack components that statics leave open."),
         Told("joints/NAME/moment|rigid_moment", XYZ, "N m", "world",
              "On the same link, about the joint's nominal point as it moves with the rigid motion, of a slot about the pin."),
         Told("joints/NAME/angle|angle_about_NAME", ("angle",), "rad", "",

@@ -126,7 +126,21 @@ def _cad_face(gmsh: ModuleType, tag: int, name: str, sign: float) -> CadFace:
         length=form.length,
         surface=gmsh.model.getType(2, tag) if form.kind == "other" else "",
         bend=_least_radius(gmsh, tag, within) if form.kind == "other" else np.nan,
+        hollow=_hollow(within, sign) if form.kind == "other" else form.inward,
     )
+
+
+def _hollow(within: Places, sign: float) -> bool:
+    """Whether a face bends more towards the outside than it does towards the inside, along its parameters."""
+    m = int(np.sqrt(len(within.points)))
+    X, n = within.points.reshape(m, m, 3), sign * within.normals.reshape(m, m, 3)
+    bends = []
+    for axis in (0, 1):
+        dx, dn = np.diff(X, axis=axis), np.diff(n, axis=axis)
+        length2 = (dx**2).sum(axis=2)
+        bends.append(((dx * dn).sum(axis=2) / np.where(length2 > 0, length2, np.inf)).ravel())
+    bend = np.concatenate(bends)
+    return bool(-bend.min() > max(bend.max(), 0.0))
 
 
 def _least_radius(gmsh: ModuleType, tag: int, places: Places) -> float:

@@ -19,6 +19,7 @@ class CadFace:
 
     surface : OpenCASCADE's word for it, where `kind` is other
     bend : the least radius of curvature of such a face [m]
+    hollow : whether it is bent most towards the outside, as bores and fillets are
     """
 
     tag: int
@@ -32,6 +33,7 @@ class CadFace:
     length: float
     surface: str = ""
     bend: float = np.nan
+    hollow: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,9 @@ class Solid:
         return sum(face.area for face in self.faces)
 
 
+AROUND = 0.3  # of a bore's radius: a place so near its middle is in it
+
+
 @dataclass(frozen=True, slots=True)
 class Sizing:
     """How fine a mesh of a solid is to be.
@@ -70,8 +75,8 @@ class Sizing:
     across : hexahedra across the smallest width, where no size is given
     layers : least number through each thickness of a part made of layers
     turn : most that an element turns along a curved face [rad]
-    hollow : the same along a concave one of a part swept along or about a line, where stress is highest: fillets, and
-        bores that are around none of the places
+    hollow : the same along a concave one, where stress is highest: fillets, and bores that are around none of the
+        places
     ignore : blends smaller than that may be left out [m]; None: convex ones that are very small
     kept, named : places (in the part's frame [m]) and faces where none may
     """

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.mesh.cad.solids import Sizing
+from kedfem.mesh.cad.solids import AROUND, Sizing
 from kedfem.mesh.layered.mapping import Mapping, mappings
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region
 
@@ -14,7 +14,6 @@ _GROWTH = 0.4  # of an element's length by the distance
 _SLENDER = 1.5  # an element's length along a rib by the rib's width
 _FINEST = 0.2  # of the size: no arc asks for less to be exact
 _THINNEST = 0.05  # of the size: no rib asks for less
-_AROUND = 0.3  # of a bore's radius: a place so near its middle is in it
 _LOST = 1e-5  # of the volume: what parabolas may lose of a whole circle
 _LOST_AT_45 = 2.44e-3  # of R²: area of a circle less that inside eight parabolas, θ = 45° each:
 # 8 ((θ − sin θ) / 2 − 4/3 sin(θ/2) (1 − cos(θ/2))); it goes with θ⁴
@@ -99,7 +98,7 @@ def _turns(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
         radii = 1 / np.maximum(bends, 1e-9)
         centres = points - radii[:, None] * inwards
         off = np.linalg.norm(centres[:, None] - held, axis=2).min(axis=1, initial=np.inf)
-        hollow = ((np.gradient(along, axis=0) * inwards).sum(axis=1) < 0) & (off > _AROUND * radii)
+        hollow = ((np.gradient(along, axis=0) * inwards).sum(axis=1) < 0) & (off > AROUND * radii)
         turns = np.where(hollow & (bends > 0), sizing.hollow, sizing.turn)
         out[i] = np.minimum(out[i], turns if forward else turns[::-1])
     return out

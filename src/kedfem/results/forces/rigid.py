@@ -138,8 +138,11 @@ class RigidForces:
 def rigid_forces(
     scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None
 ) -> RigidForces:
-    """What can be told of a driven scene: the drive, and with a path all joints where nothing moves freely."""
-    every = [_drive(scene, linkage, name) for name in scene.driven_joints]
+    """What can be told of a driven scene: its drives, and with a path all joints; nothing where links move freely too.
+
+    A free motion is held in the rigid linkage, by what no link has there.
+    """
+    every = [] if linkage.mobility else [_drive(scene, linkage, name) for name in scene.driven_joints]
     if along is not None and not linkage.mobility:
         found = reactions(linkage, _on_grid(linkage, along))
         every = [*(x for name in scene.joints for x in _joint(scene, linkage, found, name)), *every]

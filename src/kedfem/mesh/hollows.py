@@ -1,0 +1,61 @@
+"""Fillets and free bores of a solid that is filled with tetrahedra, finer than the rest: stress is highest there."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+import numpy as np
+
+from kedfem.mesh.cad.solids import AROUND, CadFace, Sizing, Solid
+from kedfem.mesh.session import gmsh_options
+
+USUAL = np.pi / 4  # as nobody asked for finer ones: gmsh's own angle for all faces, within its least size
+_FINEST = 4.0  # the least size elsewhere over the least one here
+
+
+@contextmanager
+def finer_hollows(
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, turn: float, finest: float
+) -> Iterator[None]:
+    """For a while gmsh's elements turn by the sizing's `hollow` along hollow faces, elsewhere as by its own options.
+
+    gmsh knows one angle and one least size for all faces. What it asks for is the radius of curvature times that angle;
+    here it is scaled where a face or an edge of it is hollow, and kept from the least size elsewhere.
+
+    Parameters
+    ----------
+    gmsh : module
+        With the solid, and with the options of a mesh.
+    turn : float
+        By which elements turn along all faces with these options [rad].
+    finest : float
+        Their least size [m].
+    """
+    tags = {face.tag for face in solid.faces if face.hollow and not _in_use(face, sizing)}
+    if sizing.hollow >= USUAL or not tags:
+        yield
+        return
+    edges = gmsh.model.getBoundary([(2, tag) for tag in sorted(tags)], combined=False, oriented=False)
+    hollow = {(2, tag) for tag in tags} | set(edges)
+
+    def wanted(dimension: int, tag: int, x: float, y: float, z: float, size: float) -> float:
+        if (dimension, tag) in hollow:
+            return size * sizing.hollow / turn
+        return max(size, finest) if dimension < 3 else size
+
+    gmsh.model.mesh.setSizeCallback(wanted)
+    try:
+        with gmsh_options(gmsh, {"Mesh.MeshSizeMin": finest / _FINEST}):
+            yield
+    finally:
+        gmsh.model.mesh.removeSizeCallback()
+
+
+def _in_use(face: CadFace, sizing: Sizing) -> bool:
+    """Whether a place where a joint or load is sits in a bore or ball seat."""
+    if face.kind not in ("cylinder", "sphere") or not sizing.kept:
+        return False
+    away = np.array(sizing.kept) - face.centre
+    if face.kind == "cylinder":
+        away = away - (away @ face.direction)[:, None] * face.direction
+    return bool((np.linalg.norm(away, axis=1) <= AROUND * face.radius).any())
