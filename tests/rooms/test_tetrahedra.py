@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_link
 from kedfem.links.solid import solid_basis
-from kedfem.mesh import SolidMesh, filling, link_mesh, mesh_quality, part_mesh
+from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.cad.solids import OtherWayError, Sizing
@@ -24,6 +24,7 @@ from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads
 from kedfem.mesh.elements.simplices import TET10
 from kedfem.mesh.elements.tetrahedra import FORMS, straightened, tetrahedral
+from kedfem.mesh.elements.unfolding import unfolded
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.blends import swept_without_blends
@@ -82,13 +83,13 @@ class TestMended:
         points, cells = TET10.copy(), np.arange(10)[None]
         points[4] = [0.5, 0.6, 0.6]
         assert not valid_everywhere(points, cells).all()
-        mended = filling._unfolded(points, cells)
+        mended = unfolded(points, cells, 0.03)
         assert mended is not None
         assert valid_everywhere(mended, cells).all()
         assert_allclose(mended[:4], points[:4])
 
     def test_flat_ones_are_not(self) -> None:
-        assert filling._unfolded(TET10 * [1, 1, 0.0], np.arange(10)[None]) is None
+        assert unfolded(TET10 * [1, 1, 0.0], np.arange(10)[None], 0.03) is None
 
 
 #: Easy ones of the catalogue, a tiny edge, and a part whose grid of looks met the edge of a hole.
