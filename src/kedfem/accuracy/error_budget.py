@@ -12,6 +12,7 @@ WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
 UNACCOUNTED = 0.5  # of energy or momentum
+UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LEAST = 0.005  # what no run warns of
 OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
 
@@ -138,7 +139,8 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
 
 
 REMEDIES = {
-    "mesh": "take finer elements, or leave mesh and element out so that analysis.accuracy chooses them",
+    "mesh": "take finer elements; where mesh and element are left out, analysis.accuracy chooses them, up to "
+    f"{UNKNOWNS:,} unknowns in all",
     "step": "take a shorter step, or leave it out so that analysis.accuracy chooses it; a sudden start or load that "
     "excites vibration beyond any step needs a smoother one, or damping",
     "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",

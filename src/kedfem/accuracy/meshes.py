@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.accuracy.choices import elastic, open_step
+from kedfem.accuracy.error_budget import UNKNOWNS
 from kedfem.accuracy.estimates import Strained, link_errors, mesh_errors
 from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.prepared import Prepared
@@ -15,7 +16,6 @@ from kedfem.scene import Cad, MeshFile, Scene, time_grid
 MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
 FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
 FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # degrees an element turns, by accuracy
-UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced unasked
 
 
