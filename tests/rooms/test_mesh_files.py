@@ -197,6 +197,10 @@ a brick of two
 far, S4
 *SURFACE, NAME=top
 body, S2
+*SURFACE, NAME=some, TYPE=ELEMENT
+1, S1
+2, S1
+2, S4,
 """
 
 
@@ -210,6 +214,7 @@ def test_node_sets_and_surfaces_of_abaqus_are_faces(tmp_path: Path) -> None:
         "tip": 1,
         "top": 2,
         "wall": 1,
+        "some": 3,
     }
     assert_allclose(faces["tip"].direction, [1, 0, 0], atol=1e-12)
     assert_allclose(faces["top"].centre, [1, 0.5, 1], atol=1e-12)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from kedfem.scene import Scene, by_constraint_equations, corotational, drive_angle, rayleigh, time_grid
+from kedfem.scene import Scene, corotational, drive_angle, enforced_by_equations, rayleigh, time_grid
 
 MARGIN = 0.8  # of the turn 1 − ρ∞ [rad] in a step, at which such vibration neither grows nor dies (measured)
 
@@ -29,11 +29,7 @@ def fewest_steps(scene: Scene) -> float:
 def _moving(scene: Scene) -> str | None:
     """A joint enforced by constraint equations, from whose force vibration comes that grows alike (from twice MARGIN on,
     measured)."""
-    drives = scene.driven_joints
-    return next(
-        (name for name, joint in scene.joints.items() if by_constraint_equations(joint, drives.get(name))),
-        None,
-    )
+    return next((name for name in scene.joints if enforced_by_equations(scene, name)), None)
 
 
 def stability_warning(scene: Scene) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ from kedfem.scene.loads import (
 )
 from kedfem.scene.materials import Material
 from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
-from kedfem.scene.moving_joints import by_constraint_equations, moving_grounds
+from kedfem.scene.moving_joints import enforced_by_equations, moving_grounds
 from kedfem.scene.outlines import Arc, Hole
 from kedfem.scene.planes import spatial_beams
 from kedfem.scene.read import face_from, link_from, material_from, read_keys, read_scene, scene_from
@@ -113,11 +113,11 @@ __all__ = [
     "TorsionSpring",
     "TravelLimit",
     "TubeSection",
-    "by_constraint_equations",
     "corotational",
     "corotational_links",
     "cycle",
     "drive_angle",
+    "enforced_by_equations",
     "face_from",
     "factor_table",
     "factors",

@@ -22,7 +22,7 @@ SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
 DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive prescribes
 CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
 SHARED = "shared points"  # and one that holds points of its links together for good
-MIXED = "plane link and another"  # what a joint joins
+MIXED = "plane link and one in space"  # what a joint joins
 BESIDE = "plane link and a rigid one"  # of which the rigid one moves freely in space
 
 
@@ -78,9 +78,8 @@ REFUSALS = (
         "there is none that it could resist", "a {kind} joint, which leaves all free",
         "leave it out, or take another kind of joint"),
     Refusal("joints", {"joint": ("weld", "prismatic"), "partners": (MIXED,)}, "{where}.kind",
-        "be revolute or spherical between a plane link and another", "a plane link constrains no rotation "
-        "out of its plane",
-        "'{kind}' of {names}", "give both the same fidelity"),
+        "be revolute or spherical between a plane link and a solid or beam in space",
+        "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same fidelity"),
     Refusal("joints", {"joint": ("weld",), "partners": (BESIDE,)}, "{where}.kind",
         "be revolute or spherical between a plane link and a rigid one that moves freely",
         "a plane link constrains no rotation out of its plane", "'weld' of {names}",

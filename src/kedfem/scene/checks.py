@@ -17,7 +17,7 @@ from kedfem.scene.faults import either, line, place
 from kedfem.scene.files import sketched
 from kedfem.scene.links import DIRECTED, GROUND, SQUARE
 from kedfem.scene.moving_joints import moving_grounds_of
-from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.parts import Entry, Parts, fidelity, link_names
 from kedfem.scene.wording import shown, unknown_name
 
 if TYPE_CHECKING:
@@ -34,14 +34,6 @@ ELEMENTS = {
     "beam": ["beam3", "beam2", "beam4", "beam5", "beam7", "beam9"],
 }
 NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}
-
-
-def fidelity(link: Entry) -> str:
-    """The fidelity of a link as given; of one that leaves it open what it is meshed as."""
-    given = link.word("fidelity") or "solid"
-    if given not in {"reduced", "auto"}:
-        return given
-    return "beam" if link.word("shape", "kind") == "polyline" else "solid"
 
 
 def reference_faults(parts: Parts) -> Iterator[str]:
@@ -62,12 +54,6 @@ def reference_faults(parts: Parts) -> Iterator[str]:
         joint_name = drive.word("joint")
         if joint_name is not None and parts.joints and joint_name not in parts.joints:
             yield drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
-
-
-def link_names(joint: Entry) -> list[str]:
-    """The names of the links that a joint joins, as given."""
-    names = joint.raw.get("links")
-    return [name for name in names if isinstance(name, str)] if isinstance(names, (list, tuple)) else []
 
 
 def link_faults(parts: Parts) -> Iterator[str]:

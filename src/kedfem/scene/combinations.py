@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from kedfem.scene.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
-from kedfem.scene.checks import NOUNS, fidelity, link_names
+from kedfem.scene.checks import NOUNS
 from kedfem.scene.damping import rayleigh
 from kedfem.scene.faults import place
 from kedfem.scene.frames import default_frames
 from kedfem.scene.moving_joints import moving_joints
-from kedfem.scene.parts import Entry, Parts
-from kedfem.scene.planes import rigid_in_space
+from kedfem.scene.parts import Entry, Parts, fidelity, link_names
+from kedfem.scene.planes import rigid_in_space, spatial_names
 from kedfem.scene.wording import shown
 
 Told = tuple[str, Facts, Mapping[str, str]]
@@ -72,11 +72,12 @@ def joints(parts: Parts) -> Iterator[Told]:
 
 def partners(parts: Parts, held: list[Entry]) -> str:
     """What a joint joins, as far as the table asks for it."""
-    kinds = {NOUNS[fidelity(link)] for link in held if fidelity(link) in NOUNS}
-    if NOUNS["plane"] in kinds and len(kinds) == 2:
+    kinds = {fidelity(link) for link in held}
+    if "plane" not in kinds:
+        return ""
+    if any(fidelity(link) == "solid" or link.name in spatial_names(parts) for link in held):
         return MIXED
-    beside = NOUNS["plane"] in kinds and any(rigid_in_space(parts, link) for link in held)
-    return BESIDE if beside else ""
+    return BESIDE if any(rigid_in_space(parts, link) for link in held) else ""
 
 
 def named(held: list[Entry]) -> str:

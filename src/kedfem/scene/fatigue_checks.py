@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kedfem.scene.checks import fidelity
 from kedfem.scene.faults import line, place
-from kedfem.scene.parts import Parts
+from kedfem.scene.parts import Parts, fidelity
 from kedfem.scene.wording import unknown_name
 
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 from kedfem.errors import SceneError
 from kedfem.scene.analysis import WITHOUT_VIBRATION
-from kedfem.scene.checks import NOUNS, fidelity
+from kedfem.scene.checks import NOUNS
 from kedfem.scene.drives import ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
 from kedfem.scene.files import part_geometry
 from kedfem.scene.laws import table_noise
-from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.parts import Entry, Parts, fidelity
 from kedfem.scene.planes import FLAT, leaving, off_plane, spring_ends, vector
 from kedfem.scene.shapes import Bar, Cad, MeshFile, Part
 from kedfem.scene.timing import cycle, turning_speed

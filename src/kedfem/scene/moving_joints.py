@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kedfem.scene.drives import Drive
 from kedfem.scene.links import GROUND, Joint
-from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.parts import Entry, Parts, fidelity, link_names
 
 if TYPE_CHECKING:
     from kedfem.scene.scene import Scene
@@ -19,13 +19,18 @@ SHARED = (
 )  # kinds that hold points of their links together, wherever these go
 
 
-def by_constraint_equations(joint: Joint, drive: Drive | None = None) -> bool:
+def by_constraint_equations(
+    joint: Joint, drive: Drive | None = None, kinds: frozenset[str] = frozenset()
+) -> bool:
     """Whether a joint cannot be said of points that its links share for good.
 
     Parameters
     ----------
     drive : of the joint, if it is driven
+    kinds : what its links are meshed as: a plane link has no rotation that it could share with a beam
     """
+    if joint.kind == "weld" and kinds == {"plane", "beam"}:
+        return True
     if joint.bushing is not None or (drive is not None and drive.shaft_stiffness is not None):
         return True
     if joint.kind in SHARED:
@@ -37,7 +42,23 @@ def moving_joints(parts: Parts) -> list[Entry]:
     """Good joints of a scene under validation enforced by constraint equations."""
     drives = {drive.word("joint"): drive.record for drive in parts.all_drives if drive.record is not None}
     good = [joint for joint in parts.joints.values() if joint.record is not None]
-    return [joint for joint in good if by_constraint_equations(joint.record, drives.get(joint.name))]
+    return [
+        joint for joint in good
+        if by_constraint_equations(joint.record, drives.get(joint.name), kinds_joined(parts, joint))
+    ]  # fmt: skip
+
+
+def kinds_joined(parts: Parts, joint: Entry) -> frozenset[str]:
+    """What the links of a joint are meshed as."""
+    return frozenset(fidelity(parts.links[name]) for name in link_names(joint) if name in parts.links)
+
+
+def enforced_by_equations(scene: Scene, name: str) -> bool:
+    """Whether a joint of a scene is enforced by constraint equations."""
+    joint = scene.joints[name]
+    links = [scene.links[each] for each in joint.links if each != GROUND]
+    kinds = frozenset("rigid" if link.fidelity == "rigid" else link.family for link in links)
+    return by_constraint_equations(joint, scene.driven_joints.get(name), kinds)
 
 
 def moving_grounds(scene: Scene) -> dict[str, str]:

@@ -171,3 +171,17 @@ def scene_parts(raw: Mapping[str, Any], gravity: tuple[float, ...], folder: Path
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
         folder=folder,
     )
+
+
+def fidelity(link: Entry) -> str:
+    """The fidelity of a link as given; of one that leaves it open what it is meshed as."""
+    given = link.word("fidelity") or "solid"
+    if given not in {"reduced", "auto"}:
+        return given
+    return "beam" if link.word("shape", "kind") == "polyline" else "solid"
+
+
+def link_names(joint: Entry) -> list[str]:
+    """The names of the links that a joint joins, as given."""
+    names = joint.raw.get("links")
+    return [name for name in names if isinstance(name, str)] if isinstance(names, (list, tuple)) else []

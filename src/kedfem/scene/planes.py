@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from kedfem.scene.apart import Apart
-from kedfem.scene.checks import NOUNS, fidelity, link_names
+from kedfem.scene.checks import NOUNS
 from kedfem.scene.moving_joints import moving_joints
-from kedfem.scene.parts import NONE, Entry, Parts
+from kedfem.scene.parts import NONE, Entry, Parts, fidelity, link_names
 from kedfem.scene.points import XYZ
 from kedfem.scene.shapes import Bar, Polyline
 
@@ -136,7 +136,7 @@ def own_obstacles(parts: Parts, name: str, around: Iterable[Entry]) -> Iterator[
         ]
         if getattr(entry.record, "kind", None) == "weld" and others:
             other = fidelity(others[0])
-            if other not in {"beam", "rigid"} or rigid_in_space(parts, others[0]):
+            if other not in {"beam", "plane", "rigid"} or rigid_in_space(parts, others[0]):
                 yield entry.fault(
                     "kind", f"must be a hinge {whose}, got a weld to a {NOUNS.get(other, 'rigid link')}"
                 )

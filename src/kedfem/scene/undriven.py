@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kedfem.scene.checks import fidelity
 from kedfem.scene.combinations import frames_of, slider
 from kedfem.scene.drives import SLIDING, TURNING
 from kedfem.scene.links import GROUND
-from kedfem.scene.parts import Entry, Parts
+from kedfem.scene.parts import Entry, Parts, fidelity
 from kedfem.scene.units import Quantity, si_number
 from kedfem.scene.wording import shown, unknown_name
 

@@ -19,7 +19,7 @@ from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import unit
 from kedfem.motion.newton import cross_matrix
-from kedfem.scene import GROUND, Joint, Scene, by_constraint_equations, moving_grounds
+from kedfem.scene import GROUND, Joint, Scene, enforced_by_equations, moving_grounds
 
 Ports = Float[np.ndarray, "p 3"]
 
@@ -76,10 +76,9 @@ class ConstraintJoint:
 
 def needs_rows(scene: Scene, name: str) -> bool:
     """Whether a joint is enforced by constraint equations: where shared port points cannot say what it holds."""
-    driven = scene.driven_joints.get(name)
-    if driven is not None and name in moving_grounds(scene).values():
+    if name in scene.driven_joints and name in moving_grounds(scene).values():
         return False
-    return by_constraint_equations(scene.joints[name], driven)
+    return enforced_by_equations(scene, name)
 
 
 def ordered(joint: Joint) -> tuple[str, str]:

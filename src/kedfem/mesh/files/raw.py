@@ -1,5 +1,6 @@
 """Mesh files as they are: nodes, cells, sets of sides and of nodes, through gmsh or meshio; each form has one reader."""
 
+import io
 import re
 import warnings
 from dataclasses import dataclass, field
@@ -36,6 +37,11 @@ _ABAQUS_SIDES = {
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
     4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
 }  # fmt: skip
+
+
+#: A *SURFACE block of Abaqus: its options, and its lines; the name among its options.
+_SURFACES = r"(?im)^\*SURFACE\s*,([^\n]*)\n((?:(?!\*)[^\n]+\n?)*)"
+_NAME = r"(?i)\bNAME\s*=\s*\"?([^,\"\s]+)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +140,41 @@ def _through_meshio(path: Path) -> RawMesh:
 
     _abaqus.abaqus_to_meshio_type.update(_PLANE)
     _mesh.topological_dimension.update(_QUADRATIC)
+    abaqus = path.suffix.lower() == ".inp"
+    text = _with_sets(path.read_text(errors="replace")) if abaqus else ""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        raw = meshio.read(path)
-    return from_meshio(raw, path.read_text(errors="replace") if path.suffix.lower() == ".inp" else "")
+        raw = _abaqus.read_buffer(_named(text, path)) if abaqus else meshio.read(path)
+    return from_meshio(raw, text)
+
+
+def _named(text: str, path: Path) -> io.StringIO:
+    """A text to read as the file that it is from, beside which others may be included."""
+    buffer = io.StringIO(text)
+    buffer.name = str(path)
+    return buffer
+
+
+def _with_sets(text: str) -> str:
+    """An Abaqus file whose *SURFACE blocks name single elements by number, with sets of elements in their place."""
+    sets: dict[str, list[str]] = {}
+
+    def of_sets(block: re.Match[str]) -> str:
+        name = re.search(_NAME, block[1])
+        lines: dict[str, None] = {}  # in their order, once each
+        for line in block[2].splitlines(keepends=True):
+            said = line
+            match = re.fullmatch(r"\s*(\d+)\s*,\s*[Ss](\d)\s*,?\s*", line)
+            if name and match:
+                of_side = f"{name[1]}:S{match[2]}"
+                sets.setdefault(of_side, []).append(match[1])
+                said = f"{of_side}, S{match[2]}\n"
+            lines[said] = None
+        return block[0].replace(block[2], "".join(lines)) if lines else block[0]
+
+    changed = re.sub(_SURFACES, of_sets, text)
+    added = [f"*ELSET, ELSET={name}\n" + ",\n".join(numbers) + "\n" for name, numbers in sets.items()]
+    return "\n".join([changed.rstrip("\n"), *added]) if added else text
 
 
 def from_meshio(raw: Any, abaqus: str = "") -> RawMesh:
@@ -182,9 +219,8 @@ def _sides(raw: Any, abaqus: str) -> dict[str, list[np.ndarray]]:
 def _abaqus_surfaces(text: str) -> list[tuple[str, str, int]]:
     """Lines of *SURFACE blocks that take one side of all elements of a set: name, set, number of the side from 0."""
     found = []
-    blocks = re.findall(r"(?im)^\*SURFACE\s*,([^\n]*)\n((?:(?!\*)[^\n]*\n?)*)", text)
-    for options, lines in blocks:
-        name = re.search(r"(?i)\bNAME\s*=\s*\"?([^,\"\s]+)", options)
+    for options, lines in re.findall(_SURFACES, text):
+        name = re.search(_NAME, options)
         for line in lines.splitlines():
             match = re.fullmatch(r"\s*\"?([^,\"\s]+)\"?\s*,\s*[Ss](\d)\s*,?\s*", line)
             if name and match and int(match[2]) > 0:
