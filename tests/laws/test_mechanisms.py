@@ -112,10 +112,11 @@ def test_a_driven_mechanism_with_corotational_frames_moves_as_by_the_oracle(seed
 
 
 @pytest.mark.long
-def test_thirty_driven_mechanisms_vibrate_alike_by_both_solvers() -> None:
-    found = [by_both_solvers(seed, most=3)[0] for seed in range(30)]
+@pytest.mark.parametrize("first", range(0, 30, 6))
+def test_thirty_driven_mechanisms_vibrate_alike_by_both_solvers(first: int) -> None:
+    found = [by_both_solvers(seed, most=3)[0] for seed in range(first, first + 6)]
     assert "differs" not in found
-    assert found.count("fine") >= 15
+    assert found.count("fine") >= 3
 
 
 def test_mechanisms_are_of_two_to_twelve_bodies() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.scene import ConstantSpeed, Material, Ramp, Scene
+from kedfem.scene.units import RPM
 
 LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
 MASSES = 1e-9, 1e6  # kg, of a link
@@ -65,7 +66,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
         {name: float(np.linalg.norm(np.ptp(X, axis=0))) for name, X in every.items()},
         {name: masses[name] for name in scene.links if name in masses},
         moduli,
-        {name: speed * 30 / np.pi for name, speed in final.items() if name not in slides},
+        {name: speed * RPM for name, speed in final.items() if name not in slides},
         {name: speed for name, speed in final.items() if name in slides},
     )
 

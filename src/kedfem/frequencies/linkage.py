@@ -36,6 +36,7 @@ from kedfem.results.frequencies import (
     write_summary,
 )
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
+from kedfem.scene.units import RPM
 
 Watch = Callable[[str, int, int], None]
 #: of the drive's, at which stiffening is looked at; a Campbell plot ends with the last
@@ -173,10 +174,9 @@ def _write_files(
 def _summary(done: Frequencies, source: str | None, wanted: Wanted) -> Summary:
     """What a report shows of them."""
     every = done.values[:, ~np.isnan(done.values).any(axis=0)]
-    rpm = 60 / (2 * np.pi)
-    met = [(x.mode, x.harmonic, rpm * x.slowest, rpm * x.fastest) for x in done.crossings]
+    met = [(x.mode, x.harmonic, RPM * x.slowest, RPM * x.fastest) for x in done.crossings]
     lowest, highest = (f(every, axis=0).tolist() for f in (np.min, np.max))
-    return Summary(source, len(done.time), wanted.free, done.still, lowest, highest, rpm * done.speed, met)
+    return Summary(source, len(done.time), wanted.free, done.still, lowest, highest, RPM * done.speed, met)
 
 
 def _at_speeds(
@@ -191,7 +191,7 @@ def _at_speeds(
         except UnstableError:
             if share <= 1.0:
                 raise
-            between = (60 / (2 * np.pi) * speed * x for x in (max(found), share))
+            between = (RPM * speed * x for x in (max(found), share))
             return found, (BUCKLED.format(*between),)
     return found, ()
 

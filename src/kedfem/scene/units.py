@@ -22,6 +22,7 @@ NUMBER = re.compile(
     r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^0-9\s+-].*?|)\s*", re.ASCII
 )
 LONGEST = 60  # letters of a unit
+RPM = 30 / math.pi  # revolutions per minute of 1 rad/s
 NAMED = (
     r"\(*(?!inf\b|nan\b)(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*) ?-?[1-9]|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?\)*"
 )

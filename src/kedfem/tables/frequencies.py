@@ -9,8 +9,8 @@ from rich.text import Text
 from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
 from kedfem.output.words import moment, with_prefix
 from kedfem.scene import Scene
+from kedfem.scene.units import RPM
 
-RPM = 60 / (2 * np.pi)
 WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
 MODES = 8  # side by side
 

@@ -32,11 +32,6 @@ class Looks:
         """Whether all normals are square to a direction."""
         return bool(abs(self.normals @ direction).max(initial=0) < OFF)
 
-    def is_through(self, axis: Axis) -> bool:
-        """Whether it is in a plane that holds the axis."""
-        off = abs(((self.places - axis[0]) * self.normals).sum(axis=1)).max(initial=0)
-        return self.face.kind == "plane" and bool(off < OFF) and self.runs_along(axis[1])
-
 
 def looks(gmsh: ModuleType, solid: Solid) -> dict[int, Looks]:
     """Of each face, by its tag, places and normals, without those that OpenCASCADE does not know."""

@@ -48,7 +48,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     solid : Solid
         The only solid in that model.
     sizing : Sizing
-        How fine; the rule is that of :func:`~kedfem.mesh.division.plan_size`.
+        How fine; the rule is that of :func:`~kedfem.mesh.layered.division.plan_size`.
 
     Returns
     -------

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.plots.drawing import figure_saved
+from kedfem.scene.units import RPM
 
 
 def write_over_turn(
@@ -46,7 +47,7 @@ def write_campbell(
     OutputError
         The file cannot be written.
     """
-    rpm = speeds * 60 / (2 * np.pi)
+    rpm = RPM * speeds
     with figure_saved(
         path, "Campbell plot: natural frequencies over a turn, harmonics of the drive"
     ) as figure:
@@ -59,7 +60,7 @@ def write_campbell(
         for k in range(1, harmonics + 1):
             ax.plot(rpm, k * rpm / 60, color="0.25", linewidth=0.9, linestyle="--")
             ax.annotate(f"{k}×", (rpm[-1], k * rpm[-1] / 60), xytext=(3, -3), textcoords="offset points")
-        ax.axvline(speed * 60 / (2 * np.pi), color="0.5", linewidth=0.9, linestyle=":")
+        ax.axvline(RPM * speed, color="0.5", linewidth=0.9, linestyle=":")
         ax.set_xlabel("drive speed (rpm); dotted: the scene's")
         ax.set_ylabel("frequency (Hz)")
         ax.grid(alpha=0.3)
