@@ -17,7 +17,7 @@ from kedfem.mesh.elements.shape_functions import node_numbers
 from kedfem.mesh.elements.simplices import TET10
 from kedfem.mesh.elements.tetrahedra import edge_middles
 from kedfem.mesh.elements.unfolding import unfolded
-from kedfem.mesh.hollows import USUAL, finer_hollows
+from kedfem.mesh.hollows import USUAL, finer_hollows, free_hollows
 from kedfem.mesh.session import gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
@@ -105,6 +105,8 @@ def _with_hollows(
     They are coarser where elements would be bad, or, without a size, more than 90,000 unknowns; the mesh says so then.
     """
     coarser, found = usual
+    if not free_hollows(solid, sizing):
+        return found
     least, angle = min(_BAD, _least_jacobian(found)), sizing.hollow
     while angle < USUAL:
         mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, said, _MOST)

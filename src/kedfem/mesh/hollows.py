@@ -31,7 +31,7 @@ def finer_hollows(
     finest : float
         Their least size [m].
     """
-    tags = {face.tag for face in solid.faces if face.hollow and not _in_use(face, sizing)}
+    tags = free_hollows(solid, sizing)
     if sizing.hollow >= USUAL or not tags:
         yield
         return
@@ -49,6 +49,11 @@ def finer_hollows(
             yield
     finally:
         gmsh.model.mesh.removeSizeCallback()
+
+
+def free_hollows(solid: Solid, sizing: Sizing) -> frozenset[int]:
+    """Tags of the fillets, and of the bores and ball seats that no joint or load is in."""
+    return frozenset(face.tag for face in solid.faces if face.hollow and not _in_use(face, sizing))
 
 
 def _in_use(face: CadFace, sizing: Sizing) -> bool:
