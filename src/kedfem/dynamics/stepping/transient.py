@@ -198,7 +198,8 @@ def _unbalanced(scene: Scene, motion: RigidMotion) -> str:
         "balance to be found: hold them by joints, springs or a drive, let loads grow in smaller steps over time, or "
         "take kind = 'transient' with damping"
         if kind == "static"
-        else "a drive near a natural frequency: take a slower drive, stiffer links or kind = 'steady'"
+        else "a drive near a natural frequency, or a linkage near a dead point, where small loads move it far: take a "
+        "slower drive, stiffer links, another position or kind = 'steady'"
     )
     return (
         f"analysis.kind: all forces must balance at each position of a {kind} analysis, got no balance at "
