@@ -96,6 +96,14 @@ def test_forces_of_a_driven_mechanism_tend_to_those_of_rigid_links(seed: int, fr
     assert found
 
 
+@pytest.mark.long
+def test_a_spring_beside_stiff_links_does_not_hide_their_balance() -> None:
+    """Its iterations crept where matrices had mass, and did not settle where changes were rounding."""
+    what, found = limit(5083, "rigid-body", most=3)
+    assert what == "fine", found
+    assert max(found.values()) < 2e-4
+
+
 @pytest.mark.parametrize("seed", [554, 558, 568, 593])
 def test_a_driven_mechanism_vibrates_alike_by_both_solvers(seed: int) -> None:
     """568 and 593: a drive on a joint whose other directions give."""

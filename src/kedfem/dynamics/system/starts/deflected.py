@@ -36,7 +36,8 @@ KRYLOV = 60
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 CONVERGED = 1e-10  # change of a iteration, of the deflection
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
-FREE = 1e-3  # the same where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
+STALLED, IN_A_ROW = 1e-5, 3  # the same of so many changes that do not fall, by matrices without mass
+FREE = 1e-3  # as ROUNDING where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
@@ -216,13 +217,15 @@ def _balanced(
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
-    linear = of.c.single
+    linear, slow, creeps = of.c.single, 0, False
     for n in range(SWEEPS):
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
             balance = Balance(of, bodies.held(R), R, _asked(now, u, z1))
-            change = bodies.change(balance, r, exact=linear and (n >= DIRECT or any(bodies.sparse)))
+            change = bodies.change(
+                balance, r, exact=creeps or (linear and (n >= DIRECT or any(bodies.sparse)))
+            )
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
@@ -233,6 +236,11 @@ def _balanced(
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
+        if n >= DIRECT and size > last / 2 and spins is not None and not (linear or creeps):
+            creeps, mixing, last = True, Mixing(), np.inf  # it may be the mass in the matrices that slows it
+            continue
+        slow = slow + 1 if creeps and size > last / 2 and size <= STALLED * reached else 0
+        stalls = stalls or slow >= IN_A_ROW
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise NoBalanceError(
         "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "

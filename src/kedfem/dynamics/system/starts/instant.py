@@ -86,6 +86,7 @@ class Instant:
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
+        self._gradients: Float[np.ndarray, "r k"] | None = None  # as they were found last
 
     def inside(self, u: Flat, v: Flat) -> list[Inside]:
         """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
@@ -133,7 +134,8 @@ class Instant:
 
     def gradients(self, z: Flat) -> Float[np.ndarray, "r k"]:
         """Of all coordinates by z."""
-        return gradients(self.of.system, self.at, z)
+        self._gradients = gradients(self.of.system, self.at, z, self._gradients)
+        return self._gradients.copy()
 
     def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""

@@ -88,8 +88,15 @@ def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float
     ])  # fmt: skip
 
 
-def gradients(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, "r k"]:
-    """How all coordinates change with z, at rest in their places of the rigid-body motion where they are linear in it."""
+def gradients(
+    system: System, at: Places, z: Float[np.ndarray, " k"], known: Float[np.ndarray, "r k"] | None = None
+) -> Float[np.ndarray, "r k"]:
+    """How all coordinates change with z, at rest in their places of the rigid-body motion where they are linear in it.
+
+    Parameters
+    ----------
+    known : the same at another z, where those that are linear are as here
+    """
     C = np.zeros((len(system.constraints), system.unknowns))
     still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
     moving: dict[tuple[int, int, bool], tuple[Series, Series]] = {}
@@ -103,6 +110,9 @@ def gradients(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[n
         return moving[key]
 
     for a, each in enumerate(system.constraints):
+        if each.linear and known is not None:
+            C[a] = known[a]
+            continue
         rest = _Poses(system, still, np.stack([0.0 * z if each.linear else z, 0.0 * z, 0.0 * z]))
         for term in each.terms:
             columns = {
