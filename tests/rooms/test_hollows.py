@@ -7,15 +7,15 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from geometry.make import empty_model
 
 from kedfem.mesh import SolidMesh, filling
-from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.solids import Sizing, Solid
 from kedfem.mesh.filling import filled_mesh
-from kedfem.mesh.session import gmsh_options
 from kedfem.scene import Cad
 from tests.verification.concentrations import CROSS, LENGTH, bored_shaft, shaft
+
+from .cad_files import KEYS, written
 
 Draw = Callable[[ModuleType], None]
 ASKED = np.radians(15)
@@ -24,15 +24,8 @@ ASKED = np.radians(15)
 @contextmanager
 def read(draw: Draw, folder: Path) -> Iterator[tuple[ModuleType, Solid]]:
     """A drawing that has been through STEP."""
-    file = folder / "part.step"
-    with empty_model() as occ:
-        draw(occ)
-        import gmsh
-
-        occ.synchronize()
-        with gmsh_options(gmsh, {"General.Terminal": 0.0}):
-            gmsh.write(str(file))
-    with solid_model(CadKeys("part.step", "solid"), file, "part", Cad(file=file.name)) as found:
+    written(folder, "part", draw, ("step",))
+    with solid_model(KEYS, folder / "part.step", "part", Cad(file="part.step")) as found:
         yield found
 
 

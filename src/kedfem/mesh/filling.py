@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.faces import joined_faces
-from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import USUAL, CadFace, OtherWayError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
@@ -17,7 +17,7 @@ from kedfem.mesh.elements.shape_functions import node_numbers
 from kedfem.mesh.elements.simplices import TET10
 from kedfem.mesh.elements.tetrahedra import edge_middles
 from kedfem.mesh.elements.unfolding import unfolded
-from kedfem.mesh.hollows import USUAL, finer_hollows, free_hollows
+from kedfem.mesh.hollows import finer_hollows, free_hollows
 from kedfem.mesh.session import gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
@@ -179,7 +179,7 @@ def _tried(
 ) -> Iterator[SolidMesh]:
     """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
     size = coarser * tetrahedron_size(solid, sizing)
-    turn = min(_TURN * coarser, np.pi / 3) * min(1.0, 4 * sizing.turn / np.pi)
+    turn = min(_TURN * coarser, np.pi / 3) * min(1.0, sizing.turn / USUAL)
     finest = size * min(1.0, coarser / _FINEST)
     for setting in SETTINGS:
         numbers = _options(size, turn, finest, setting)

@@ -6,10 +6,9 @@ from types import ModuleType
 
 import numpy as np
 
-from kedfem.mesh.cad.solids import AROUND, CadFace, Sizing, Solid
+from kedfem.mesh.cad.solids import AROUND, USUAL, CadFace, Sizing, Solid
 from kedfem.mesh.session import gmsh_options
 
-USUAL = np.pi / 4  # as nobody asked for finer ones: gmsh's own angle for all faces, within its least size
 _FINEST = 4.0  # the least size elsewhere over the least one here
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import USUAL, OtherWayError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.tetrahedra import FORMS
@@ -124,7 +124,7 @@ def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
 
 def sizing(mesh: Meshing) -> Sizing:
     """What the keys of a link's mesh ask for."""
-    hollow = np.pi / 4 if mesh.fillet_angle is None else mesh.fillet_angle
+    hollow = USUAL if mesh.fillet_angle is None else mesh.fillet_angle
     return Sizing(
         size=mesh.size, across=mesh.elements_across or 2, layers=mesh.layers, ignore=mesh.defeature_size,
         hollow=hollow,

@@ -53,9 +53,11 @@ def common_facts(parts: Parts) -> dict[str, str]:
 def joints(parts: Parts) -> Iterator[Told]:
     """Good joints: how each is enforced, and what it joins."""
     moving = {joint.name for joint in moving_joints(parts)}
+    mixed = any(fidelity(link) == "plane" for link in parts.links.values())
+    spatial = spatial_names(parts) if mixed else frozenset[str]()  # asked for beside plane links only
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
-        facts = {"joint": kind, "partners": partners(parts, held)}
+        facts = {"joint": kind, "partners": partners(parts, held, spatial)}
         words = {"where": place(joint.where), "kind": kind, "key": "kind", "names": named(held)}
         if joint.record is None:
             yield "joints", facts, words
@@ -70,12 +72,16 @@ def joints(parts: Parts) -> Iterator[Told]:
         yield "joints", facts, words
 
 
-def partners(parts: Parts, held: list[Entry]) -> str:
-    """What a joint joins, as far as the table asks for it."""
-    kinds = {fidelity(link) for link in held}
-    if "plane" not in kinds:
+def partners(parts: Parts, held: list[Entry], spatial: frozenset[str]) -> str:
+    """What a joint joins, as far as the table asks for it.
+
+    Parameters
+    ----------
+    spatial : names of the beams in space
+    """
+    if not any(fidelity(link) == "plane" for link in held):
         return ""
-    if any(fidelity(link) == "solid" or link.name in spatial_names(parts) for link in held):
+    if any(fidelity(link) == "solid" or link.name in spatial for link in held):
         return MIXED
     return BESIDE if any(rigid_in_space(parts, link) for link in held) else ""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from kedfem.scene.faults import place
 from kedfem.scene.hints import Where, below, quantities
+from kedfem.scene.units import RPM
 
 TURN = 2.0 * math.pi
 FAST = (
@@ -45,7 +46,7 @@ def doubts(where: str, value: float, units: set[str]) -> Iterator[str]:
         )
     if units == {"rad/s"} and abs(value) >= FAST and value % 10 == 0:
         yield (
-            f"{where}: {value:g} without a unit is in rad/s, {value * 30 / math.pi:.4g} rpm; "
+            f"{where}: {value:g} without a unit is in rad/s, {value * RPM:.4g} rpm; "
             f"if rpm are meant write '{value:g} rpm', else '{value:g} rad/s'"
         )
     if units == {"m/s"} and abs(value) >= FAST and value % 10 == 0:

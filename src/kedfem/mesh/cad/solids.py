@@ -64,6 +64,7 @@ class Solid:
         return sum(face.area for face in self.faces)
 
 
+USUAL = np.pi / 4  # that an element turns along a curved face where nobody asks for less [rad]
 AROUND = 0.3  # of a bore's radius: a place so near its middle is in it
 
 
@@ -84,8 +85,8 @@ class Sizing:
     size: float | None = None
     across: int = 2
     layers: int = 1
-    turn: float = np.pi / 4
-    hollow: float = np.pi / 4
+    turn: float = USUAL
+    hollow: float = USUAL
     ignore: float | None = None
     kept: tuple[tuple[float, float, float], ...] = ()
     named: tuple[str, ...] = ()

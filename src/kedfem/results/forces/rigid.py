@@ -142,10 +142,12 @@ def rigid_forces(
 
     A free motion is held in the rigid linkage, by what no link has there.
     """
-    every = [] if linkage.mobility else [_drive(scene, linkage, name) for name in scene.driven_joints]
-    if along is not None and not linkage.mobility:
-        found = reactions(linkage, _on_grid(linkage, along))
-        every = [*(x for name in scene.joints for x in _joint(scene, linkage, found, name)), *every]
+    every: list[Borne] = []
+    if not linkage.mobility:
+        if along is not None:
+            found = reactions(linkage, _on_grid(linkage, along))
+            every += [x for name in scene.joints for x in _joint(scene, linkage, found, name)]
+        every += [_drive(scene, linkage, name) for name in scene.driven_joints]
     acted = rigid_actions(scene, linkage.bodies)
     measured = Measured(acted, kernel_table(acted))
     return RigidForces(scene, linkage, inertias, tuple(every), measured, returning(scene, along))

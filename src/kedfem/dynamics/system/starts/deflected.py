@@ -217,15 +217,15 @@ def _balanced(
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
-    linear, slow, creeps = of.c.single, 0, False
+    linear, slow = of.c.single, 0
+    exact = linear and any(bodies.sparse)
     for n in range(SWEEPS):
+        exact = exact or (linear and n >= DIRECT)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)
         try:
             balance = Balance(of, bodies.held(R), R, _asked(now, u, z1))
-            change = bodies.change(
-                balance, r, exact=creeps or (linear and (n >= DIRECT or any(bodies.sparse)))
-            )
+            change = bodies.change(balance, r, exact)
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
@@ -236,10 +236,10 @@ def _balanced(
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
-        if n >= DIRECT and size > last / 2 and spins is not None and not (linear or creeps):
-            creeps, mixing, last = True, Mixing(), np.inf  # it may be the mass in the matrices that slows it
+        if n >= DIRECT and size > last / 2 and spins is not None and not exact:
+            exact, mixing, last = True, Mixing(), np.inf  # it may be the mass in the matrices that slows it
             continue
-        slow = slow + 1 if creeps and size > last / 2 and size <= STALLED * reached else 0
+        slow = slow + 1 if exact and size > last / 2 and size <= STALLED * reached else 0
         stalls = stalls or slow >= IN_A_ROW
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     raise NoBalanceError(
