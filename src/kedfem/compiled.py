@@ -75,11 +75,36 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
     atexit.register(note, _FOLDER)
     vars(numba.config)["CACHE_DIR"] = str(_FOLDER)
 
+
+def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
+    """What compiles a function by numba, and keeps it while no other process does.
+
+    Numba writes the list of what is kept of a function, then the code: of two processes that compile it for different
+    types at once, one could find the other's code under its own types.
+    """
+
+    def compiles(function: Callable[..., Any]) -> Any:
+        dispatcher = numba.njit(**options)(function)
+        file = dispatcher._cache._cache_file
+        save, lock = file.save, Path(dispatcher.stats.cache_path, "lock")
+
+        def alone(key: object, code: object) -> None:
+            from filelock import FileLock
+
+            with FileLock(lock):
+                save(key, code)
+
+        file.save = alone
+        return dispatcher
+
+    return compiles
+
+
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 _FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
-compiled: Any = numba.njit(**_FAST)
+compiled = _kept(_FAST)
 _INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-inner: Any = numba.njit(**_INNER)
+inner = _kept(_INNER)
 """Called by compiled loops only, and allocates nothing, so that no references are counted: compiled in less time."""
-compiled_in_order: Any = numba.njit(**_OPTIONS)
+compiled_in_order = _kept(_OPTIONS)
 """Sums as written, where their order matters."""

@@ -27,24 +27,31 @@ def unsealed(whole: bytes) -> bytes | None:
 
 
 def drop_changed(folder: Path) -> None:
-    """Remove the files of a folder's own folders that are not as `note` found them; new ones stay."""
+    """Remove the files of a folder's own folders that are not as `note` found them; those written since stay."""
     known = _known(folder)
     for file in _files(folder) if known else ():
         with suppress(OSError):
-            if known.get(_name(file), digest := _digest(file)) != digest:
+            time, digest = _time(file), _digest(file)
+            if known.get(_name(file), {time: digest}).get(time, digest) != digest:
                 file.unlink()
 
 
 def note(folder: Path) -> None:
-    """Write the digests of all files, where some are newer than these are; nothing where nothing can be written."""
+    """Write the digests of files that were written since the last note; nothing where nothing can be written.
+
+    Another process may write a file meanwhile: its time is read before its digest, which is never taken for a later's.
+    """
     with suppress(OSError):
-        known, written = _known(folder), folder / DIGESTS
-        last = written.stat().st_mtime_ns if known else 0
-        new = [file for file in _files(folder) if _name(file) not in known or file.stat().st_mtime_ns > last]
+        known = _known(folder)
+        new = {
+            _name(file): {time: _digest(file)}
+            for file in _files(folder)
+            if (time := _time(file)) not in known.get(_name(file), {})
+        }
         if not new:
             return
-        with whole(written) as part:
-            part.write_text(json.dumps(known | {_name(file): _digest(file) for file in new}))
+        with whole(folder / DIGESTS) as part:
+            part.write_text(json.dumps(known | new))
 
 
 def _files(folder: Path) -> list[Path]:
@@ -55,13 +62,22 @@ def _name(file: Path) -> str:
     return f"{file.parent.name}/{file.name}"
 
 
+def _time(file: Path) -> str:
+    return str(file.stat().st_mtime_ns)
+
+
 def _digest(file: Path) -> str:
     return sha256(file.read_bytes()).hexdigest()
 
 
-def _known(folder: Path) -> dict[str, str]:
+def _known(folder: Path) -> dict[str, dict[str, str]]:
+    """Of each file the digest by the time at which it was written."""
     try:
         known = json.loads((folder / DIGESTS).read_bytes())
     except (OSError, ValueError):
         return {}
-    return known if isinstance(known, dict) else {}
+    return (
+        {name: each for name, each in known.items() if isinstance(each, dict)}
+        if isinstance(known, dict)
+        else {}
+    )

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -96,12 +97,21 @@ def _count_cycles() -> None:
 
 
 def _all_compiled() -> Path:
-    """A file that stands in numba's folder once all of these kernels have been compiled for this processor."""
+    """A file that stands in numba's folder once all of these kernels have been compiled for this processor.
+
+    Numba keeps code for one installation, and while its files' times stay: of another, or after an upgrade that left the
+    kernels alone, nothing that it kept is used.
+    """
     import numba
     from llvmlite.binding import get_host_cpu_name
 
     from kedfem.compiled import ROOT, kernel_folder
 
+    stamps = [f"{kernel_folder(ROOT).name} {numba.__version__} {sys.version}"]
+    for kernel in sorted(ROOT.rglob("*kernel.py")):
+        stat = kernel.stat()
+        stamps.append(f"{kernel} {stat.st_mtime_ns} {stat.st_size}")
     options = vars(numba.config)
     processor = options["CPU_NAME"] or get_host_cpu_name()
-    return Path(options["CACHE_DIR"], f"all-{kernel_folder(ROOT).name}-{processor}")
+    digest = sha256("\n".join(stamps).encode()).hexdigest()[:16]
+    return Path(options["CACHE_DIR"], f"all-{digest}-{processor}")

@@ -134,6 +134,47 @@ def test_after_compiling_beforehand_no_scene_compiles_anything(tmp_path: Path) -
     subprocess.run([sys.executable, "-c", BEFOREHAND, *scenes], check=True, timeout=600)
 
 
+def test_an_installation_whose_kernels_are_newer_or_elsewhere_is_compiled_for_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba uses nothing that it kept of these; `kedfem compile` once said that all was there, and scenes compiled."""
+    from kedfem.precompile import _all_compiled
+
+    def marker(folder: str, time: int) -> Path:
+        kernel = tmp_path / folder / "loop_kernel.py"
+        kernel.parent.mkdir(exist_ok=True)
+        kernel.write_text("x = 1\n")
+        os.utime(kernel, (time, time))
+        monkeypatch.setattr(compiled, "ROOT", kernel.parent)
+        return _all_compiled()
+
+    assert marker("first", 1) == marker("first", 1)
+    assert len({marker("first", 1), marker("first", 2), marker("second", 1)}) == 3
+
+
+def test_of_two_processes_that_compile_for_different_types_each_keeps_its_own(tmp_path: Path) -> None:
+    """Numba names files of code by their number in a list that it reads and writes: two could take the same number."""
+    source = tmp_path / "loop_kernel.py"
+    source.write_text("from kedfem.compiled import compiled\n\n@compiled\ndef twice(x):\n    return x + x\n")
+    code = f"""
+import sys, time
+sys.path.insert(0, {str(tmp_path)!r})
+import loop_kernel
+file = loop_kernel.twice._cache._cache_file
+index = file._save_index
+def slowly(listed):
+    time.sleep(1.0)
+    index(listed)
+file._save_index = slowly
+loop_kernel.twice(eval(sys.argv[1]))
+"""
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    both = [subprocess.Popen([sys.executable, "-c", code, given], env=environment) for given in ("1", "1.5")]
+    assert [each.wait(timeout=120) for each in both] == [0, 0]
+    assert len(list((tmp_path / "cache").rglob("loop_kernel*.nbc"))) == 2
+
+
 PRODUCT = """
 import numpy as np
 from kedfem.compiled import compiling
@@ -166,5 +207,7 @@ def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word
     for file in (tmp_path / "kernels").rglob(f"*.{end}"):
         content = bytearray(file.read_bytes())
         content[len(content) // 2] ^= 1
+        stat = file.stat()
         file.write_bytes(content)
+        os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     assert (ran(), ran()) == ("compiled", "read")
