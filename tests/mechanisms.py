@@ -1,8 +1,8 @@
 """Random mechanisms: trees of 2 to 12 bodies in space, on the ground or free, without a drive; driven ones of all kinds.
 
 ``python -m tests.mechanisms --count 2000`` tries as many of the first, with ``--driven rigid-body`` or ``co-rotational``
-of the others (`tests.random_scenes`), with ``--solvers`` of these by two solvers; ``--first SEED --count 1`` one of
-them again.
+of the others by one of their laws (`tests.driven_mechanisms`), ``--law turned``; ``--first SEED --count 1`` one of them
+again. Numbers after driven ones are parts of what is allowed.
 """
 
 import argparse
@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kedfem.accuracy.prepared import moving
-from kedfem.errors import KedfemError, MeshError, MotionError, SolveError
-from kedfem.scene import scene_from
+from kedfem.errors import MotionError, SolveError
 from tests.cells import apart, as_a_run, run_of
-from tests.moving import beam_in_space, channels, ran, turned
+from tests.driven_mechanisms import FRAMES, LAWS, tried
+from tests.moving import beam_in_space, turned
 from tests.partners import joint
 from tests.random_scenes import driven
 from tests.spatial_joints import rigid_in_space
-from tests.systems import Begun, against_oracle, begun, by_oracle, marched, rows
+from tests.systems import Begun, begun, by_oracle, marched, rows
 
 Raw = dict[str, Any]
 KINDS = ("revolute", "spherical", "universal", "prismatic", "cylindrical", "screw", "weld", "planar")
@@ -127,140 +126,14 @@ def outcome(seed: int, most: int = 12) -> tuple[str, dict[str, float]]:
     return "fine" if all(x < WITHIN[key] for key, x in found.items()) else "differs", found
 
 
-# -- driven ones ---------------------------------------------------------------------------------------------
-
-STIFFER, TEN, LIMIT, SECONDS = 3.0, 10.0, 1e-3, 60.0
-LEAST, SPEED = 1e-12, 0.1  # m, N, N m; rad/s, m/s of coordinates: what is less is rounding
-ALIKE = 5e-5  # of the largest: what the monolithic step's rounding leaves of stiff hubs' forces, and iterations of laws
-#: drawn at random, some lock, or have a slot too short, or one that turns too far
-NO_MECHANISM = (MotionError, MeshError)
-
-
-def stiffer(raw: Raw, factor: float) -> Raw:
-    """A scene whose elastic links and bushings are stiffer by a factor; not its springs, which act as they do."""
-    raw = copy.deepcopy(raw)
-    for link in raw["links"].values():
-        link["material"] = "steel" if link["fidelity"] == "rigid" else "elastic"
-    raw["materials"] = {
-        "elastic": {"youngs_modulus": 2.1e11 * factor, "poisson_ratio": 0.3, "density": 7850.0}
-    }
-    for each in raw["joints"].values():
-        if "bushing" in each:
-            each["bushing"] = {key: x * factor for key, x in each["bushing"].items()}
-    return raw
-
-
-def off_rigid(raw: Raw) -> dict[str, float]:
-    """How far forces and moments of joints, and efforts of drives, are from rigid inverse dynamics, of the largest."""
-    got = channels(*ran(raw))
-    pairs = {}
-    for name, elastic in got.items():
-        head, _, what = name.rpartition("/")
-        rigid = got.get(f"{head}/rigid_{what}")
-        if rigid is not None and rigid.shape == elastic.shape:
-            pairs[name] = elastic, rigid
-    arm = 0.15  # m, the length of a link
-    unit = {name: 1.0 if name.endswith("force") else arm for name in pairs}
-    largest = max(
-        (float(np.abs(rigid).max()) / unit[name] for name, (_, rigid) in pairs.items()), default=1.0
-    )
-    return {name: float(np.abs(e - r).max()) / unit[name] / largest for name, (e, r) in pairs.items()}
-
-
-def limit(seed: int, frames: str, most: int = 6) -> tuple[str, dict[str, float]]:
-    """Whether a driven mechanism of nearly rigid links has the forces of rigid ones, and how far it is from that.
-
-    Two independent ways: multipliers of the rigid linkage's equations, and the balance of elastic links. Where they are
-    not within LIMIT, a stiffness ten times as high must bring them nearer, five times at least.
-    """
-    raw = driven(seed, most, frames)
-    try:
-        moving(scene_from(raw))
-        found = off_rigid(stiffer(raw, STIFFER))
-        soft = any(x >= LIMIT for x in found.values())
-        again = off_rigid(stiffer(raw, TEN * STIFFER)) if soft else {}
-    except NO_MECHANISM:
-        return "no mechanism", {}
-    except KedfemError as error:
-        return f"refused: {error}", {}
-    return "fine" if all(
-        x < 2 * max(found[name], LIMIT) / TEN for name, x in again.items()
-    ) else "differs", found
-
-
-def by_both_solvers(seed: int, most: int = 6) -> tuple[str, dict[str, float]]:
-    """Whether a driven mechanism, in rigid-body frames and without limits, vibrates alike by both solvers; how far."""
-    raw = varied(driven(seed, most, "rigid-body") | {"limits": {}}, seed)
-    got = []
-    try:
-        for solver in ("condensed", "monolithic"):
-            analysis = raw["analysis"] | {
-                "kind": "transient",
-                "solver": solver,
-                "end_time": 20 * STEP,
-                "step": STEP,
-            }
-            got.append(channels(*ran({**raw, "analysis": analysis})))
-    except NO_MECHANISM:
-        return "no mechanism", {}
-    except KedfemError as error:
-        return f"refused: {error}", {}
-    sizes: dict[str, float] = {}
-    for name, values in got[1].items():
-        sizes[_kind(name)] = max(sizes.get(_kind(name), 0.0), float(np.abs(values).max(initial=0.0)))
-    found = {
-        name: float(np.abs(values - got[1][name]).max(initial=0.0))
-        / max(sizes[_kind(name)], SPEED if name.endswith("/speed") else LEAST)
-        for name, values in got[0].items()
-        if not name.startswith("energy/")
-    }
-    return "fine" if all(x < ALIKE for x in found.values()) else "differs", found
-
-
-def varied(raw: Raw, seed: int) -> Raw:
-    """A scene with damping, start, numerical damping and stiffening at random."""
-    random, analysis = np.random.default_rng(seed + 1_000_000), {}
-    if random.random() < 0.5:
-        alpha, beta = float(random.uniform(0, 5)), float(10 ** random.uniform(-6, -4))
-        raw = raw | {"damping": {"alpha": alpha, "beta": beta}}
-    analysis["initial"] = "quasi-static" if random.random() < 0.4 else "rest"
-    analysis["rho_inf"] = float(random.choice([0.3, 0.8, 0.9]))
-    if random.random() < 0.2:
-        analysis["stiffening"] = True
-    return raw | {"analysis": raw["analysis"] | analysis}
-
-
-def by_march_and_oracle(seed: int, most: int = 6) -> tuple[str, dict[str, float]]:
-    """Whether a driven mechanism with co-rotational frames moves from rest as by the oracle; how far it is.
-
-    Where a motor's force rises with its speed, or a limit is met, a step may have several solutions.
-    """
-    raw = driven(seed, most, "co-rotational")
-    analysis = {"kind": "transient", "initial": "rest", "end_time": STEPS * STEP, "step": STEP}
-    try:
-        of = as_a_run(begun(raw | {"analysis": raw["analysis"] | analysis}))
-        found = {"oracle": against_oracle(of, STEPS, keeps=True)}
-    except NO_MECHANISM:
-        return "no mechanism", {}
-    except KedfemError as error:
-        return f"refused: {error}", {}
-    return "fine" if found["oracle"] < WITHIN["monolithic"] else "differs", found
-
-
-def _kind(name: str) -> str:
-    """What channels are measured by: force, moment, displacement …"""
-    return name.rpartition("/")[2].removeprefix("rigid_").replace("torque", "moment")
-
-
 def bounded(seed: int, given: argparse.Namespace) -> tuple[str, dict[str, float]]:
     """What becomes of a mechanism within so much processor time."""
     signal.signal(signal.SIGPROF, _stop)
     signal.setitimer(signal.ITIMER_PROF, given.seconds)
     try:
-        if given.solvers:
-            two = by_march_and_oracle if given.driven == "co-rotational" else by_both_solvers
-            return two(seed, min(given.most, 6))
-        return limit(seed, given.driven, min(given.most, 6)) if given.driven else outcome(seed, given.most)
+        if given.driven:
+            return tried(given.law, seed, given.driven, min(given.most, 6))
+        return outcome(seed, given.most)
     except TimeoutError:
         return "takes too long", {}
     finally:
@@ -276,16 +149,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     for name, usual in (("count", 200), ("first", 0), ("most", 12)):
         parser.add_argument(f"--{name}", type=int, default=usual)
-    parser.add_argument("--driven", choices=("rigid-body", "co-rotational"))
-    parser.add_argument("--solvers", action="store_true", help="driven ones by both solvers")
-    parser.add_argument("--seconds", type=float, default=SECONDS, help="processor time of one")
+    parser.add_argument("--driven", choices=FRAMES)
+    parser.add_argument("--law", choices=LAWS, default="rigid", help="of driven ones")
+    parser.add_argument("--seconds", type=float, default=60.0, help="processor time of one")
     given = parser.parse_args()
     count: dict[str, int] = {}
     for seed in range(given.first, given.first + given.count):
         what, found = bounded(seed, given)
         count[what.split(":")[0]] = count.get(what.split(":")[0], 0) + 1
-        frames = given.driven or ("rigid-body" if given.solvers else None)
-        raw = driven(seed, min(given.most, 6), frames) if frames else mechanism(seed, given.most)
+        raw = driven(seed, min(given.most, 6), given.driven) if given.driven else mechanism(seed, given.most)
         kinds = " ".join(x["kind"] for x in raw["joints"].values())
         worst = sorted(found.items(), key=lambda x: -x[1])[:4]
         far = ", ".join(f"{key} {x:.1e}" for key, x in worst)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from kedfem.errors import SceneError
 from kedfem.links.bodies import with_body
 from kedfem.links.record import Link
-from kedfem.links.reduced import RIGID, rigid, rigid_functions, wave_frequency
+from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid, without_vibration
 
@@ -100,4 +100,4 @@ def _mounted(link: Link, along: float, about: float) -> float:
     """The highest frequency at which a link would swing alone on one of such mounts [rad/s]."""
     mass, second = float(link.one @ link.m1[:, 0]), _second_moments(link)
     least = float(second[:2].sum())  # about the axis with most mass near it
-    return float(np.sqrt(along / mass + (along * link.size**2 + about) / least))
+    return float(np.sqrt(along / mass + (along * reach(link) ** 2 + about) / least))

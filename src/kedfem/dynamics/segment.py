@@ -34,17 +34,13 @@ def internal_force(
     damped: np.ndarray,
     beta: float,
 ) -> tuple[Nodal, float]:
-    """Internal force of a segment with damping, world components, and its strain energy.
+    """Internal force of a segment with co-rotational frames and damping, world components, and its strain energy.
 
     Parameters
     ----------
     y : (n, d) position in the rigid-body frame R
     damped : α M δ and its rates there
     """
-    if link.fit is None:
-        g = y - position(link, np.zeros_like(y))
-        Kg = np.asarray((link.K0 @ g.ravel()).reshape(g.shape))
-        return (Kg + damped[1]) @ R.T, 0.5 * float(np.vdot(g, Kg))
     found = [
         frame_force(link, frame, now, y, beta) for frame, now in zip(frames_of(link), frames, strict=True)
     ]

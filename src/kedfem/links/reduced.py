@@ -127,7 +127,14 @@ def rigid(link: Link, frequency: float | None = None) -> Link:
 def wave_frequency(link: Link) -> float:
     """Of the order of a link's first axial vibration: √(E/ρ)/L, how often a wave passes along it [1/s]."""
     density = float(link.m1[:, 0].sum() / link.volume.sum())
-    return float(np.sqrt(link.E / density) / link.size)
+    return float(np.sqrt(link.E / density) / reach(link))
+
+
+def reach(link: Link) -> float:
+    """How far a link reaches from the node farthest from its middle [m]; the same in a scene that is turned."""
+    nodes = (link.full or link).nodes
+    end = nodes[np.argmax(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1))]
+    return float(np.linalg.norm(nodes - end, axis=1).max())
 
 
 def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:

@@ -278,7 +278,9 @@ def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: St
     pulled = scene.springs or scene.motors or scene.limits
     plain = (solver.ready.c.single and not pulled) or solver.stiffening is not None
     damped = _dampers_count(model)
-    if plain and (at_rest or not damped) and not scene.analysis.initial_deflection:
+    # nodal rows lose digits of links a million times as stiff as others
+    stiff = bool(model.rows) and any(link.rigid for link in model.links) and solver.stiffening is None
+    if plain and (at_rest or not (damped or stiff)) and not scene.analysis.initial_deflection:
         states = first_states(scene, linkage, along, model, solver.stiffening)
         return from_links(Instant(solver.ready, motion_at, 0.0), states)
     return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])

@@ -91,7 +91,10 @@ class Instant:
     def inside(self, u: Flat, v: Flat) -> list[Inside]:
         """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
         of, spins = self.of, cross_matrix(self.omega)
-        out = [inside(of, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
+        still = self.always.still
+        out = [
+            inside(still, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))
+        ]
         pushed = self.pushed(u)
         return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
 

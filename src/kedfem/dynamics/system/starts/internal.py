@@ -18,6 +18,7 @@ from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.sparse import SparsePart, component_order, momentum
 from kedfem.links.record import Link, mass_times
+from kedfem.links.reduced import rigid_modes
 
 Flat = Float[np.ndarray, " N"]
 
@@ -26,6 +27,7 @@ class Still:
     """Internal forces of all bodies where they do not move in their frames: what balances of deflections ask for.
 
     K : per body its stiffness on coordinates, in its frame
+    rigid : per body its rigid motions on coordinates, orthonormal
     """
 
     def __init__(self, of: Ready) -> None:
@@ -35,6 +37,7 @@ class Still:
             else component_first(part.T, link.K0)
             for part, link in zip(of.parts, of.system.model.links, strict=True)
         ]  # fmt: skip
+        self.rigid = [_rigid(link, part) for link, part in zip(of.system.model.links, of.parts, strict=True)]
         none = (
             np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
         )
@@ -67,11 +70,21 @@ class Still:
         return f, mean
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
-        """R K0 Rᵀ u of the displacement u (N,) of body k, world components."""
-        d = int(self.of.bodies.components[k])
+        """R K0 Rᵀ u of the displacement u (N,) of body k, world components.
+
+        It does no work on rigid motions. Rounding would: of a stiff body on soft mounts by more than others' forces.
+        """
+        d, B = int(self.of.bodies.components[k]), self.rigid[k]
         turn = R[:d, :d]
-        g = turn.T @ u.reshape(d, -1)
-        return np.asarray(turn @ (self.K[k] @ g.ravel()).reshape(d, -1)).ravel()
+        f = self.K[k] @ (turn.T @ u.reshape(d, -1)).ravel()
+        f -= B @ (B.T @ f)
+        return np.asarray(turn @ f.reshape(d, -1)).ravel()
+
+
+def _rigid(link: Link, part: Any) -> Float[np.ndarray, "N m"]:
+    """Rigid motions of a body where it is drawn, on its coordinates, orthonormal."""
+    moved = rigid_modes(link).T.reshape(-1, link.n, link.d)
+    return np.asarray(np.linalg.qr(np.array([coordinates(link, part, x).ravel() for x in moved]).T)[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +126,7 @@ def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
 
 
 def inside(
-    of: Ready, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
+    still: Still, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
 ) -> Inside:
     """Body k at the displacement u with the rate v.
 
@@ -121,6 +134,7 @@ def inside(
     ----------
     R, spin : of the rigid-body motion, and its [ω]×
     """
+    of = still.of
     link, damping = of.system.model.links[k], of.system.model.damping
     d = link.d
     x, x1 = rows(of, k, u), rows(of, k, v)
@@ -132,10 +146,14 @@ def inside(
         if link.fit is None and damping.beta:
             damped[m] += damping.beta * (link.K0 @ each.ravel()).reshape(each.shape)
     frames = [seen_from(link, frame, y, g1) for frame in frames_of(link)]
-    f, energy = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
     mean = R.copy()
     mean[:d, :d] = mean_orientation(link, x, R[:d, :d])
-    return Inside(work_on(of.parts[k], f).ravel(), mean, frames, damped, g, energy)
+    if link.fit is None:
+        elastic = still.sprung(k, R, u)
+        f = elastic + work_on(of.parts[k], damped[1] @ R[:d, :d].T).ravel()
+        return Inside(f, mean, frames, damped, g, 0.5 * float(elastic @ u))
+    force, energy = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
+    return Inside(work_on(of.parts[k], force).ravel(), mean, frames, damped, g, energy)
 
 
 def remembered(of: Ready, k: int, found: Inside, state: State) -> None:

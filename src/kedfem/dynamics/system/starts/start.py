@@ -45,7 +45,8 @@ def rest(
 def from_links(now: Instant, links: Sequence[LinkState]) -> State:
     """The state whose displacements, rates, accelerations and forces are those of links in nodal rows.
 
-    Nodal rows know internal forces of links a million times as stiff as others to more digits than coordinates do.
+    Nodal rows know internal forces of rigid cross-section nodes to more digits than coordinates do, where no joint is
+    enforced by constraint equations.
     """
     of, joints = now.of, now.of.system.model.joints
     u, v = (as_coordinates(of, [getattr(x, name) for x in links]) for name in "uv")
