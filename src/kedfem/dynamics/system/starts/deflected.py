@@ -151,9 +151,10 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
     """Deflection and rate with the rigid-body motion, from five instants within a step."""
     of, h = first.of, first.of.c.h / 4
     instants = [first, *(Instant(of, motion_at, first.time + k * h, first) for k in range(1, 5))]
-    u, v, change = np.zeros((5, int(of.bodies.at[-1]))), np.zeros((5, 0)), np.inf
+    u, change = np.zeros((5, int(of.bodies.at[-1]))), np.inf
+    v = felt = np.zeros((5, 0))
     for again in range(DAMPED if _feels_rates(of) else 1):
-        before, felt = u.copy(), v
+        before, earlier, felt = u.copy(), felt, v
         for k, now in enumerate(instants):
             guess = u[k]
             if again == 0 and k:  # joints are closed in all before, and so in what these go on to
@@ -162,6 +163,8 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
             z1 = now.interface(v[k]) if again else None
             u[k] = _balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
+        if again > 1 and change > last / 2:  # rounding of rates, which grows from time to time
+            return before[0], earlier[0]
         if again and (change > last / 2 or change <= CONVERGED * float(np.linalg.norm(u[0]))):
             break
     return u[0], v[0] if again == 0 else felt[0]  # the rates that dampers have felt: u balances these
