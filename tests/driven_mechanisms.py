@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import moving
 from kedfem.errors import KedfemError, MeshError, MotionError
 from kedfem.scene import scene_from
 from tests.cells import as_a_run
-from tests.moving import channels, ran
+from tests.moving import channels, ran, turned
 from tests.random_scenes import driven
 from tests.systems import against_oracle, begun
 
@@ -27,7 +27,6 @@ NO_MECHANISM = (MotionError, MeshError)
 FRAMES = ("rigid-body", "co-rotational")
 SOFT, HUBS = (0.01, 0.1), 3e-4  # of steel; of the largest
 CLOSED = 1e-6  # of the largest energy: what closes anyhow
-POINTS, DIRECTIONS = {"at"}, {"axis", "axes", "up", "vector", "gravity"}
 
 
 def stiffer(raw: Raw, factor: float) -> Raw:
@@ -96,42 +95,12 @@ def when_turned(raw: Raw) -> dict[str, float]:
     plane = any(len(p) == 2 for link in raw["links"].values() for p in link["shape"].get("between", ()))
     R = Rotation.from_rotvec([0.0, 0.0, 0.8] if plane else [0.7, -1.1, 0.4]).as_matrix()
     shift = np.array([0.3, -0.2, 0.0 if plane else 0.5])
-    got, other = recorded(raw), recorded(moved_whole(raw, R, shift))
+    got, other = recorded(raw), recorded(turned(raw, R, shift))
     back = {
         name: x @ R[: x.shape[1], : x.shape[1]] if x.shape[1] in {2, 3} and "energy" not in name else x
         for name, x in other.items()
     }
     return {name: x / ALIKE for name, x in differences(back, got).items()}
-
-
-def moved_whole(raw: Raw, R: np.ndarray, shift: np.ndarray) -> Raw:
-    """A scene that is turned and shifted as a whole, with all that names places and directions."""
-
-    def moved(x: Any, key: str = "") -> Any:
-        if isinstance(x, dict):
-            return {name: moved(each, name) for name, each in x.items()}
-        if key in POINTS and isinstance(x, list) and len(x) and isinstance(x[0], float):
-            return point(x)
-        if key in DIRECTIONS and isinstance(x, list):
-            return [vector(each) for each in x] if isinstance(x[0], list) else vector(x)
-        if isinstance(x, list):
-            return [point(e) if key in {"points", "between"} and isinstance(e, list) else moved(e) for e in x]
-        return x
-
-    def point(x: list[float]) -> list[float]:
-        k = len(x)
-        return [float(c) for c in (R @ np.resize([*x, 0.0], 3) + shift)[:k]]
-
-    def vector(x: list[float]) -> list[float]:
-        return [float(c) for c in R @ np.asarray(x)]
-
-    out: Raw = moved(raw)
-    for table in ("springs", "motors"):  # laws over time, speed, … are tables too
-        for name, each in out.get(table, {}).items():
-            each |= {key: x for key, x in raw[table][name].items() if isinstance(x, dict)}
-    for name, each in out.get("loads", {}).items():
-        each |= {key: x for key, x in raw["loads"][name].items() if key == "factor"}
-    return out
 
 
 def energy(raw: Raw) -> dict[str, float]:

@@ -6,7 +6,6 @@ again. Numbers after driven ones are parts of what is allowed.
 """
 
 import argparse
-import copy
 import signal
 import sys
 from typing import Any
@@ -100,13 +99,7 @@ def checked(seed: int, most: int = 12) -> dict[str, float]:
     if not any("ground" in each["links"] for each in raw["joints"].values()):
         found["momentum"] = momentum(of, v)
     R, shift = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix(), np.array([0.3, -0.2, 0.5])
-    again = turned(copy.deepcopy(raw), R, shift)
-    for motion in again["analysis"].get("initial_motions", {}).values():
-        motion |= {
-            "at": (R @ motion["at"] + shift).tolist(),
-            "angular_velocity": (R @ motion["angular_velocity"]).tolist(),
-        }
-    other = stepped(again)
+    other = stepped(turned(raw, R, shift))
     found["turned"] = apart(of_beams(*other[:2]), of_beams(of, u) @ R.T)
     return found
 

@@ -161,32 +161,32 @@ def geared() -> dict[str, Any]:
     }
 
 
+DIRECTIONS = {"axis", "axes", "up", "vector", "gravity", "angular_velocity"}
+
+
 def turned(raw: dict[str, Any], R: np.ndarray, shift: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:
-    """A scene of beams in space, turned and shifted as a whole; of other links only joints and gravity are."""
+    """A scene that is turned and shifted as a whole, with all that names places and directions; one of links that are
+    drawn in a plane stays in it."""
 
     def vector(x: Any) -> list[float]:
         return [float(c) for c in R @ np.asarray(x, float)]
 
     def point(x: Any) -> list[float]:
-        return [float(c) for c in R @ np.asarray(x, float) + shift]
+        return [float(c) for c in (R @ np.resize([*x, 0.0], 3) + shift)[: len(x)]]
 
-    def moved(shape: dict[str, Any]) -> dict[str, Any]:
-        if shape["kind"] != "polyline":
-            return shape
-        return {**shape, "points": [point(p) for p in shape["points"]], "up": vector(shape["up"])}
+    def moved(x: Any, key: str = "") -> Any:
+        if isinstance(x, dict):
+            return x if "over" in x else {name: moved(each, name) for name, each in x.items()}
+        if not isinstance(x, list):
+            return x
+        if key == "at":
+            return point(x)
+        if key in DIRECTIONS:
+            return [vector(each) for each in x] if isinstance(x[0], list) else vector(x)
+        return [point(e) if key in {"points", "between"} and isinstance(e, list) else moved(e) for e in x]
 
-    links = {
-        name: link if "shape" not in link else {**link, "shape": moved(link["shape"])}
-        for name, link in raw["links"].items()
-    }
-    joints = {
-        name: {**joint, "at": point(joint["at"])}
-        | ({"axis": vector(joint["axis"])} if "axis" in joint else {})
-        | ({"axes": [vector(a) for a in joint["axes"]]} if "axes" in joint else {})
-        for name, joint in raw["joints"].items()
-    }
-    gravity = {"gravity": vector(raw["gravity"])} if "gravity" in raw else {}
-    return {**raw, "links": links, "joints": joints, **gravity}
+    made: dict[str, Any] = moved(raw)
+    return made
 
 
 def screwed() -> dict[str, Any]:

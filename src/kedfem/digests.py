@@ -31,27 +31,21 @@ def drop_changed(folder: Path) -> None:
     known = _known(folder)
     for file in _files(folder) if known else ():
         with suppress(OSError):
-            time, digest = _time(file), _digest(file)
-            if known.get(_name(file), {time: digest}).get(time, digest) != digest:
+            if known.get(_name(file), digest := _digest(file)) != digest:
                 file.unlink()
 
 
 def note(folder: Path) -> None:
-    """Write the digests of files that were written since the last note; nothing where nothing can be written.
-
-    Another process may write a file meanwhile: its time is read before its digest, which is never taken for a later's.
-    """
+    """Write the digests of all files, if some were written since the last note; nothing where nothing can be written."""
     with suppress(OSError):
-        known = _known(folder)
-        new = {
-            _name(file): {time: _digest(file)}
-            for file in _files(folder)
-            if (time := _time(file)) not in known.get(_name(file), {})
-        }
-        if not new:
+        # another process may write a file meanwhile: named before it is read, it has another name by then
+        known, named = _known(folder), {_name(file): file for file in _files(folder)}
+        if named.keys() <= known.keys():
             return
         with whole(folder / DIGESTS) as part:
-            part.write_text(json.dumps(known | new))
+            part.write_text(
+                json.dumps({name: known.get(name) or _digest(file) for name, file in named.items()})
+            )
 
 
 def _files(folder: Path) -> list[Path]:
@@ -59,25 +53,17 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _name(file: Path) -> str:
-    return f"{file.parent.name}/{file.name}"
-
-
-def _time(file: Path) -> str:
-    return str(file.stat().st_mtime_ns)
+    """A file with the time at which it was written."""
+    return f"{file.parent.name}/{file.name} {file.stat().st_mtime_ns}"
 
 
 def _digest(file: Path) -> str:
     return sha256(file.read_bytes()).hexdigest()
 
 
-def _known(folder: Path) -> dict[str, dict[str, str]]:
-    """Of each file the digest by the time at which it was written."""
+def _known(folder: Path) -> dict[str, str]:
     try:
         known = json.loads((folder / DIGESTS).read_bytes())
     except (OSError, ValueError):
         return {}
-    return (
-        {name: each for name, each in known.items() if isinstance(each, dict)}
-        if isinstance(known, dict)
-        else {}
-    )
+    return known if isinstance(known, dict) else {}
