@@ -163,9 +163,9 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
             z1 = now.interface(v[k]) if again else None
             u[k] = _balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
-        if again > 1 and change > last / 2:  # rounding of rates, which grows from time to time
+        if again > 1 and change > last:  # rounding of rates; changes that only fall unevenly go on
             return before[0], earlier[0]
-        if again and (change > last / 2 or change <= CONVERGED * float(np.linalg.norm(u[0]))):
+        if again and change <= CONVERGED * float(np.linalg.norm(u[0])):
             break
     return u[0], v[0] if again == 0 else felt[0]  # the rates that dampers have felt: u balances these
 
