@@ -251,6 +251,23 @@ def test_angles_count_on_beyond_a_turn_and_know_large_ones_to_rounding() -> None
     )  # the sum itself is rounded to 7e-12
 
 
+def test_the_angle_of_tilted_axes_depends_on_no_mark() -> None:
+    """Of bodies turned at random: the same from all directions across the axis, and its negative from the other body."""
+    axis, R = np.array([0.48, 0.6, 0.64]), Rotation.random(3, rng=8).as_matrix()
+    R[0] = np.eye(3)
+    turn = turn_row("A", 2, 1, axis)
+    marks = [Rotation.from_rotvec(angle * axis).apply(turn.a) for angle in (0.0, 0.4, 1.1)]
+    rows = stacked([*(replace(turn, a=a) for a in marks), turn_row("A", 1, 2, axis)])
+    f = features(rows, (R[None], np.zeros((1, 3, 3))), np.zeros((1, 4)))
+    x, y, z, w = Rotation.from_matrix(R[1].T @ R[2]).as_quat()
+    twist = 2 * np.arctan2(axis @ [x, y, z], w)
+    assert abs(axis @ (R[1].T @ R[2] @ axis) - 1) > 0.1
+    np.testing.assert_allclose(np.sin(f.value[:3, 0]), np.sin(twist), atol=1e-14)
+    np.testing.assert_allclose(np.cos(f.value[:3, 0]), np.cos(twist), atol=1e-14)
+    np.testing.assert_allclose(f.value[3], -f.value[0], atol=1e-14)
+    np.testing.assert_allclose(f.about[:, 1:3, 0], f.about[:, [0, 0], 0], atol=1e-14)
+
+
 # -- what is reported ----------------------------------------------------------------------------------------
 
 

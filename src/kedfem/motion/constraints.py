@@ -4,7 +4,8 @@ A body's point is at p + R X (X: reference position, R = I there). Three kinds o
 
 * gap:   b_j · (x_i − x_j)    how far two points of bodies i and j are apart along a direction b fixed in body j
 * turn:  a_i · b_j            cosine between directions of body i and body j: zero where they are perpendicular
-* angle: turn of body i against body j about an axis b fixed in body j, counted on beyond a revolution
+* angle: twist of body i against body j about an axis b of both, counted on beyond a revolution: the arctangent of
+         a_i · e_j − e_i · a_j over a_i · a_j + e_i · e_j, e = b × a: the same for all a across b, however the axes tilt
 
 A constraint is an elementary row, plus further ones with constant coefficients, less the value of a drive: zero.
 """

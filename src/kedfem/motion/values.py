@@ -23,8 +23,8 @@ class Features:
     w : (3, E, T) b in world components
     arm_i, arm_j : (3, E, T) R_i a and R_j a_j
     value : (E, T) [m, -, rad]
-    along, across : (A, T) of angles: u along a_j and across it; their ratio is the tangent
-    aside : (3, A, T) of angles: b × a_j in world components
+    along, across : (A, T) of angles: a · a_j + e · e_j and a · e_j − e · a_j; their ratio is the tangent
+    e, e_j : (3, A, T) of angles: b × a in body i and b × a_j in body j, world components
     about : (3, A, T) of angles: derivative by ω_i − ω_j; the axis itself where the hinge is closed
     """
 
@@ -35,7 +35,8 @@ class Features:
     value: np.ndarray
     along: np.ndarray
     across: np.ndarray
-    aside: np.ndarray
+    e: np.ndarray
+    e_j: np.ndarray
     about: np.ndarray
 
 
@@ -47,12 +48,13 @@ def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Featur
     u, g, k = arm_i.copy(), rows.gaps, rows.angles
     u[:, g] += p[:, rows.i[g]] - p[:, rows.j[g]] - arm_j[:, g]
     value = _dot(u, w)
-    aside = _cross(w[:, k], arm_j[:, k])
-    along, across = _dot(u[:, k], arm_j[:, k]), _dot(u[:, k], aside)
+    a, a_j = arm_i[:, k], arm_j[:, k]
+    e, e_j = _turned(Ri[:, :, k], np.cross(rows.b[k], rows.a[k])), _cross(w[:, k], a_j)
+    along, across = _dot(a, a_j) + _dot(e, e_j), _dot(a, e_j) - _dot(e, a_j)
     cos, sin = np.cos(near.T), np.sin(near.T)  # sines of large angles are reduced without loss
     value[k] = near.T + np.arctan2(across * cos - along * sin, along * cos + across * sin)
-    gradient = (along * aside - across * arm_j[:, k]) / (along**2 + across**2)
-    return Features(u, w, arm_i, arm_j, value, along, across, aside, _cross(u[:, k], gradient))
+    about = _cross(a, along * e_j - across * a_j) - _cross(e, along * a_j + across * e_j)
+    return Features(u, w, arm_i, arm_j, value, along, across, e, e_j, about / (along**2 + across**2))
 
 
 def residuals(rows: Rows, f: Features, q: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
@@ -126,14 +128,18 @@ def convective(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T 
 
 
 def _angle_convective(f: Features, k: np.ndarray, wi: np.ndarray, wj: np.ndarray) -> np.ndarray:
-    """Of angles: second derivative of the arc tangent of y / x, x and y those of a along two directions of body j."""
-    u, square = f.u[:, k], f.along**2 + f.across**2
-    u1 = _cross(wi, u)
-    u2, u1j, u2j = _cross(wi, u1), _cross(wj, u1), _cross(wj, _cross(wj, u))
-    # of u · f, f fixed in body j: u2 · f + 2 u1 · (ω_j × f) + u · (ω_j × (ω_j × f))
-    bent, rate = u2 - 2 * u1j + u2j, u1 - _cross(wj, u)
-    x1, y1 = _dot(rate, f.arm_j[:, k]), _dot(rate, f.aside)
-    x2, y2 = _dot(bent, f.arm_j[:, k]), _dot(bent, f.aside)
+    """Of angles: second derivative of the arc tangent of y / x, sums of products of directions of both bodies."""
+    a, a_j, square = f.arm_i[:, k], f.arm_j[:, k], f.along**2 + f.across**2
+    x1, y1, x2, y2 = np.zeros((4, *square.shape))
+    for u, along, across in ((a, a_j, f.e_j), (f.e, f.e_j, -a_j)):
+        u1 = _cross(wi, u)
+        u2, u1j, u2j = _cross(wi, u1), _cross(wj, u1), _cross(wj, _cross(wj, u))
+        # of u · f, f fixed in body j: u2 · f + 2 u1 · (ω_j × f) + u · (ω_j × (ω_j × f))
+        bent, rate = u2 - 2 * u1j + u2j, u1 - _cross(wj, u)
+        x1 += _dot(rate, along)
+        y1 += _dot(rate, across)
+        x2 += _dot(bent, along)
+        y2 += _dot(bent, across)
     spin = (f.along * y1 - f.across * x1) / square
     swing = (f.along * x1 + f.across * y1) / square
     return np.asarray((f.along * y2 - f.across * x2) / square - 2 * swing * spin)

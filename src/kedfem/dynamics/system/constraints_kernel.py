@@ -70,22 +70,31 @@ def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
 
 @inner
 def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
-    """Turn of i against j about an axis in j, to within half a turn of an earlier one; gradient as in `between`."""
+    """Twist of i against j about an axis, to within half a turn of an earlier one; gradient as in `between`."""
     i, j = of.i[t], of.j[t]
-    times(Q[i], of.a[t], w[4])
-    times(Q[j], of.a_j[t], w[5])
-    times(Q[j], of.b[t], w[10])
-    cross(w[10], w[5], w[11])
-    along, across = dot(w[4], w[5]), dot(w[4], w[11])
+    directions(Q[i], of.a[t], of.b[t], w[4], w[5], w[10])
+    directions(Q[j], of.a_j[t], of.b[t], w[6], w[8], w[10])
+    along, across = dot(w[4], w[6]) + dot(w[5], w[8]), dot(w[4], w[8]) - dot(w[5], w[6])
     value = np.arctan2(across, along)
     value += 2 * np.pi * np.round((near - value) / (2 * np.pi))
     size = along * along + across * across
     for m in range(3):
-        w[10, m] = (along * w[11, m] - across * w[5, m]) / size
+        w[10, m] = (along * w[8, m] - across * w[6, m]) / size
+        w[11, m] = (along * w[6, m] + across * w[8, m]) / size
     cross(w[4], w[10], w[7])
+    cross(w[5], w[11], w[9])
     for m in range(3):
+        w[7, m] -= w[9, m]
         w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
     return value
+
+
+@inner
+def directions(Q, a, axis, one, other, room):  # type: ignore[no-untyped-def]
+    """Q a and Q (axis × a), into `one` and `other`."""
+    times(Q, a, one)
+    cross(axis, a, room)
+    times(Q, room, other)
 
 
 @compiled

@@ -119,8 +119,8 @@ class End:
 class Term:
     """A scalar function of two ends, by their numbers: directions and points as drawn.
 
-    kind : GAP: b · (x_i − x_j), b fixed in j; TURN: a · b, a fixed in i; ANGLE: turn of i against j about b from a_j in j
-        to a in i; DISTANCE: |x_i − x_j|
+    kind : GAP: b · (x_i − x_j), b fixed in j; TURN: a · b, a fixed in i; ANGLE: twist of i against j about b from a_j in
+        j to a in i (see `motion.values`); DISTANCE: |x_i − x_j|
     a, a_j : points of i and j [m], or directions [-]
     """
 

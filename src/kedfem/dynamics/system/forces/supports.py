@@ -229,10 +229,11 @@ def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, 
     a = Q_i @ term.a
     if term.kind != ANGLE:
         return cross(a, Q_j @ term.b)
-    a_j = Q_j @ term.a_j
-    across_j = cross(Q_j @ term.b, a_j)
-    along, across = (a * a_j).sum(axis=1)[:, None], (a * across_j).sum(axis=1)[:, None]
-    return cross(a, (along * across_j - across * a_j) / (along**2 + across**2))
+    a_j, e, e_j = Q_j @ term.a_j, Q_i @ cross(term.b, term.a), Q_j @ cross(term.b, term.a_j)
+    along = (a * a_j + e * e_j).sum(axis=1)[:, None]
+    across = (a * e_j - e * a_j).sum(axis=1)[:, None]
+    moment = cross(a, along * e_j - across * a_j) - cross(e, along * a_j + across * e_j)
+    return np.asarray(moment / (along**2 + across**2))
 
 
 def poses(

@@ -247,7 +247,9 @@ def value(system: System, term: Term, one: tuple[Series, Series], other: tuple[S
     if term.kind != ANGLE:
         raise ValueError(f"term: must be a gap, turn, angle or distance, got {term.kind}")
     a, a_j = Q_i @ term.a, Q_j @ term.a_j
-    return _angle(product(np.dot, a, a_j), product(np.dot, a, product(np.cross, Q_j @ term.b, a_j)))
+    e, e_j = Q_i @ np.cross(term.b, term.a), Q_j @ np.cross(term.b, term.a_j)
+    along = product(np.dot, a, a_j) + product(np.dot, e, e_j)
+    return _angle(along, product(np.dot, a, e_j) - product(np.dot, e, a_j))
 
 
 def _angle(c: Series, s: Series) -> Series:
