@@ -12,7 +12,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, session
 from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.mesh.files.raw import RawMesh
-from kedfem.mesh.planar import quads
+from kedfem.mesh.layered import outlines
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
 
@@ -273,19 +273,19 @@ class TestGmsh:
 
     def test_that_leaves_triangles(self, monkeypatch):
         monkeypatch.setattr(session, "_QUAD4", -1)
-        assert refused(SQUARE) == (
-            "links.arm.shape: must be an area that quadrilaterals can fill, got no such mesh from gmsh "
-            "(triangles were left); change mesh.size or the outline"
+        assert refused(SQUARE | {"holes": [{"at": [0.2, 0.3], "diameter": 0.1}]}) == (
+            "links.arm.shape: quadrilaterals must fill the sections of its layers, got none around (0.45, 0.465596, 0); "
+            "change mesh.size or the outline"
         )
 
     def test_that_gives_up_says_why(self, monkeypatch):
-        monkeypatch.setattr(quads, "SETTINGS", (quads.Setting(-7, 3, 0), quads.Setting(6, 3, 0)))
-
         def failing(*_: object) -> None:
             raise Exception("Could not create wire")
 
-        monkeypatch.setattr(quads, "_drawn", failing)
-        assert "from gmsh (Could not create wire); change" in refused(SQUARE)
+        monkeypatch.setattr(outlines, "_drawn", failing)
+        assert refused(SQUARE) == (
+            "links.arm.shape: must be an area, got none from OpenCASCADE: Could not create wire; change the outline"
+        )
 
     def test_is_closed_after_an_error(self):
         import gmsh

@@ -19,10 +19,9 @@ from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, shape_functions, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, pillowed, quadratic_quads
-from kedfem.mesh.planar.outline import outline_area, profile_outline, smallest_width
 from kedfem.mesh.planar.relaxation import distortion, relaxed
 from kedfem.mesh.session import gmsh_model
-from kedfem.scene import Extrusion, LinkScene, part_geometry
+from kedfem.scene import LinkScene, part_geometry
 from tests.laws.strategies import examples
 
 HERE = Path()
@@ -238,7 +237,7 @@ class TestExtrusion:
         for x, y, d in holes:
             wall = bore_nodes(mesh, (x, y), d / 2)
             assert_allclose(wall, d / 2, rtol=1e-10)
-            assert len(wall) >= 3 * 2 * 16
+            assert len(wall) >= 3 * 2 * 8
 
     @pytest.mark.parametrize("across", [*(pytest.param(n, marks=pytest.mark.long) for n in (4, 6)), 5])
     def test_is_good_where_no_recombination_by_itself_is(self, across):
@@ -270,6 +269,14 @@ class TestExtrusion:
         assert_array_equal(first.points, second.points)
         assert_array_equal(first.cells, second.cells)
 
+    def test_fillet_angle_divides_bores_that_no_joint_is_around(self):
+        shape = extrusion_shape(*OUTLINES[0])
+        link = LinkScene(shape=shape, mesh={"fillet_angle": 0.2, "layers": 1})
+        (x, y, d), (p, q, c) = OUTLINES[0][1]
+        mesh = link_mesh("arm", link, Path(), (((x, y, 0.0),), ()))
+        assert len(bore_nodes(mesh, (p, q), c / 2)) >= 5 * 31  # 2π / 0.2 elements of 20 nodes
+        assert len(bore_nodes(mesh, (x, y), d / 2)) <= 5 * 16
+
     def test_finer_meshes_are_finer(self):
         coarse, fine = (meshed(**extrusion_shape(*OUTLINES[3]), mesh={"size": h}) for h in (0.05, 0.0125))
         assert len(fine.cells) > 8 * len(coarse.cells)
@@ -284,7 +291,7 @@ class TestParts:
         between = [[1, 2, 0.5], [1, 2 + PARTS[name], 0.5]]
         mesh = meshed(GEOMETRY, kind="part", file=f"{name}.toml", between=between)
         assert_allclose(volume(mesh), raw.thickness * area, rtol=1e-4)
-        assert mesh_quality(mesh).least >= 0.5
+        assert mesh_quality(mesh).least >= 0.4
         assert conforming(mesh)
         for hole in raw.holes:  # part x runs along global y
             wall = bore_nodes(mesh, (1 - hole.at[1], 2 + hole.at[0]), hole.diameter / 2)
@@ -294,25 +301,6 @@ class TestParts:
     @pytest.mark.parametrize("name", PARTS)
     def test_say_what_they_are(self, name):
         assert (GEOMETRY / f"{name}.toml").read_text(encoding="utf-8").startswith("# A ")
-
-
-class TestOutline:
-    @pytest.mark.parametrize(("outline", "holes"), OUTLINES)
-    def test_area_is_that_of_the_polygon_of_chords(self, outline, holes):
-        shape = Extrusion(**extrusion_shape(outline, holes))
-        assert_allclose(
-            outline_area(profile_outline(shape)), polygon_area(outline, [d for *_, d in holes]), rtol=1e-7
-        )
-
-    def test_smallest_width_is_that_of_a_long_strip_or_twice_the_wall_of_a_hole(self):
-        strip = [[0, 0], [100, 0], [100, 1], [0, 1]]
-        assert_allclose(
-            smallest_width(profile_outline(Extrusion(**extrusion_shape(strip, [])))), 1, rtol=0.01
-        )
-        bored = Extrusion(**extrusion_shape(strip, [(50, 0.4, 0.6)]))
-        assert_allclose(smallest_width(profile_outline(bored)), 0.2, rtol=1e-12)
-        disc = Extrusion(**extrusion_shape(DISC, [(0, 0.05, 0.02)]))
-        assert_allclose(smallest_width(profile_outline(disc)), 2 * 0.04, rtol=1e-12)
 
 
 class TestElements:

@@ -11,7 +11,7 @@ from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import filleted, refinable, refined, shortened, with_links
-from kedfem.scene import Cad, MeshFile, Scene, time_grid
+from kedfem.scene import Cad, Extrusion, MeshFile, Part, Scene, time_grid
 
 MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
 FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
@@ -29,12 +29,14 @@ def open_meshes(scene: Scene) -> list[str]:
 
 
 def with_fillets(scene: Scene, asked: float) -> Scene:
-    """The scene with fillets and free bores of parts from CAD divided as their stress needs, where meshes are open."""
+    """The scene with fillets and free bores of CAD parts and outlines as fine as stress needs, where meshes are open."""
     angle = np.radians(next((angle for least, angle in FILLETS if asked >= least), FINEST_FILLET))
     links = {
         name: filleted(link, float(angle))
         for name, link in scene.links.items()
-        if isinstance(link.shape, Cad) and link.fidelity != "rigid" and "mesh" not in link.model_fields_set
+        if isinstance(link.shape, Cad | Extrusion | Part)
+        and link.fidelity != "rigid"
+        and "mesh" not in link.model_fields_set
     }
     return with_links(scene, links) if links else scene
 

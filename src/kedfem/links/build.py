@@ -94,7 +94,9 @@ def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None) ->
         mesh = link_mesh(name, link, scene.folder, touched(scene, name))
         return with_chosen_faces(scene, solid_link(name, mesh, material, link_axes(link)))
     if link.family == "plane":
-        return plane_link(name, plane_mesh(name, link, scene.folder), material, link_axes(link))
+        return plane_link(
+            name, plane_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
+        )
     return _beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
 
 

@@ -1,23 +1,26 @@
 """The mesh of a link, whatever its shape."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.cad.model import CadKeys
+from kedfem.mesh.cad.solids import Sizing
 from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, rectangle_quads
 from kedfem.mesh.elements.quality import checked_mesh
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.mesh.memory_forecast import NODES_EACH, check_room
-from kedfem.mesh.methods import NOTHING, KeptWhole, cad_mesh, file_axes
-from kedfem.mesh.planar.areas import Quads
+from kedfem.mesh.layered.outlines import outline_quads
+from kedfem.mesh.memory_forecast import NODES_EACH, check_count, check_room, check_size, size_key
+from kedfem.mesh.methods import NOTHING, KeptWhole, cad_mesh, file_axes, sizing
 from kedfem.mesh.planar.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.planar.outline import Outline, outline_area, profile_outline, smallest_width, turned_outline
+from kedfem.mesh.planar.outline import profile_outline, turned_outline
 from kedfem.mesh.planar.plate import PlateSizes, plate_quads
-from kedfem.mesh.planar.quads import quad_mesh
+from kedfem.mesh.swept.blends import points_in_file
 from kedfem.scene import (
     Arc,
     Bar,
@@ -32,7 +35,6 @@ from kedfem.scene import (
     part_geometry,
 )
 
-MOST_ELEMENTS = 2_000_000
 _EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wider than the waist
 
 
@@ -48,7 +50,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
     folder : Path
         The folder that the names of part and mesh files refer to.
     kept_whole : points and names
-        Where joints, loads and probes sit, and the faces that they name: a part from CAD keeps its blends there.
+        Where joints, loads and probes sit, and the faces that they name: a part from CAD keeps its blends there, and
+        `mesh.fillet_angle` is not of bores around them.
 
     Returns
     -------
@@ -69,7 +72,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
             key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
             mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
         case _:
-            plate = link_plate(where, link, folder)
+            plate = link_plate(where, link, folder, kept_whole)
             elements = len(plate.quads[1]) * _layers(link)
             check_room(where, 3.0 * NODES_EACH[str(link.element)] * elements, link.fidelity != "rigid")
             mesh = swept_mesh(plate, _layers(link))
@@ -102,18 +105,18 @@ def part_mesh(link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) ->
     return checked_mesh(shape.file, FORMS[str(link.element)](mesh), link.min_quality)
 
 
-def plane_mesh(name: str, link: LinkScene, folder: Path) -> QuadMesh:
+def plane_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> QuadMesh:
     """The quadrilateral mesh of a plane link: its plate's middle plane, in the scene's reference position.
 
     Parameters and errors are those of `link_mesh`; there are 9 nodes to an element.
     """
-    mesh = middle_mesh(link_plate(f"links.{name}", link, folder))
+    mesh = middle_mesh(link_plate(f"links.{name}", link, folder, kept_whole))
     check_room(f"links.{name}", 2.0 * len(mesh.points), link.fidelity != "rigid", plane=True)
     return checked_mesh(f"links.{name}", mesh, link.min_quality)
 
 
-def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
-    """The plate that a link's shape describes.
+def link_plate(where: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> Plate:
+    """The plate that a link's shape describes; parameters as of `link_mesh`.
 
     Raises
     ------
@@ -126,9 +129,9 @@ def link_plate(where: str, link: LinkScene, folder: Path) -> Plate:
         case PlateLink() as shape:
             return eye_plate(where, shape, link.mesh)
         case Extrusion() as shape:
-            return extrusion_plate(where, shape, link.mesh)
+            return extrusion_plate(where, shape, link.mesh, kept_whole)
         case Part() as shape:
-            return part_plate(where, shape, link.mesh, folder)
+            return part_plate(where, shape, link.mesh, folder, kept_whole)
         case other:
             kind = "no shape" if other is None else other.kind
             raise MeshError(
@@ -140,7 +143,7 @@ def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:
     """A box between two points, in equal elements."""
     elements = mesh.elements or 4
     along, across, *layers = elements if isinstance(elements, tuple) else (elements, 2)
-    _check_count(f"{where}.mesh.elements", float(math.prod([along, across, *layers])))
+    check_count(f"{where}.mesh.elements", float(math.prod([along, across, *layers])))
     P, Q = np.array(shape.between)
     quads = rectangle_quads(math.dist(P, Q), shape.width, along, across)
     return Plate(quads, shape.thickness, P, frame_along(Q - P, np.array(shape.upward)))
@@ -156,27 +159,36 @@ def eye_plate(where: str, shape: PlateLink, mesh: Meshing) -> Plate:
             f"{where}.shape.eye_diameter: must be at most {length / _EYE_GAP:.6g} [m], the distance of the "
             f"bores over {_EYE_GAP}, for eyes wider than the waist, got {shape.eye_diameter:.6g}"
         )
-    size = element_size(where, mesh, shape.width, length + shape.eye_diameter)
-    _check_count(_size_key(where, mesh), mesh.layers * (length + shape.eye_diameter) * shape.width / size**2)
+    extent, size = length + shape.eye_diameter, mesh.size or shape.width / (mesh.elements_across or 2)
+    check_size(where, mesh.size, size, extent)
+    check_count(size_key(where, mesh.size), mesh.layers * extent * shape.width / size**2)
     axes = frame_along(Q - P)
     return Plate(plate_quads(sizes, size), shape.thickness, P + shape.offset * axes[2], axes)
 
 
-def extrusion_plate(where: str, shape: Extrusion, mesh: Meshing) -> Plate:
+def extrusion_plate(where: str, shape: Extrusion, mesh: Meshing, kept_whole: KeptWhole) -> Plate:
     """A plate of any outline, in a z plane."""
-    quads = _outline_quads(where, profile_outline(shape), mesh)
     start = shape.outline[0]
     middle = np.array([0.0, 0.0, (start.to if isinstance(start, Arc) else start)[2] + shape.offset])
+    quads = outline_quads(where, profile_outline(shape), _sizing(mesh, kept_whole, middle, np.eye(3)))
     return Plate(quads, shape.thickness, middle, np.eye(3))
 
 
-def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path) -> Plate:
+def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole: KeptWhole) -> Plate:
     """A plate that a file describes, between two points."""
     part = _part(where, shape, folder)
     origin, x_point = np.array(part.origin[:2]), np.array(part.x_point[:2])
-    quads = _outline_quads(where, turned_outline(profile_outline(part), origin, x_point - origin), mesh)
+    outline = turned_outline(profile_outline(part), origin, x_point - origin)
     P, Q = np.array(shape.between)
-    return Plate(quads, part.thickness, P, frame_along(Q - P))
+    axes = frame_along(Q - P)
+    return Plate(outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes)), part.thickness, P, axes)
+
+
+def _sizing(
+    mesh: Meshing, kept_whole: KeptWhole, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]
+) -> Sizing:
+    """What the keys of a mesh ask for, with the places in the plate's own frame."""
+    return replace(sizing(mesh), kept=points_in_file(kept_whole[0], origin, axes))
 
 
 def _layers(link: LinkScene) -> int:
@@ -200,42 +212,3 @@ def _part(where: str, shape: Part, folder: Path) -> PartGeometry:
             f"{wanted:.9g} [m], got {got:.9g}"
         )
     return part
-
-
-def _outline_quads(where: str, outline: Outline, mesh: Meshing) -> Quads:
-    """The plane mesh of an outline, in elements of the size asked for."""
-    extent = float(np.linalg.norm(np.ptp(outline.corners, axis=0)))
-    size = element_size(where, mesh, smallest_width(outline), extent)
-    _check_count(_size_key(where, mesh), mesh.layers * outline_area(outline) / size**2)
-    return quad_mesh(f"{where}.shape", outline, size)
-
-
-def element_size(where: str, mesh: Meshing, width: float, extent: float) -> float:
-    """Edge length of the elements [m]: as given, or from the number of them across the smallest width.
-
-    Raises
-    ------
-    MeshError
-        The size given is larger than the whole link.
-    """
-    if mesh.size is None:
-        return width / (mesh.elements_across or 2)
-    if mesh.size > extent:
-        raise MeshError(
-            f"{where}.mesh.size: must be below the link's own size {extent:.6g} [m], got {mesh.size:.6g}"
-        )
-    return mesh.size
-
-
-def _size_key(where: str, mesh: Meshing) -> str:
-    """The key that the element size comes from."""
-    return f"{where}.mesh.{'elements_across' if mesh.size is None else 'size'}"
-
-
-def _check_count(key: str, count: float) -> None:
-    """Refuse meshes that no computer here could solve, before they are made."""
-    if count > MOST_ELEMENTS:
-        raise MeshError(
-            f"{key}: must give at most {MOST_ELEMENTS:,} elements, got about {count:,.0f}; "
-            "take a coarser mesh"
-        )

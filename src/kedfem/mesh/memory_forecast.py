@@ -9,6 +9,7 @@ from kedfem.errors import MeshError
 FACTOR_BYTES, LINK_BYTES, ASSEMBLY_BYTES = 22.0, 5e3, 1.5e4
 PLANE_FILL = 0.1  # of the factor that a plane mesh has, from 18,000 to 240,000 unknowns
 #: New nodes to each element of a large mesh of hexahedra, and of tetrahedra that divide them.
+MOST_ELEMENTS = 2_000_000
 NODES_EACH = {"hex8": 1, "hex20": 4, "hex27": 8, "tet10": 8}
 
 
@@ -39,4 +40,25 @@ def check_room(where: str, unknowns: float, factored: bool = True, plane: bool =
             f"{where}: must fit in this machine's memory of {memory() / 1e9:.3g} GB, got about {unknowns:,.0f} unknowns, "
             f"which take at least {(kept + factor) / 1e9:,.3g} GB (matrices {kept / 1e9:,.3g}, their factor "
             f"{factor / 1e9:,.3g}); take larger elements (mesh.size, mesh.elements, mesh.unknowns)"
+        )
+
+
+def size_key(where: str, given: float | None) -> str:
+    """The key that the length of a link's elements comes from: `mesh.size` as given, or `mesh.elements_across`."""
+    return f"{where}.mesh.{'elements_across' if given is None else 'size'}"
+
+
+def check_size(where: str, given: float | None, size: float, extent: float) -> None:
+    """Refuse elements that are longer than the whole link [m]."""
+    if size > extent:
+        raise MeshError(
+            f"{size_key(where, given)}: must be below the link's own size {extent:.6g} [m], got {size:.6g}"
+        )
+
+
+def check_count(key: str, count: float) -> None:
+    """Refuse meshes that no computer here could solve, before they are made."""
+    if count > MOST_ELEMENTS:
+        raise MeshError(
+            f"{key}: must give at most {MOST_ELEMENTS:,} elements, got about {count:,.0f}; take a coarser mesh"
         )

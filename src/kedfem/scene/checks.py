@@ -130,8 +130,11 @@ def meshing_faults(link: Entry) -> Iterator[str]:
     shape, mesh = link.word("shape", "kind"), link.raw.get("mesh")
     if not isinstance(mesh, Mapping):
         return
-    if link.has("mesh", "unknowns") and shape != "cad":
-        yield link.fault("mesh", f"must be given for a part from CAD only, got one for a {shape}", "unknowns")
+    for key in ("unknowns", "defeature_size", "kind", "fillet_angle"):
+        outline = key == "fillet_angle" and shape in {"extrusion", "part"}
+        if link.has("mesh", key) and shape != "cad" and not outline:
+            only = "a part from CAD, an extrusion or a part" if key == "fillet_angle" else "a part from CAD"
+            yield link.fault("mesh", f"must be given for {only} only, got one for a {shape}", key)
     counted = "beam" if fidelity(link) == "beam" else "bar" if shape == "bar" else None
     if fidelity(link) == "plane" and link.has("mesh", "layers"):
         wanted = "must be left out for a plane link (it has one element through its thickness)"

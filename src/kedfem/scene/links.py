@@ -67,8 +67,8 @@ class Meshing(Record):
     fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = (
         None
     )
-    """a part from CAD: most that an element turns along a fillet, or a bore without a joint; if not given 45° where it is
-    swept, 30° of tetrahedra; where `analysis.accuracy` finds the mesh open 15° to 45°"""
+    """a part from CAD, extrusion or part: most that an element turns along a fillet, or a bore without a joint; if not
+    given 45° where it is swept, 30° of tetrahedra; where `analysis.accuracy` finds the mesh open 15° to 45°"""
     kind: Literal["hexahedra"] | None = None
     """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
 

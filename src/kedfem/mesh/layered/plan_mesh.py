@@ -98,10 +98,10 @@ def _filled(
     where: str, plan: Plan, region: Region, rim: Rim, mapping: Mapping | None
 ) -> tuple[PlaneQuads, int]:
     """The cells of one region and gmsh's algorithm that made them, 0 if it is mapped."""
-    best = best_quads([mapped(rim, mapping)], first_good=True) if mapping else None
+    best = best_quads([mapped(rim, mapping)]) if mapping else None
     algorithm = 0
     if best is None or best.quality < GOOD:
-        other = best_quads(polygon_quads(rim), first_good=True)
+        other = best_quads(polygon_quads(rim))
         if other is not None and (best is None or other.quality > best.quality + _BETTER):
             best, algorithm = other, SETTINGS[other.tried].algorithm
     if best is None:

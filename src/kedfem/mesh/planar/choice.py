@@ -1,4 +1,4 @@
-"""Which of several meshes of one area is taken: each relaxed, the best or the smallest good one."""
+"""Which of several meshes of one area is taken: each relaxed, the first good one."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +9,9 @@ from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.planar.areas import PlaneQuads, Quads, pillowed
 from kedfem.mesh.planar.relaxation import relaxed
 
-GOOD = 0.5  # scaled Jacobian that is good enough: of such meshes the one with the fewest elements is taken
+GOOD = 0.5  # scaled Jacobian that is good enough: no more are tried
+LARGE = 2000  # quadrilaterals from which time matters more than the last of quality
+ITERATIONS = 150, 40  # of a relaxation at most, and of a large one
 FAIR = 0.3  # scaled Jacobian below which subdivision, at four times the elements, is tried too
 
 
@@ -43,42 +45,36 @@ class Candidate:
         return PlaneQuads(points[:count], cells[:, :4], self.start.rim, self.start.middles)
 
 
-def best_quads(
-    meshes: Iterable[PlaneQuads | None], first_good: bool, iterations: int = 150
-) -> Candidate | None:
+def best_quads(meshes: Iterable[PlaneQuads | None]) -> Candidate | None:
     """The mesh to take of those made under each of the settings, which may be None; None if all are.
 
     Parameters
     ----------
     meshes : iterable of PlaneQuads or None
         In the order of SETTINGS; no more are asked for than needed.
-    first_good : bool
-        Whether the first good mesh is taken: time matters where meshes are large or many.
-    iterations : int
-        How far each is relaxed.
 
     Returns
     -------
     Candidate
-        Of the meshes that are good, or within a tenth of the best if none is, the one with the fewest elements.
+        The first that is good; if none is, of those within a tenth of the best the one with the fewest elements.
     """
     found: list[Candidate] = []
     for tried, mesh in enumerate(meshes):
         if mesh is not None:
-            found += _relaxed_meshes(mesh, iterations, tried)
+            found += _relaxed_meshes(mesh, tried)
         best = max((candidate.quality for candidate in found), default=-1.0)
-        if (first_good and best >= GOOD) or (tried == len(SETTINGS) - 2 and best >= FAIR):
+        if best >= GOOD or (tried == len(SETTINGS) - 2 and best >= FAIR):
             break
     enough = min(GOOD, best - 0.1 * abs(best)) if found else np.inf
     good = [candidate for candidate in found if candidate.quality >= enough]
     return min(good, key=lambda candidate: len(candidate.quads[1]), default=None)
 
 
-def _relaxed_meshes(mesh: PlaneQuads, iterations: int, tried: int) -> list[Candidate]:
+def _relaxed_meshes(mesh: PlaneQuads, tried: int) -> list[Candidate]:
     """The mesh relaxed and, unless that is good, pillowed and relaxed."""
     found: list[Candidate] = []
     for start in (mesh, pillowed(mesh)):
-        points, cells = relaxed(start, iterations)
+        points, cells = relaxed(start, ITERATIONS[len(mesh.cells) > LARGE])
         quality = float(scaled_jacobian(points, cells).min())
         found.append(Candidate(quality, (points, cells), start, tried))
         if quality >= GOOD:

@@ -52,7 +52,7 @@ def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]
     angles = np.arange(2 * around) * np.pi / around
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rim = Rim(circle[::2], ((np.append(np.arange(around), 0),),), circle[1::2])
-    best = best_quads([mapped(rim, Mapping("disc"))], first_good=True)
+    best = best_quads([mapped(rim, Mapping("disc"))])
     if best is None:
         raise ValueError("a disc must have a mesh")
     full = quadratic_quads(best.corners)

@@ -1,0 +1,90 @@
+"""Outlines of a scene, meshed as the sections of parts from CAD are."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+import numpy as np
+
+from kedfem.errors import MeshError
+from kedfem.mesh.cad.solids import OtherWayError, Sizing
+from kedfem.mesh.elements.quality import scaled_jacobian
+from kedfem.mesh.layered.division import plan_size
+from kedfem.mesh.layered.partition import Plan
+from kedfem.mesh.layered.plan_mesh import plan_mesh
+from kedfem.mesh.layered.sections import laid_over
+from kedfem.mesh.memory_forecast import check_count, check_size, size_key
+from kedfem.mesh.planar.areas import Quads
+from kedfem.mesh.planar.choice import FAIR
+from kedfem.mesh.planar.outline import Outline
+from kedfem.mesh.session import gmsh_model
+
+_SHARES = (1.0, 0.75, 0.5)  # of the size, until a mesh is fair
+_FLAT = np.array([0.0, 1.0])  # where its only slab begins and ends: sizes do not depend on it
+
+
+def outline_quads(where: str, outline: Outline, sizing: Sizing) -> Quads:
+    """quad9 mesh of the area inside an outline, nodes on the boundary exactly on its arcs and holes.
+
+    Parameters
+    ----------
+    where : of the link, for messages
+    outline : a checked one
+    sizing : as for parts from CAD, see :func:`~kedfem.mesh.layered.division.plan_size`
+
+    Returns
+    -------
+    (n, 2) [m] and (e, 9)
+        Plane nodes; cells in VTK order, anticlockwise.
+
+    Raises
+    ------
+    MeshError
+        The size is larger than the outline or gives far too many elements, gmsh cannot be used, or quadrilaterals do not
+        fill the outline.
+    """
+    found: list[tuple[float, Quads]] = []
+    with _plan(where, outline) as plan:
+        size = plan_size(plan, sizing)
+        check_size(where, sizing.size, plan.extent * size, plan.extent)
+        check_count(size_key(where, sizing.size), sizing.layers * plan.volume / size**2)
+        for share in _SHARES:
+            try:
+                flat = plan_mesh(f"{where}.shape", plan, share * size, sizing)
+            except OtherWayError as error:
+                if not found and share == _SHARES[-1]:
+                    raise MeshError(f"{error}; change mesh.size or the outline") from error
+                continue
+            least = float(scaled_jacobian(flat.points, flat.cells).min())
+            found.append((least, (plan.extent * flat.points, flat.cells)))
+            if least >= FAIR:
+                break
+    return max(found, key=lambda one: one[0])[1]
+
+
+@contextmanager
+def _plan(where: str, outline: Outline) -> Iterator[Plan]:
+    """An outline as a plan of one region; its curves can be asked for places within the context."""
+    extent = float(np.linalg.norm(np.ptp(outline.corners, axis=0)))
+    with gmsh_model() as gmsh:
+        try:
+            plan = laid_over(gmsh, [[(2, _drawn(gmsh, outline, 1 / extent))]], np.eye(3), extent, _FLAT)
+        except Exception as error:  # gmsh raises nothing more special
+            raise MeshError(
+                f"{where}.shape: must be an area, got none from OpenCASCADE: {error}; change the outline"
+            ) from error
+        yield plan
+
+
+def _drawn(gmsh: ModuleType, outline: Outline, factor: float) -> int:
+    """The area inside an outline as a face of gmsh's model, all lengths multiplied: tolerances are absolute."""
+    occ = gmsh.model.occ
+    corners = [occ.addPoint(x, y, 0) for x, y in factor * outline.corners]
+    edges = zip(corners, corners[1:] + corners[:1], factor * outline.via, strict=True)
+    loops = [occ.addCurveLoop([
+        occ.addLine(start, end) if np.isnan(via[0]) else occ.addCircleArc(start, occ.addPoint(*via, 0), end, center=False)
+        for start, end, via in edges
+    ])]  # fmt: skip
+    for (x, y), radius in zip(factor * outline.centres, factor * outline.radii, strict=True):
+        loops.append(occ.addCurveLoop([occ.addCircle(x, y, 0, radius)]))
+    return int(occ.addPlaneSurface(loops))
