@@ -121,8 +121,8 @@ def test_solids_are_drawn_where_frames_have_them(solid: Path) -> None:
     assert len(placed) == len(written) == 6
     for points, stress, grid in zip(placed, surface.stress[1:], written, strict=True):
         distance, near = KDTree(grid.points).query(points)
-        assert distance.max() < 1e-9
-        assert_allclose(stress, grid.point_data[VON_MISES][near], rtol=1e-9)
+        assert distance.max() < 1e-7  # frames are in single precision
+        assert_allclose(stress, grid.point_data[VON_MISES][near], rtol=1e-6)
     envelope = pyvista.read(solid / "envelope.vtu")
     distance, near = KDTree(envelope.points).query(drawn)
     assert distance.max() < 1e-12

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -24,6 +25,7 @@ from kedfem.output.array_names import (
     VON_MISES,
 )
 from kedfem.output.bars import SECTION
+from kedfem.processes import threads
 from kedfem.results.files import ready_folder, reason, replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
@@ -183,9 +185,15 @@ class AnimationWriter:
         now = {"TimeValue": float(time)} | ({self.drive: float(angle)} if self.drive else {})
         files = [f"{self.stem}/{name}_{self.count:04d}.vtu" for name in _file_names(fields)]
         ready_folder(self.folder / self.stem)
-        for k, (field, name) in enumerate(zip(fields, files, strict=True)):
-            with replacing(self.folder / name) as part:
-                _write_vtu(part, now, [field], k)
+
+        def write(k: int) -> None:
+            with replacing(self.folder / files[k]) as part:
+                _write_vtu(part, now, [fields[k]], k)
+
+        with ThreadPoolExecutor(
+            threads()
+        ) as pool:  # most of it is compression, which lets other threads go on
+            list(pool.map(write, range(len(fields))))
         self.entries += [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
         self.count += 1
         write_collection(self.folder, self.stem, self.entries)
@@ -387,13 +395,14 @@ def _merged(fields: Sequence[Block], number: int) -> Any:
     first = np.cumsum([0, *(len(field.points) for field in fields)])
     every = [field.arrays() for field in fields]
     return meshio.Mesh(
-        np.concatenate([field.points for field in fields]),
+        np.concatenate([field.points for field in fields]).astype(np.float32),
         [
             (field.cell_type, (field.cells + n0).astype(np.int32))
             for field, n0 in zip(fields, first, strict=False)
         ],
         point_data={
-            name: np.ascontiguousarray(np.concatenate([each[name] for each in every])) for name in every[0]
+            name: np.concatenate([each[name] for each in every]).astype(np.float32, order="C")
+            for name in every[0]
         },
         cell_data={
             "link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields, start=number)]
