@@ -12,6 +12,8 @@ from beartype import beartype
 from hypothesis import settings
 from jaxtyping import AbstractArray, install_import_hook, jaxtyped
 
+from tests.slow import slow_tests
+
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ["KEDFEM_CACHE"] = "off"
 settings.register_profile("here", deadline=None)
@@ -72,7 +74,12 @@ install_import_hook(CHECKED, "tests.conftest.shapes_checked")
 
 @pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the default tests of laws and numbers, which .ci/run repeats with other BLAS and numba kernels."""
+    """Mark tests of laws and numbers that are no long studies, which .ci/run repeats with other BLAS and numba kernels;
+    then those that the default run leaves out as they are slow."""
+    slow = slow_tests()
     for item in items:
         if item.path.parent.name in NUMERICAL and not item.get_closest_marker("long"):
             item.add_marker("kernels")
+        if item.nodeid in slow:
+            item.add_marker("slow")
+            item.add_marker("long")
