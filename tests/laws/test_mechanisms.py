@@ -114,8 +114,8 @@ def test_a_driven_mechanism_with_corotational_frames_moves_as_by_the_oracle(seed
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("first", range(0, 30, 6))
-def test_thirty_driven_mechanisms_vibrate_alike_by_both_solvers(first: int) -> None:
+@pytest.mark.parametrize("first", range(0, 24, 6))
+def test_two_dozen_driven_mechanisms_vibrate_alike_by_both_solvers(first: int) -> None:
     found = [tried("solvers", seed, most=3)[0] for seed in range(first, first + 6)]
     assert "differs" not in found
     assert found.count("fine") >= 3

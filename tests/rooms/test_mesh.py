@@ -237,7 +237,7 @@ class TestExtrusion:
         for x, y, d in holes:
             wall = bore_nodes(mesh, (x, y), d / 2)
             assert_allclose(wall, d / 2, rtol=1e-10)
-            assert len(wall) >= 3 * 2 * 8
+            assert len(wall) >= 3 * 2 * 16  # joints find bores by the mesh alone
 
     @pytest.mark.parametrize("across", [*(pytest.param(n, marks=pytest.mark.long) for n in (4, 6)), 5])
     def test_is_good_where_no_recombination_by_itself_is(self, across):

@@ -35,6 +35,7 @@ from kedfem.scene import (
     part_geometry,
 )
 
+_FOUND = np.pi / 8  # that an element turns at most around what joints find by the mesh alone [rad]
 _EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wider than the waist
 
 
@@ -187,8 +188,10 @@ def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole:
 def _sizing(
     mesh: Meshing, kept_whole: KeptWhole, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]
 ) -> Sizing:
-    """What the keys of a mesh ask for, with the places in the plate's own frame."""
-    return replace(sizing(mesh), kept=points_in_file(kept_whole[0], origin, axes))
+    """What the keys of a mesh ask for, with the places in the plate's own frame, and arcs that joints find."""
+    asked = sizing(mesh)
+    hollow = min(asked.hollow, _FOUND)
+    return replace(asked, turn=_FOUND, hollow=hollow, kept=points_in_file(kept_whole[0], origin, axes))
 
 
 def _layers(link: LinkScene) -> int:
