@@ -291,7 +291,7 @@ class TestParts:
         between = [[1, 2, 0.5], [1, 2 + PARTS[name], 0.5]]
         mesh = meshed(GEOMETRY, kind="part", file=f"{name}.toml", between=between)
         assert_allclose(volume(mesh), raw.thickness * area, rtol=1e-4)
-        assert mesh_quality(mesh).least >= 0.4
+        assert mesh_quality(mesh).least >= 0.45
         assert conforming(mesh)
         for hole in raw.holes:  # part x runs along global y
             wall = bore_nodes(mesh, (1 - hole.at[1], 2 + hole.at[0]), hole.diameter / 2)

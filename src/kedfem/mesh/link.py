@@ -189,9 +189,7 @@ def _sizing(
     mesh: Meshing, kept_whole: KeptWhole, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]
 ) -> Sizing:
     """What the keys of a mesh ask for, with the places in the plate's own frame, and arcs that joints find."""
-    asked = sizing(mesh)
-    hollow = min(asked.hollow, _FOUND)
-    return replace(asked, turn=_FOUND, hollow=hollow, kept=points_in_file(kept_whole[0], origin, axes))
+    return replace(sizing(mesh), turn=_FOUND, kept=points_in_file(kept_whole[0], origin, axes))
 
 
 def _layers(link: LinkScene) -> int:

@@ -87,16 +87,14 @@ def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
             gmsh.option.setNumber(name, value)
 
 
-def quadrilaterals(
-    gmsh: ModuleType,
-) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"], Int[np.ndarray, " n"]] | None:
-    """Nodes and cells of the plane mesh in gmsh's model, and gmsh's numbers of the nodes; None if triangles are left."""
+def quadrilaterals(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"]] | None:
+    """Nodes and cells of the plane mesh in gmsh's model; None if triangles are left."""
     kinds, _, nodes = gmsh.model.mesh.getElements(2)
     if list(kinds) != [_QUAD4]:
         return None
     points, tags = numbered_nodes(gmsh)
     used, cells = np.unique(nodes[0], return_inverse=True)
-    return points[np.searchsorted(tags, used), :2], cells.reshape(-1, 4), used.astype(np.int64)
+    return points[np.searchsorted(tags, used), :2], cells.reshape(-1, 4)
 
 
 def numbered_nodes(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.motion.constraints import Rows
+from kedfem.motion.constraints import Rows, cross
 
 Poses = tuple[Float[np.ndarray, "T B 3 3"], Float[np.ndarray, "T B 3"]]
 Twists = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
@@ -49,7 +49,7 @@ def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Featur
     u[:, g] += p[:, rows.i[g]] - p[:, rows.j[g]] - arm_j[:, g]
     value = _dot(u, w)
     a, a_j = arm_i[:, k], arm_j[:, k]
-    e, e_j = _turned(Ri[:, :, k], np.cross(rows.b[k], rows.a[k])), _cross(w[:, k], a_j)
+    e, e_j = _turned(Ri[:, :, k], cross(rows.b[k], rows.a[k])), _cross(w[:, k], a_j)
     along, across = _dot(a, a_j) + _dot(e, e_j), _dot(a, e_j) - _dot(e, a_j)
     cos, sin = np.cos(near.T), np.sin(near.T)  # sines of large angles are reduced without loss
     value[k] = near.T + np.arctan2(across * cos - along * sin, along * cos + across * sin)

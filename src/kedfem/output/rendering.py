@@ -76,7 +76,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     import pyvista
 
     grid: Any = pyvista.read(vtu)
-    grid.point_data["MPa"] = np.asarray(grid.point_data[VON_MISES], float) / 1e6
+    grid.point_data["MPa"] = np.asarray(grid.point_data[VON_MISES], float) / 1e6  # as of bars, to merge
     shown = view(grid, np.array([float(x) for x in gravity or (0, 0, 0)]))
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")

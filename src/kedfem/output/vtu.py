@@ -190,9 +190,8 @@ class AnimationWriter:
             with replacing(self.folder / files[k]) as part:
                 _write_vtu(part, now, [fields[k]], k)
 
-        with ThreadPoolExecutor(
-            threads()
-        ) as pool:  # most of it is compression, which lets other threads go on
+        # most of it is compression, which lets other threads go on
+        with ThreadPoolExecutor(threads()) as pool:
             list(pool.map(write, range(len(fields))))
         self.entries += [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
         self.count += 1

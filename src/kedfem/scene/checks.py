@@ -130,10 +130,12 @@ def meshing_faults(link: Entry) -> Iterator[str]:
     shape, mesh = link.word("shape", "kind"), link.raw.get("mesh")
     if not isinstance(mesh, Mapping):
         return
-    for key in ("unknowns", "defeature_size", "kind", "fillet_angle"):
-        outline = key == "fillet_angle" and shape in {"extrusion", "part"}
-        if link.has("mesh", key) and shape != "cad" and not outline:
-            only = "a part from CAD, an extrusion or a part" if key == "fillet_angle" else "a part from CAD"
+    part = {"cad"}, "a part from CAD"
+    arcs = {"cad", "extrusion", "part"}, "a part from CAD, an extrusion or a part"
+    for key, (shapes, only) in {
+        "unknowns": part, "defeature_size": part, "kind": part, "fillet_angle": arcs
+    }.items():  # fmt: skip
+        if link.has("mesh", key) and shape not in shapes:
             yield link.fault("mesh", f"must be given for {only} only, got one for a {shape}", key)
     counted = "beam" if fidelity(link) == "beam" else "bar" if shape == "bar" else None
     if fidelity(link) == "plane" and link.has("mesh", "layers"):

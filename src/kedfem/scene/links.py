@@ -68,7 +68,8 @@ class Meshing(Record):
         None
     )
     """a part from CAD, extrusion or part: most that an element turns along a fillet, or a bore without a joint; if not
-    given 45° where it is swept, 30° of tetrahedra; where `analysis.accuracy` finds the mesh open 15° to 45°"""
+    given 22.5° of extrusions and parts, 45° of CAD that is swept, 30° of tetrahedra; where `analysis.accuracy` finds the
+    mesh open 15° to 45°"""
     kind: Literal["hexahedra"] | None = None
     """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
 

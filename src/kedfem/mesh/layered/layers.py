@@ -15,11 +15,10 @@ from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
+from kedfem.mesh.layered.shares import GOOD, SHARES
 from kedfem.mesh.layered.sweep import swept
 from kedfem.mesh.places import in_mm
 
-_GOOD = 0.3  # scaled Jacobian from which no smaller size and no other direction is tried
-_SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
 _LEAST = 0.1  # scaled Jacobian below which another way may do better
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
@@ -63,7 +62,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """
     best: tuple[float, SolidMesh] | None = None
     refusals: list[str] = []
-    tries = [(direction, share) for direction in layer_directions(gmsh, solid) for share in _SHARES]
+    tries = [(direction, share) for direction in layer_directions(gmsh, solid) for share in SHARES]
     hopeless = None
     for direction, share in tries:
         if direction is hopeless:
@@ -80,7 +79,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         least = mesh_quality(mesh).least
         if best is None or least > best[0] + _GAIN:
             best = least, mesh
-        if least >= _GOOD:
+        if least >= GOOD:
             break
     if best is None:
         raise OtherWayError(refusals[0])

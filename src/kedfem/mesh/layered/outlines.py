@@ -13,13 +13,12 @@ from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.sections import laid_over
+from kedfem.mesh.layered.shares import first_good
 from kedfem.mesh.memory_forecast import check_count, check_size, size_key
 from kedfem.mesh.planar.areas import Quads
-from kedfem.mesh.planar.choice import FAIR
 from kedfem.mesh.planar.outline import Outline
 from kedfem.mesh.session import gmsh_model
 
-_SHARES = (1.0, 0.75, 0.5)  # of the size, until a mesh is fair
 _FLAT = np.array([0.0, 1.0])  # where its only slab begins and ends: sizes do not depend on it
 
 
@@ -43,23 +42,18 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> Quads:
         The size is larger than the outline or gives far too many elements, gmsh cannot be used, or quadrilaterals do not
         fill the outline.
     """
-    found: list[tuple[float, Quads]] = []
     with _plan(where, outline) as plan:
         size = plan_size(plan, sizing)
         check_size(where, sizing.size, plan.extent * size, plan.extent)
         check_count(size_key(where, sizing.size), sizing.layers * plan.volume / size**2)
-        for share in _SHARES:
-            try:
-                flat = plan_mesh(f"{where}.shape", plan, share * size, sizing)
-            except OtherWayError as error:
-                if not found and share == _SHARES[-1]:
-                    raise MeshError(f"{error}; change mesh.size or the outline") from error
-                continue
-            least = float(scaled_jacobian(flat.points, flat.cells).min())
-            found.append((least, (plan.extent * flat.points, flat.cells)))
-            if least >= FAIR:
-                break
-    return max(found, key=lambda one: one[0])[1]
+        try:
+            _, flat = first_good(
+                lambda share: plan_mesh(f"{where}.shape", plan, share * size, sizing),
+                lambda flat: float(scaled_jacobian(flat.points, flat.cells).min()),
+            )
+        except OtherWayError as error:
+            raise MeshError(f"{error}; change mesh.size or the outline") from error
+    return plan.extent * flat.points, flat.cells
 
 
 @contextmanager

@@ -49,7 +49,7 @@ def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
         gmsh.model.mesh.generate(2)
     if (found := quadrilaterals(gmsh)) is None:
         return None
-    points, cells, _ = found
+    points, cells = found
     return _on_rim(rim, step, points, cells)
 
 

@@ -3,13 +3,12 @@
 from collections.abc import Callable
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.layered.layers import not_too_bad
+from kedfem.mesh.layered.shares import GOOD, first_good
 
-_GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
-_SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
 _PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser, as with tetrahedra
 _COARSER = (1.4, 2.0)  # times the size
 
@@ -27,20 +26,8 @@ def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -
     OtherWayError
         None is made, or all are poor.
     """
-    found: list[tuple[float, SolidMesh]] = []
-    refusals: list[str] = []
-    for share in _SHARES:
-        try:
-            mesh = mesh_of(share)
-        except KedfemError as error:
-            refusals.append(str(error))
-            continue
-        found.append((mesh_quality(mesh).least, mesh))
-        if found[-1][0] >= _GOOD:
-            return _cheaper(sizing, mesh, mesh_of)
-    if not found:
-        raise OtherWayError(refusals[0])
-    return not_too_bad(solid, max(found, key=lambda each: each[0])[1])
+    least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)
+    return _cheaper(sizing, mesh, mesh_of) if least >= GOOD else not_too_bad(solid, mesh)
 
 
 def _cheaper(sizing: Sizing, mesh: SolidMesh, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
@@ -52,6 +39,6 @@ def _cheaper(sizing: Sizing, mesh: SolidMesh, mesh_of: Callable[[float], SolidMe
             other = mesh_of(share)
         except KedfemError:
             continue
-        if len(other.points) < len(mesh.points) and mesh_quality(other).least >= _GOOD:
+        if len(other.points) < len(mesh.points) and mesh_quality(other).least >= GOOD:
             mesh = other
     return mesh
