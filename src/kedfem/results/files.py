@@ -1,7 +1,7 @@
 """Folders and files that can be written, and files that appear only when they are whole."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -85,8 +85,12 @@ def require_space(folder: Path, size: int) -> None:
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[Path]:
+def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
     """A folder that belongs to one run until the block ends; what killed runs left of unfinished files is removed.
+
+    Parameters
+    ----------
+    within : names of folders in it that the run writes in, too
 
     Raises
     ------
@@ -104,9 +108,10 @@ def claimed(folder: Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{folder}: must be a folder that can be locked, got {reason(error)}") from error
     try:
-        for path in folder.iterdir():
-            if PART.fullmatch(path.name):
-                path.unlink(missing_ok=True)
+        for place in (folder, *(folder / each for each in within)):
+            for path in place.iterdir() if place.is_dir() else ():
+                if PART.fullmatch(path.name):
+                    path.unlink(missing_ok=True)
         yield folder
     finally:
         with suppress(

@@ -16,7 +16,7 @@ from kedfem.scene.timing import scene_speed
 from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges
-from kedfem.sweep.files import keep_row, kept_row, write_sweep, write_table
+from kedfem.sweep.files import ROWS, STATES, keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.following import Following, refuse_without_order
 from kedfem.sweep.keys import with_values
 from kedfem.sweep.plot import write_plot
@@ -99,7 +99,7 @@ def sweep(
         refuse_without_growth(scene, axes[0], asked.edges)
     if asked.follow:
         refuse_without_order(scene, asked.edges is not None)
-    with claimed(folder or sweep_folder(base)) as target:
+    with claimed(folder or sweep_folder(base), (ROWS, STATES)) as target:
         chosen, planned = _planned(base, axes, watch)
         jobs = [Job(base, values, chosen, asked.last) for values in _points(axes)]
         following = Following.along(axes) if asked.follow else Following()
