@@ -290,7 +290,9 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     killed.kill()
     assert killed.wait() == -signal.SIGKILL
     before = {path.name: path.read_bytes() for path in kept}
-    (tmp_path / "killed" / "rows" / "unfinished.0123abcd.part.json").touch()  # as one leaves that is killed while it writes
+    (
+        tmp_path / "killed" / "rows" / "row.0123abcd.part.json"
+    ).touch()  # as one leaves that is killed in the middle
     subprocess.run([*command, "--folder", str(tmp_path / "killed")], check=True, capture_output=True)
     for name, content in before.items():
         assert (tmp_path / "killed" / "rows" / name).read_bytes() == content

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import OutputError
+from kedfem.folders import PART
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.output.array_names import (
     ACCELERATION,
@@ -335,7 +336,7 @@ def write_cells(
 
 
 def remove_animation(folder: Path, stem: str) -> None:
-    """Delete the animation of an earlier run: ``STEM.pvd``, the frames in folder ``STEM``, and nothing else.
+    """Delete the animation of an earlier run: ``STEM.pvd``, the frames in folder ``STEM``, whole or not, no more.
 
     Raises
     ------
@@ -349,7 +350,7 @@ def remove_animation(folder: Path, stem: str) -> None:
         if not inside.is_dir():
             return
         for path in inside.iterdir():
-            if frame.fullmatch(path.name):
+            if frame.fullmatch(path.name) or PART.fullmatch(path.name):
                 path.unlink()
         if not any(inside.iterdir()):
             inside.rmdir()
