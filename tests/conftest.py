@@ -1,7 +1,9 @@
 """For all tests: array shapes are checked as they run, nothing needs a display or is kept, random tests repeat in CI."""
 
 import os
+from collections import Counter
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from types import FunctionType, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
@@ -18,17 +20,18 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ["KEDFEM_CACHE"] = "off"
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
-IN_CI = bool(os.environ.get("CI"))
-settings.load_profile("ci" if IN_CI else "here")
+settings.load_profile("ci" if os.environ.get("CI") else "here")
 PACKAGE = Path(__file__).parents[1] / "src" / "kedfem"
 ALL = [
     ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts)
     for file in PACKAGE.rglob("*.py")
     if file.stem != "__init__" and not file.stem.endswith("kernel")  # numba compiles the kernels itself
 ]
-HERE = tuple(f"kedfem.{room}" for room in ("mesh", "links", "output", "scene.laws"))
+FIRST = (
+    20  # calls of a function in a test whose arrays are checked: all of them would take longer than the tests
+)
+CALLS = Counter[FunctionType]()
 NUMERICAL = {"laws", "verification", "hard_cases"}  # folders
-CHECKED = ALL if IN_CI else [module for module in ALL if module.startswith(HERE)]
 
 
 def shapes_checked(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -47,13 +50,23 @@ def shapes_checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def jaxtyped_arrays(typechecker: Any) -> Callable[[Any], Any]:
-    """jaxtyping's decorator, for classes and for functions that take or return arrays: it costs some 50 µs a call."""
+    """jaxtyping's decorator, for classes, and for the first calls of functions that take or return arrays.
+
+    It costs some 50 µs a call."""
 
     def decorated(x: Any) -> Any:
         if isinstance(x, FunctionType):
             hints = x.__annotations__.values()
             if not any(isinstance(hint, str) or of_arrays(hint) for hint in hints):
                 return x
+            checked = jaxtyped(typechecker=typechecker)(x)
+
+            @wraps(x)
+            def first(*args: Any, **kwargs: Any) -> Any:
+                CALLS[x] += 1
+                return (checked if CALLS[x] <= FIRST else x)(*args, **kwargs)
+
+            return first
         return jaxtyped(typechecker=typechecker)(x)
 
     return decorated
@@ -68,8 +81,12 @@ def of_arrays(hint: object) -> bool:
 
 
 jaxtyping.jaxtyped = jaxtyped_arrays  # what its hook puts on everything
-# before the first import of kedfem; what runs in every step takes longer, so only in CI
-install_import_hook(CHECKED, "tests.conftest.shapes_checked")
+install_import_hook(ALL, "tests.conftest.shapes_checked")  # before the first import of kedfem
+
+
+def pytest_runtest_setup() -> None:
+    """The first calls are those of each test."""
+    CALLS.clear()
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m chooses

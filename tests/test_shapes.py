@@ -5,7 +5,7 @@ import pytest
 from jaxtyping import Float, TypeCheckError
 
 from kedfem.links.record import mass_times
-from tests.conftest import jaxtyped_arrays, shapes_checked
+from tests.conftest import CALLS, FIRST, jaxtyped_arrays, shapes_checked
 
 checked = jaxtyped_arrays(shapes_checked)
 
@@ -32,6 +32,16 @@ def test_right_shapes_pass() -> None:
 def test_wrong_ones_do_not(u: np.ndarray, m: np.ndarray, rows: int) -> None:
     with pytest.raises(TypeCheckError):
         first(u, m, rows)
+
+
+def test_the_first_calls_of_each_test_are_checked() -> None:
+    for _ in range(FIRST):
+        first(np.ones((4, 3)), np.ones(4), 4)
+    first(np.ones((4, 2)), np.ones(4), 4)
+    assert CALLS
+    CALLS.clear()  # as before each test
+    with pytest.raises(TypeCheckError):
+        first(np.ones((4, 2)), np.ones(4), 4)
 
 
 def test_what_has_no_arrays_costs_nothing() -> None:
