@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
 from kedfem.links.solid import solid_basis
-from kedfem.mesh import Quality, SolidMesh, checked_mesh, link_mesh, mesh_quality
+from kedfem.mesh import Quality, SolidMesh, checked_mesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, shape_functions, shape_gradients
@@ -277,9 +277,49 @@ class TestExtrusion:
         assert len(bore_nodes(mesh, (p, q), c / 2)) >= 5 * 31  # 2π / 0.2 elements of 20 nodes
         assert len(bore_nodes(mesh, (x, y), d / 2)) <= 5 * 16
 
+    @pytest.mark.parametrize("size", [0.04, 0.01])
+    def test_cusps_are_cut_off_and_told(self, size):
+        near = 0.1 * math.sqrt(0.5)
+        touching = {
+            "via": [near, 0.1 - near],
+            "to": [0, 0],
+        }  # a quarter of a circle that ends along the first edge
+        shape = extrusion_shape([[0, 0], [0.2, 0], [0.2, 0.1], [0.1, 0.1], touching], [])
+        mesh = meshed(**shape, mesh={"size": size})
+        assert mesh.way == "cusps between touching edges cut off, 0.02 % of the area"
+        assert mesh_quality(mesh).least >= 0.4
+        assert_allclose(volume(mesh), 0.02 * (0.02 - math.pi * 0.0025) * (1 - 2e-4), rtol=2e-5)
+
     def test_finer_meshes_are_finer(self):
         coarse, fine = (meshed(**extrusion_shape(*OUTLINES[3]), mesh={"size": h}) for h in (0.05, 0.0125))
         assert len(fine.cells) > 8 * len(coarse.cells)
+
+
+class TestUnknowns:
+    """About as many as asked for, of plates of any outline."""
+
+    @pytest.mark.parametrize("wanted", [15_000, 40_000])
+    @pytest.mark.parametrize("model", ["hex27", "hex20", "hex8", "plane"])
+    @pytest.mark.parametrize("kind", ["plate_link", "extrusion", "part"])
+    def test_are_about_as_many(self, kind, model, wanted):
+        shape = {
+            "plate_link": plate_shape(0.3, 0.03, 0.05, 0.02),
+            "extrusion": extrusion_shape(*OUTLINES[0]),
+            "part": {"kind": "part", "file": "crank_web.toml", "between": [[0, 0], [PARTS["crank_web"], 0]]},
+        }[kind]
+        plane = model == "plane"
+        sizes = {"fidelity": model} if plane else {"element": model}
+        link = LinkScene(shape=shape, mesh={"unknowns": wanted, **({} if plane else {"layers": 2})}, **sizes)
+        mesh = (plane_mesh if plane else link_mesh)("arm", link, GEOMETRY)
+        assert 0.75 < (2 if plane else 3) * len(mesh.points) / wanted < 1.33
+        assert mesh.way == ""
+
+    @pytest.mark.parametrize("kind", ["plate_link", "extrusion"])
+    def test_fewer_than_the_shape_has_are_told(self, kind):
+        shape = plate_shape(0.3, 0.03, 0.05, 0.02) if kind == "plate_link" else extrusion_shape(*OUTLINES[0])
+        mesh = meshed(**shape, mesh={"unknowns": 300})
+        assert len(mesh.points) > 130
+        assert mesh.way == "the nearest found to the 300 unknowns asked for"
 
 
 class TestParts:

@@ -285,16 +285,9 @@ class TestScene:
         with pytest.raises(SceneError, match=message):
             scene_from(raw, GEOMETRY)
 
-    def test_unknowns_are_for_parts_from_cad(self) -> None:
-        shape = {
-            "kind": "plate_link",
-            "between": [[0, 0], [1, 0]],
-            "width": 0.1,
-            "thickness": 0.1,
-            "bore_diameter": 0.02,
-        }
+    def test_unknowns_are_not_for_bars(self) -> None:
+        shape = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}
         raw = self.RAW | {"links": {"arm": {"material": "steel", "shape": shape, "mesh": {"unknowns": 500}}}}
-        with pytest.raises(
-            SceneError, match=r"links.arm.mesh.unknowns: must be given for a part from CAD only, got one for"
-        ):
+        wanted = "for a part from CAD, an extrusion, a part or a plate link only, got one for a bar"
+        with pytest.raises(SceneError, match=f"links.arm.mesh.unknowns: must be given {wanted}"):
             scene_from(raw, GEOMETRY)

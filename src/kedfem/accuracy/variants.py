@@ -118,7 +118,7 @@ def refined(link: LinkScene, factor: float) -> LinkScene:
         if mesh.size is not None:
             changed["size"] = mesh.size / factor
         elif mesh.unknowns is not None:
-            changed["unknowns"] = _more(mesh.unknowns, factor**3)
+            changed["unknowns"] = _more(mesh.unknowns, factor ** (2 if link.family == "plane" else 3))
         else:
             changed["elements_across"] = _more(mesh.elements_across or 2, factor)
     return link.model_copy(update={"mesh": mesh.model_copy(update=changed)})

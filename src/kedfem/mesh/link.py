@@ -21,6 +21,7 @@ from kedfem.mesh.planar.flat import Plate, QuadMesh, middle_mesh, swept_mesh
 from kedfem.mesh.planar.outline import profile_outline, turned_outline
 from kedfem.mesh.planar.plate import PlateSizes, plate_quads
 from kedfem.mesh.swept.blends import points_in_file
+from kedfem.mesh.unknowns import nearest
 from kedfem.scene import (
     Arc,
     Bar,
@@ -117,22 +118,46 @@ def plane_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole =
 
 
 def link_plate(where: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> Plate:
-    """The plate that a link's shape describes; parameters as of `link_mesh`.
+    """The plate that a link's shape describes, of about as many unknowns as asked for; parameters as of `link_mesh`.
 
     Raises
     ------
     MeshError
         The shape is no plate or cannot be meshed as asked, or a part's file cannot be used.
     """
+    usual = _plate(where, link, link.mesh, folder, kept_whole)
+    wanted = link.mesh.unknowns
+    if wanted is None:
+        return usual
+
+    def unknowns(plate: Plate) -> int:
+        if link.family == "plane":
+            return 2 * len(plate.quads[0])
+        return 3 * len(FORMS[str(link.element)](swept_mesh(plate, _layers(link))).points)
+
+    def sized(size: float) -> tuple[Plate, int]:
+        plate = _plate(where, link, link.mesh.model_copy(update={"size": size}), folder, kept_whole)
+        return plate, unknowns(plate)
+
+    points, cells = usual.quads
+    p, q, r, s = np.moveaxis(points[cells[:, :4]], 1, 0)
+    size = math.sqrt(float(np.linalg.det(np.stack([r - p, s - q], axis=1)).mean()) / 2)
+    most = float(np.linalg.norm(np.ptp(points, axis=0))) / 2
+    plate, told = nearest(wanted, size * math.sqrt(unknowns(usual) / wanted), most, 2.0, sized)
+    return replace(plate, way="; ".join(filter(None, (plate.way, told))))
+
+
+def _plate(where: str, link: LinkScene, mesh: Meshing, folder: Path, kept_whole: KeptWhole) -> Plate:
+    """The plate with elements as one of the link's meshes asks for."""
     match link.shape:
         case Bar() as shape:
-            return bar_plate(where, shape, link.mesh)
+            return bar_plate(where, shape, mesh)
         case PlateLink() as shape:
-            return eye_plate(where, shape, link.mesh)
+            return eye_plate(where, shape, mesh)
         case Extrusion() as shape:
-            return extrusion_plate(where, shape, link.mesh, kept_whole)
+            return extrusion_plate(where, shape, mesh, kept_whole)
         case Part() as shape:
-            return part_plate(where, shape, link.mesh, folder, kept_whole)
+            return part_plate(where, shape, mesh, folder, kept_whole)
         case other:
             kind = "no shape" if other is None else other.kind
             raise MeshError(
@@ -171,8 +196,8 @@ def extrusion_plate(where: str, shape: Extrusion, mesh: Meshing, kept_whole: Kep
     """A plate of any outline, in a z plane."""
     start = shape.outline[0]
     middle = np.array([0.0, 0.0, (start.to if isinstance(start, Arc) else start)[2] + shape.offset])
-    quads = outline_quads(where, profile_outline(shape), _sizing(mesh, kept_whole, middle, np.eye(3)))
-    return Plate(quads, shape.thickness, middle, np.eye(3))
+    quads, told = outline_quads(where, profile_outline(shape), _sizing(mesh, kept_whole, middle, np.eye(3)))
+    return Plate(quads, shape.thickness, middle, np.eye(3), told)
 
 
 def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole: KeptWhole) -> Plate:
@@ -182,7 +207,8 @@ def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole:
     outline = turned_outline(profile_outline(part), origin, x_point - origin)
     P, Q = np.array(shape.between)
     axes = frame_along(Q - P)
-    return Plate(outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes)), part.thickness, P, axes)
+    quads, told = outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes))
+    return Plate(quads, part.thickness, P, axes, told)
 
 
 def _sizing(

@@ -25,6 +25,7 @@ from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
 from kedfem.mesh.swept.blocks import block_mesh
 from kedfem.mesh.swept.path_sweep import carried_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
+from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
@@ -32,8 +33,7 @@ ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other way is tr
 FAIR = 0.2  # of hexahedra that are taken before tetrahedra
 FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some micrometres are in it
 MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
-NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
-TRIES = 6  # meshes made in search of a number of unknowns
+_POWER = 2.5  # by which of the size unknowns fall, between that of plates and that of lumps
 
 Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 #: Places of the scene [m] and names of faces at which a part keeps its blends.
@@ -139,29 +139,23 @@ def _wanted(link: LinkScene, shape: Cad, kept_whole: KeptWhole) -> Sizing:
 
 
 def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
-    """The mesh of the size asked for, or of the number of unknowns: then the nearest of at most TRIES."""
+    """The mesh of the size asked for, or of about so many unknowns."""
     wanted, element = link.mesh.unknowns, str(link.element)
     ways, form = WAYS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
     if wanted is None:
         return best_mesh(where, gmsh, solid, asked, form, ways)
-    nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # to a cube of the size
-    size = (solid.volume * 3 * nodes_each / wanted) ** (1 / 3)
-    found: list[tuple[float, SolidMesh]] = []
-    for _ in range(TRIES):
-        mesh = best_mesh(where, gmsh, solid, replace(asked, size=min(size, solid.extent / 2)), form, ways)
-        ratio = 3 * len(form(mesh).points) / wanted
-        found.append((abs(np.log(ratio)), mesh))
-        if 1 / NEAR < ratio < NEAR or (
-            len(found) > 1 and ratio == 3 * len(form(found[-2][1]).points) / wanted
-        ):
-            break
+
+    def sized(size: float) -> tuple[SolidMesh, int]:
+        nonlocal ways
+        mesh = best_mesh(where, gmsh, solid, replace(asked, size=size), form, ways)
         if mesh.tetrahedra:
             ways = (filled_mesh,)  # what cannot be swept cannot in other sizes
-        size *= ratio ** (1 / 2.5)  # in between what plates and lumps need
-    off, mesh = min(found, key=lambda each: each[0])
-    if off <= np.log(NEAR):
-        return mesh
-    return replace(mesh, way=f"{mesh.way}; the nearest found to the {wanted:,} unknowns asked for")
+        return mesh, 3 * len(form(mesh).points)
+
+    nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # to a cube of the size
+    size = (solid.volume * 3 * nodes_each / wanted) ** (1 / 3)
+    mesh, told = nearest(wanted, size, solid.extent / 2, _POWER, sized)
+    return replace(mesh, way=f"{mesh.way}; {told}") if told else mesh
 
 
 def best_mesh(

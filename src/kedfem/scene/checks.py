@@ -132,8 +132,9 @@ def meshing_faults(link: Entry) -> Iterator[str]:
         return
     part = {"cad"}, "a part from CAD"
     arcs = {"cad", "extrusion", "part"}, "a part from CAD, an extrusion or a part"
+    sized = {*arcs[0], "plate_link"}, "a part from CAD, an extrusion, a part or a plate link"
     for key, (shapes, only) in {
-        "unknowns": part, "defeature_size": part, "kind": part, "fillet_angle": arcs
+        "unknowns": sized, "defeature_size": part, "kind": part, "fillet_angle": arcs
     }.items():  # fmt: skip
         if link.has("mesh", key) and shape not in shapes:
             yield link.fault("mesh", f"must be given for {only} only, got one for a {shape}", key)

@@ -60,7 +60,7 @@ class Meshing(Record):
     layers: Count = 1
     """other shapes, solid: number through the thickness; of a part from CAD the least through each of its layers"""
     unknowns: Annotated[StrictInt, Field(ge=100)] | None = None
-    """a part from CAD: about so many unknowns, instead of `size` or `elements_across`"""
+    """other shapes: about so many unknowns, instead of `size` or `elements_across`"""
     defeature_size: PositiveLength | None = None
     """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
     then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""

@@ -1,6 +1,6 @@
 """Plates before they have a third dimension: quadrilaterals with a thickness, and where they lie in the scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -21,11 +21,14 @@ class QuadMesh:
         Node numbers in VTK order, anticlockwise (meshio: quad9).
     thickness : float [m]
         Extent along z, half of it to either side.
+    way : str
+        What is to be told of how it was made.
     """
 
     points: Float[np.ndarray, "n 3"]
     cells: Int[np.ndarray, "e 9"]
     thickness: float
+    way: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("points", np.float64), ("cells", np.int64)):
@@ -46,20 +49,24 @@ class Plate:
         Extent along z.
     origin, axes : (3,) [m], (3, 3)
         Where the frame's origin goes, and its x, y, z as rows.
+    way : str
+        What is to be told of how its mesh was made.
     """
 
     quads: Quads
     thickness: float
     origin: Float[np.ndarray, "3"]
     axes: Float[np.ndarray, "3 3"]
+    way: str = ""
 
 
 def swept_mesh(plate: Plate, layers: int) -> SolidMesh:
     """hex27 mesh of a plate, with that many elements through its thickness."""
-    return placed(extruded(*plate.quads, plate.thickness, layers), plate.origin, plate.axes)
+    mesh = replace(extruded(*plate.quads, plate.thickness, layers), way=plate.way)
+    return placed(mesh, plate.origin, plate.axes)
 
 
 def middle_mesh(plate: Plate) -> QuadMesh:
     """quad9 mesh of a plate's middle plane."""
     points, cells = plate.quads
-    return QuadMesh(plate.origin + points @ plate.axes[:2], cells, plate.thickness)
+    return QuadMesh(plate.origin + points @ plate.axes[:2], cells, plate.thickness, plate.way)
