@@ -8,13 +8,13 @@ room (m + 1, m) : for the small system; nothing is allocated in a step
 
 import numpy as np
 
-from kedfem.compiled import compiled
+from kedfem.compiled import inner
 
 DEPENDENT = 1e-11  # what is left of a constraint's own compliance where others constrain the same
 RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 
-@compiled
+@inner
 def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
     """Anderson acceleration, see `dynamics.anderson.Mixing`: the change asked for becomes the step to take."""
     pairs, products, last, room = memory
@@ -53,7 +53,7 @@ def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
         last[0, x] = change[x]
 
 
-@compiled
+@inner
 def definite_solved(A, x):  # type: ignore[no-untyped-def]
     """x becomes A⁻¹ x, A symmetric, positive definite and used up."""
     k = len(x)
@@ -72,7 +72,7 @@ def definite_solved(A, x):  # type: ignore[no-untyped-def]
         x[i] /= A[i, i]
 
 
-@compiled
+@inner
 def factored(H, first):  # type: ignore[no-untyped-def]
     """Cholesky factor in place, entries of each row from its first column on."""
     for i in range(len(H)):
@@ -83,7 +83,7 @@ def factored(H, first):  # type: ignore[no-untyped-def]
             H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
 
 
-@compiled
+@inner
 def partly_factored(G, pivots):  # type: ignore[no-untyped-def]
     """Cholesky factor in place, of rows whose pivot is not zero; a row that depends on those above gets pivot zero."""
     for a in range(len(G)):
@@ -104,7 +104,7 @@ def partly_factored(G, pivots):  # type: ignore[no-untyped-def]
             G[a, a] = np.sqrt(G[a, a])
 
 
-@compiled
+@inner
 def solved(H, first, x):  # type: ignore[no-untyped-def]
     """x becomes the solution, by the factor."""
     k = len(x)

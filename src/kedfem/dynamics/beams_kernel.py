@@ -19,12 +19,12 @@ One call does all segments: a call costs as much as a short beam.
 
 import numpy as np
 
-from kedfem.compiled import compiled
+from kedfem.compiled import inner
 
 SMALL_TURN = 0.05  # tan of half the angle: up to here the series is exact to rounding
 
 
-@compiled
+@inner
 def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[no-untyped-def]
     """What stays for a step: R t, and where tangents would point had they turned as the rigid-body motion; damped
     strains.
@@ -52,7 +52,7 @@ def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[n
                 resisted[b, m, e] = beta * (strain[1, b, m, e] - h1 * x2 + h0 * strain[2, b, m, e])
 
 
-@compiled
+@inner
 def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[no-untyped-def]
     """Internal force of all these segments at the displacement u, added to f; flat, component first, world components.
 
@@ -110,7 +110,7 @@ def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[
             f[at + 2 * n + j] += moment
 
 
-@compiled
+@inner
 def ended(t, rates, beams, R, seen, strain, direction, turn, strains, energies):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and row t of the history: strains (T, b, 3, E), energies (T, L)."""
     segment, body, _, _, _, _, rigidity = beams

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from kedfem.compiled import compiled
+from kedfem.compiled import inner
 
 SPACE, PLANE, BEAM = 0, 1, 2
 TURNS = 50
 
 
-@compiled
+@inner
 def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work):  # type: ignore[no-untyped-def]
     """What segment i sees of the displacement u from its frame, with its rates; out becomes g + β g'.
 
@@ -42,7 +42,7 @@ def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work
             out[r] += beta * x1
 
 
-@compiled
+@inner
 def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
     """Add to f (L, D, n), world components, the force of segment i that K makes of its strain, balanced.
 
@@ -65,7 +65,7 @@ def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
                 f[i, b, j] += x * turned[m, j]
 
 
-@compiled
+@inner
 def entry(kind, Q, b, m):  # type: ignore[no-untyped-def]
     """Entry of a frame's rotation on rows: ψ does not turn."""
     if kind == SPACE or (b < 2 and m < 2):
@@ -73,7 +73,7 @@ def entry(kind, Q, b, m):  # type: ignore[no-untyped-def]
     return 1.0 if b == m else 0.0
 
 
-@compiled
+@inner
 def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untyped-def]
     """Q of Σ y_a ⊗ fit_a in place, from an earlier one; of a planar segment its angle, which counts turns."""
     n = y.shape[1]
@@ -112,7 +112,7 @@ def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untype
             break
 
 
-@compiled
+@inner
 def turn_of(U, x):  # type: ignore[no-untyped-def]
     """x becomes (tr(U) 1 − sym U)⁻¹ x."""
     trace = U[0, 0] + U[1, 1] + U[2, 2]
@@ -126,7 +126,7 @@ def turn_of(U, x):  # type: ignore[no-untyped-def]
     x[2] = (C * x0 + (d * f - a * e) * x1 + (a * b - d * d) * x2) / det
 
 
-@compiled
+@inner
 def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
     """Q becomes Q times the rotation by w."""
     x, y, z = w
@@ -144,7 +144,7 @@ def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
             Q[r, m] = p * W[0, m] + q * W[1, m] + s * W[2, m]
 
 
-@compiled
+@inner
 def deformation(i, kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def]
     """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle."""
     n = y.shape[1]
@@ -166,7 +166,7 @@ def deformation(i, kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def
             g[2 * n + j] = y[2, j] - angle * one[i, 2, j]
 
 
-@compiled
+@inner
 def balanced_plane(fit, y, Q, g, f):  # type: ignore[no-untyped-def]
     """f becomes the gradient of the energy in a plane: F_a = f_a − (τ / tr U) e_z × fit_a, τ = Σ g_a × f_a."""
     n = y.shape[1]
@@ -181,7 +181,7 @@ def balanced_plane(fit, y, Q, g, f):  # type: ignore[no-untyped-def]
         f[1, j] -= torque * fit[0, j]
 
 
-@compiled
+@inner
 def balanced_space(fit, y, Q, g, f, U, w):  # type: ignore[no-untyped-def]
     """f becomes the gradient of the energy: F_a = f_a − (G⁻¹ τ) × fit_a, τ = Σ g_a × f_a."""
     n = y.shape[1]

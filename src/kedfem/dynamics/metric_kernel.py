@@ -5,13 +5,13 @@ Tables are those of `dynamics.metric.Elements`, room is that of `dynamics.metric
 
 import numpy as np
 
-from kedfem.compiled import compiled
+from kedfem.compiled import inner
 from kedfem.dynamics.frames_kernel import SPACE, rodrigues, rotation, turn_of
 
 TURNS = 50
 
 
-@compiled
+@inner
 def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, work, room):  # type: ignore[no-untyped-def]
     """Internal force of segment i, element e, at the displacement u, added to f, world components.
 
@@ -71,7 +71,7 @@ def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, 
                 f[i, b, j] += R[i, b, m] * forces[m, j]
 
 
-@compiled
+@inner
 def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
     """Strains of element e at the position y (3, S) in the rigid-body frame; x', g, d and rotations of its nodes."""
     tangents, gradients, node, drawn = elements.tangents, elements.gradients, elements.node, elements.drawn
@@ -138,7 +138,7 @@ def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
         s[m] -= elements.drawn_strains[e, m]
 
 
-@compiled
+@inner
 def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
     """Forces on x' and on the gradient functions of element e from its stresses."""
     node, drawn, N, D = elements.node, elements.drawn, elements.N, elements.D
@@ -200,7 +200,7 @@ def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
             on_g[j, b] += on_j
 
 
-@compiled
+@inner
 def nearest(A, Q, U, change):  # type: ignore[no-untyped-def]
     """Q of A = Q U in place, from an earlier one."""
     for _ in range(TURNS):

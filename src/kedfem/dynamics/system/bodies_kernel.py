@@ -5,7 +5,7 @@ Of body i: coordinates `at[i]:at[i + 1]`, component first; mass one. Rotations a
 
 import numpy as np
 
-from kedfem.compiled import inner
+from kedfem.compiled import inlined, inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import balanced, entry, strained
 from kedfem.dynamics.metric_kernel import metric_force
@@ -36,7 +36,7 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
                 out[first + x] += c_f * c.rate[m] * state.damped[of + x]
 
 
-@inner
+@inlined
 def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
     """End of the step of a body with the rigid-body frame, from g and its balance K g = r + Wᵀ λ = A g."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -161,7 +161,7 @@ def newmark(c):  # type: ignore[no-untyped-def]
     return n0, n1, n2, c.late, c.early, c.beta
 
 
-@inner
+@inlined
 def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-untyped-def]
     """Add the internal force of a body with one frame, and keep what that sees."""
     first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
@@ -200,7 +200,7 @@ def stiffness_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
         out[j] = total
 
 
-@inner
+@inlined
 def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-untyped-def]
     """Add to trial.f the rate of α M δ in the rigid-body frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -241,7 +241,7 @@ def orientation(bodies, i, R, u, trial, out):  # type: ignore[no-untyped-def]
             out[b, m] = x
 
 
-@inner
+@inlined
 def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
     """Q becomes the mean rotation of a planar beam in the rigid-body frame, that of Σ y_a ⊗ fit_a."""
     first, n, c, s = bodies.at[i], bodies.functions[i], 0.0, 0.0
@@ -256,7 +256,7 @@ def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
     Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c, -s, s, c
 
 
-@inner
+@inlined
 def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no-untyped-def]
     """out becomes what is missing to balance at the end of the step, without interface forces, in the frame R."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -278,7 +278,7 @@ def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no
     turned_back(R, d, room[: last - first], out[first:last])
 
 
-@inner
+@inlined
 def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ignore[no-untyped-def]
     """End of the step of a body with frames of its own: what passes found becomes the state."""
     first, last = bodies.at[i], bodies.at[i + 1]

@@ -5,7 +5,7 @@ A coordinate is a sum of terms, each a function of the positions x and orientati
 
 import numpy as np
 
-from kedfem.compiled import compiled, inner
+from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
 from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RATE, SPRING, TIME, TURN
 
@@ -42,7 +42,7 @@ def coordinate(ends, of, r, nominal, place, turned, row, y, w):  # type: ignore[
     return total, rate
 
 
-@inner
+@inlined
 def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
     """Gap along a direction fixed in j, or distance; w[6:10] becomes force and moment of unit size on i and on j."""
     i, j = of.i[t], of.j[t]
@@ -68,7 +68,7 @@ def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
     return value
 
 
-@inner
+@inlined
 def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
     """Twist of i against j about an axis, to within half a turn of an earlier one; gradient as in `between`."""
     i, j = of.i[t], of.j[t]
@@ -97,7 +97,7 @@ def directions(Q, a, axis, one, other, room):  # type: ignore[no-untyped-def]
     times(Q, room, other)
 
 
-@compiled
+@inlined
 def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyped-def]
     """Force against the coordinate e with its rate, and how it grows with both: out (3,); a constraint has its misfit.
 
@@ -128,7 +128,7 @@ def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyp
     return False
 
 
-@inner
+@inlined
 def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
     """The law of a stop within a step: one that pushed goes on as long as it does not pull, wherever e is; see `law`.
 
@@ -150,7 +150,7 @@ def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
         out[0], out[1], out[2] = k * (e - limit) + c * rate, k, c
 
 
-@inner
+@inlined
 def interpolated(of, r, x):  # type: ignore[no-untyped-def]
     """Value and slope of a curve that is linear between its points and held outside."""
     first, last = of.curve_at[r], of.curve_at[r + 1] - 1

@@ -10,7 +10,7 @@ as drawn. Of a surface of which two directions are known the third is its normal
 
 import numpy as np
 
-from kedfem.compiled import inner
+from kedfem.compiled import inlined, inner
 from kedfem.dynamics.frames_kernel import rodrigues, turn_of
 from kedfem.dynamics.system.algebra_kernel import frame_copied
 from kedfem.dynamics.system.record import FACE, PLANAR, PLANAR_BEAM, POINT, RIGID
@@ -30,7 +30,7 @@ def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inner
+@inlined
 def triple(a, b, c):  # type: ignore[no-untyped-def]
     """a · (b × c)."""
     return (
@@ -97,7 +97,7 @@ def on_lines(ends, weights):  # type: ignore[no-untyped-def]
                 ends.onto[at + m] += weights[p] * ends.full[of + m]
 
 
-@inner
+@inlined
 def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
     """y becomes the displacements of an end's interface points, one after the other."""
     first, last = ends.column_at[e], ends.column_at[e + 1]
@@ -108,7 +108,7 @@ def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
             y[r] += ends.onto[at + r * c + m - first] * z[ends.columns[m]]
 
 
-@inner
+@inlined
 def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
     """D becomes the directions of a surface: the known ones from its points, the others completed."""
     form, d, known = ends.form[e], ends.components[e], ends.known[e]
@@ -127,7 +127,7 @@ def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
             D[2, m] = w[m] / size
 
 
-@inner
+@inlined
 def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
     """Q becomes the rotation of A = Σ D_k ⊗ e_k, U = Qᵀ A: by Newton from one as near as A is to a rotation."""
     squared(D, w[4:7])
@@ -215,7 +215,7 @@ def borne(ends, e, force, moment, factor, nominal, place, row, y, w):  # type: i
     return factor * power
 
 
-@inner
+@inlined
 def turning(ends, e, moment, R, omega, Q, D, U, y, w):  # type: ignore[no-untyped-def]
     """Add to forces y at an end's points those that a moment on its orientation is; its power in the rigid-body
     motion."""

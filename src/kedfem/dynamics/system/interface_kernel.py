@@ -6,7 +6,7 @@
 is put into the matrix, as in `dynamics.interface`. Constraints that repeat others get no force.
 """
 
-from kedfem.compiled import inner
+from kedfem.compiled import inlined, inner
 from kedfem.dynamics.anderson_kernel import factored, partly_factored
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
@@ -131,7 +131,7 @@ def newmark_rate(c, x, x0, x1, x2):  # type: ignore[no-untyped-def]
     return c.rate[0] * (x - x0) - c.rate[1] * x1 - c.rate[2] * x2
 
 
-@inner
+@inlined
 def acts(row):  # type: ignore[no-untyped-def]
     """Whether a constraint says something that the interface unknowns do not satisfy by themselves."""
     most = 0.0
@@ -158,7 +158,7 @@ def backward(L, first, x):  # type: ignore[no-untyped-def]
             x[j] -= L[i, j] * x[i]
 
 
-@inner
+@inlined
 def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
     """trial.H_rows becomes the factor of H with a part of each constraint and law; compliances are of what is left."""
     k, r = len(trial.z), len(trial.m)
@@ -187,7 +187,7 @@ def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
     factored(trial.H_rows, bodies.first)
 
 
-@inner
+@inlined
 def compliances(trial):  # type: ignore[no-untyped-def]
     """trial.G becomes the factor of C H⁻¹ Cᵀ + compliance; constraints that depend on others have pivot zero."""
     G, CH = trial.G, trial.CH

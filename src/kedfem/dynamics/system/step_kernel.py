@@ -8,7 +8,7 @@ again. A linear system is done after one: `linear_kernel`.
 
 import numpy as np
 
-from kedfem.compiled import compiled, inner
+from kedfem.compiled import compiled, inlined
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.system.algebra_kernel import (
@@ -78,7 +78,7 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
     return len(driving.t), -1
 
 
-@inner
+@inlined
 def meets(of, state, trial):  # type: ignore[no-untyped-def]
     """Whether a stop's push begins at once in a step."""
     for a in range(len(of.jumps)):
@@ -89,7 +89,7 @@ def meets(of, state, trial):  # type: ignore[no-untyped-def]
     return False
 
 
-@inner
+@inlined
 def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The predictor, right-hand sides of bodies with rigid-body frames, the common matrix of z."""
     R, h = driving.R[t], c.h
@@ -120,7 +120,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         placed(ends, R, driving.p[t], trial.part, trial.fixed, work.end, work.vectors)
 
 
-@inner
+@inlined
 def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
     memory = (state.pairs, state.products, state.last, trial.mixing)
@@ -147,7 +147,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
     return False, worst
 
 
-@inner
+@inlined
 def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The change of bodies with frames of their own, and of z, that a pass asks for."""
     trial.right[:] = 0.0
@@ -193,7 +193,7 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]
 
 
-@inner
+@inlined
 def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     """Squares of the change asked for, and of what a step has moved; the body that changes most."""
     size, reached, most, worst, k = 0.0, 0.0, -1.0, -1, len(trial.z)
@@ -215,7 +215,7 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     return size, reached, worst
 
 
-@inner
+@inlined
 def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
     """The change becomes part of the end of the step."""
     u, change = trial.u, trial.change
@@ -228,7 +228,7 @@ def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
         trial.z[m] += trial.change[len(trial.change) - k + m] / c.weight
 
 
-@inner
+@inlined
 def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # type: ignore[no-untyped-def]
     """What the passes found becomes the state, and row t of the history."""
     R, F = driving.R[t], driving.F[t]

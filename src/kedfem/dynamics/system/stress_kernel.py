@@ -1,11 +1,11 @@
 """Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is taken from their right-hand side."""
 
-from kedfem.compiled import inner
+from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.algebra_kernel import frame_copied, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import right_hand_side
 
 
-@inner
+@inlined
 def combined(of, driving, t, out):  # type: ignore[no-untyped-def]
     """out becomes the entries of k = Σ s_j k_j of all bodies at one time."""
     for i in range(len(of.at) - 1):
@@ -20,14 +20,14 @@ def combined(of, driving, t, out):  # type: ignore[no-untyped-def]
                 k[m] += s * of_j[m]
 
 
-@inner
+@inlined
 def stressed_begin(c, bodies, i, R, F, state, trial, room):  # type: ignore[no-untyped-def]
     """trial.f becomes the right-hand side of a body without its stress stiffness."""
     frame_copied(R, trial.Rp[i])
     right_hand_side(c, bodies, i, trial.Rp[i], F, state, trial.f, room)
 
 
-@inner
+@inlined
 def stressed_side(c, bodies, i, trial, work):  # type: ignore[no-untyped-def]
     """trial.r becomes the right-hand side, k g P taken from it at trial.u."""
     first, last = bodies.at[i], bodies.at[i + 1]
@@ -39,7 +39,7 @@ def stressed_side(c, bodies, i, trial, work):  # type: ignore[no-untyped-def]
         trial.r[first + x] = trial.f[first + x] - share * work.strained[x]
 
 
-@inner
+@inlined
 def stressed_end(bodies, i, trial, state, g, work):  # type: ignore[no-untyped-def]
     """The internal force gets k g P."""
     first, last = bodies.at[i], bodies.at[i + 1]
@@ -68,7 +68,7 @@ def add_stress(bodies, i, entries, g, room, out):  # type: ignore[no-untyped-def
             scalar_times(of, i, bodies.dense[i], k, row, out[b * n : (b + 1) * n])
 
 
-@inner
+@inlined
 def scalar_times(of, i, dense, k, x, out):  # type: ignore[no-untyped-def]
     """out + k x, k (n, n) full or of the body's sparsity pattern."""
     n = len(x)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from kedfem.compiled import inner
+from kedfem.compiled import inlined, inner
 
 
-@inner
+@inlined
 def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
     """Subtract loads from internal forces f (N,), world components, of bodies displaced by u (N,).
 
@@ -40,7 +40,7 @@ def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-de
                     f[first + b * n + x] -= p * loads.force[at + m * n + x]
 
 
-@inner
+@inlined
 def shown_frame(bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
     """frame becomes the axes of the directions that show how load w has turned, in columns, world components."""
     loads = bodies.turning
