@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.output.animation import read_collection
 from kedfem.output.array_names import JOINTS
-from kedfem.output.vtu import read_collection
 
 
 def frames(folder: Path, stem: str = "animation") -> list[Any]:

@@ -16,6 +16,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.levels import in_balance, level_steps, leveled
 from kedfem.errors import OutputError, SceneError
 from kedfem.links.record import Link
+from kedfem.output.animation import write_collection
 from kedfem.output.static_decks import (
     ELEMENTS,
     reactions,
@@ -25,7 +26,6 @@ from kedfem.output.static_decks import (
     write_deck,
     write_resultants,
 )
-from kedfem.output.vtu import write_collection
 from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.load_cases import LoadCase, Statics, load_case

@@ -21,11 +21,11 @@ from kedfem.dynamics.stepping.marks import Marks
 from kedfem.dynamics.stepping.transient import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
+from kedfem.output.animation import AnimationWriter
 from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived
 from kedfem.output.frames import link_fields
 from kedfem.output.joint_frames import joint_field
 from kedfem.output.vtkhdf import AnimationFile
-from kedfem.output.vtu import AnimationWriter
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading

@@ -67,7 +67,7 @@ def watch_all() -> None:
     import kedfem.accuracy.reduction
     import kedfem.analysis
     import kedfem.store
-    from kedfem.output.vtu import AnimationWriter
+    from kedfem.output.animation import AnimationWriter
     from kedfem.results import ResultsWriter
     from kedfem.resume import Keeper
 

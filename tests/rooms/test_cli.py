@@ -20,7 +20,7 @@ from kedfem import cli
 from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.output.vtu import AnimationWriter
+from kedfem.output.animation import AnimationWriter
 from kedfem.results import Results, read_results
 from kedfem.scene import read_scene, scene_from, time_grid
 

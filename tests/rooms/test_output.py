@@ -13,8 +13,10 @@ import pytest
 
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
+from kedfem.output.animation import AnimationWriter, read_collection, remove_animation
 from kedfem.output.array_names import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES
-from kedfem.output.bars import THINNEST, bars, heights, shape_functions
+from kedfem.output.bars import SECTION, THINNEST, bars, heights, shape_functions
+from kedfem.output.fields import JointField, LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import write_plots
@@ -24,15 +26,7 @@ from kedfem.output.plots.groups import pictures
 from kedfem.output.plots.overview import shown
 from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
-from kedfem.output.vtu import (
-    SECTION,
-    AnimationWriter,
-    JointField,
-    LinkField,
-    read_collection,
-    remove_animation,
-    write_frame,
-)
+from kedfem.output.vtu import write_frame
 from kedfem.results import Channel, Results
 from tests.moving import ran
 from tests.spatial_joints import P, pushed

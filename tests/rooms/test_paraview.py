@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.analysis import analyse
-from kedfem.output.vtu import read_collection
+from kedfem.output.animation import read_collection
 from kedfem.results import read_results
 from kedfem.scene import scene_from
 from tests.frames import merged

@@ -18,9 +18,10 @@ from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.array_names import DISPLACEMENT, STRESS, VON_MISES
+from kedfem.output.fields import LinkField
 from kedfem.output.picture import write_picture
 from kedfem.output.rendering import lifted
-from kedfem.output.vtu import LinkField, write_frame
+from kedfem.output.vtu import write_frame
 from kedfem.scene import LinkScene, scene_from
 from kedfem.tables import check_tables
 from tests.frames import frames

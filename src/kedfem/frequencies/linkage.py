@@ -20,10 +20,10 @@ from kedfem.frequencies.campbell import Campbell, Crossing, crossed
 from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.output.fields import LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.plots.frequencies import write_campbell, write_over_turn
 from kedfem.output.shapes import Shape, write_shapes
-from kedfem.output.vtu import LinkField
 from kedfem.output.words import clock, moment
 from kedfem.results import claimed
 from kedfem.results.files import beside

@@ -28,9 +28,9 @@ from kedfem.links.surfaces.candidates import surfaces
 from kedfem.links.surfaces.choosing import chosen_surface
 from kedfem.mesh import part_mesh
 from kedfem.motion.joint_equations import joint_axis
+from kedfem.output.fields import LinkField
 from kedfem.output.frames import link_field
 from kedfem.output.shapes import Shape, write_shapes
-from kedfem.output.vtu import LinkField
 from kedfem.results import claimed
 from kedfem.results.frequencies import write_part_frequencies
 from kedfem.scene import ChosenFace, LinkScene, Material, Scene, require_elastic

@@ -10,15 +10,16 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.vibration import Vibration
 from kedfem.errors import OutputError, PictureError
 from kedfem.links.recovery import StressRecovery
+from kedfem.output.animation import remove_animation
 from kedfem.output.fatigue_files import FIELD, SPOTS
 from kedfem.output.fatigue_files import POINTS as DAMAGES
+from kedfem.output.fields import LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.paraview import STATE, write_state
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.shapes import GROWING, write_growing
 from kedfem.output.stress_files import ENVELOPE, POINTS, TOP
-from kedfem.output.vtu import LinkField, remove_animation
 from kedfem.output.words import clock, moment, place_of, stress_at
 from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
 from kedfem.results.reader import foreign

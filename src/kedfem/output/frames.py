@@ -10,7 +10,7 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, turned_stress, von_mises
 from kedfem.mesh.elements.shape_functions import HEX8
-from kedfem.output.vtu import LinkField
+from kedfem.output.fields import LinkField
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 BLOCK = 0.08  # width of the block that stands for a slider without a shape, of the longest link

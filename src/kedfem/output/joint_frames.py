@@ -10,7 +10,7 @@ from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.array_names import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT
-from kedfem.output.vtu import JointField
+from kedfem.output.fields import JointField
 from kedfem.results.recorded import drive_prefix
 from kedfem.scene import Scene
 

@@ -27,7 +27,7 @@ def write_picture(
     Parameters
     ----------
     vtu
-        A frame of :class:`~kedfem.output.vtu.AnimationWriter`.
+        A frame of :class:`~kedfem.output.animation.AnimationWriter`.
     png
         The picture.
     title

@@ -13,7 +13,7 @@ from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.output.vtu import RigidField
+from kedfem.output.fields import RigidField
 from kedfem.scene import Scene
 
 

@@ -7,8 +7,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from kedfem.output.animation import AnimationWriter, remove_animation
+from kedfem.output.fields import LinkField
 from kedfem.output.picture import write_picture
-from kedfem.output.vtu import AnimationWriter, LinkField, remove_animation, write_frame
+from kedfem.output.vtu import write_frame
 
 FRAMES = 24  # over a cycle
 AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses are

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.errors import OutputError
-from kedfem.output.vtu import JointField, LinkField
+from kedfem.output.fields import JointField, LinkField
 from kedfem.results.files import ready_folder, reason, require_space
 
 VERSION = (2, 3)

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import OutputError
+from kedfem.output.animation import read_collection
 from kedfem.output.derived import STEM, WORST
 from kedfem.output.rendering import view
 from kedfem.output.stress_files import ENVELOPE
-from kedfem.output.vtu import read_collection
 from kedfem.report.surfaces import Surface, sources_of
 
 FRAMES = 120

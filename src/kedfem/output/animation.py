@@ -1,0 +1,162 @@
+"""The ParaView animation: a VTU file per link and frame, and a PVD file that lists them as named blocks."""
+
+import re
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from kedfem.errors import OutputError
+from kedfem.folders import PART
+from kedfem.output.fields import Block
+from kedfem.output.vtu import write_blocks
+from kedfem.processes import threads
+from kedfem.results.files import ready_folder, reason, replacing
+
+
+class AnimationWriter:
+    """Writes frames as they are made; each is whole, and so is the list of them, at any moment.
+
+    The first frame removes the frames that an earlier run left under the same stem, and nothing else.
+
+    Parameters
+    ----------
+    folder
+        Where ``STEM.pvd`` goes, and the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link.
+    stem
+        Beginning of the names.
+    drive
+        What the drive's position is called, with its unit; empty without one.
+
+    Raises
+    ------
+    OutputError
+        From :meth:`add`: the folder or a file cannot be written.
+    """
+
+    REMEMBERED = ("entries", "count")
+
+    def __init__(self, folder: Path, stem: str, drive: str = "") -> None:
+        self.folder, self.stem, self.drive = Path(folder), stem, drive
+        self.entries: list[Entry] = []
+        self.count = 0
+
+    @property
+    def missing(self) -> Path | None:
+        """A frame that was written and is there no more."""
+        return next((path for _, _, name in self.entries if not (path := self.folder / name).is_file()), None)
+
+    def add(self, time: float, fields: Sequence[Block], angle: float = 0.0) -> list[Path]:
+        """Write the next frame.
+
+        Parameters
+        ----------
+        time : [s]
+        fields
+            The links in this frame, and what joints exert.
+        angle : of the drive [rad], or travel [m]
+
+        Returns
+        -------
+        The VTU files.
+        """
+        if not self.count:
+            remove_animation(self.folder, self.stem)
+        now = {"TimeValue": float(time)} | ({self.drive: float(angle)} if self.drive else {})
+        files = [f"{self.stem}/{name}_{self.count:04d}.vtu" for name in _file_names(fields)]
+        ready_folder(self.folder / self.stem)
+
+        def write(k: int) -> None:
+            with replacing(self.folder / files[k]) as part:
+                write_blocks(part, now, [fields[k]], k)
+
+        # most of it is compression, which lets other threads go on
+        with ThreadPoolExecutor(threads()) as pool:
+            list(pool.map(write, range(len(fields))))
+        self.entries += [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
+        self.count += 1
+        write_collection(self.folder, self.stem, self.entries)
+        return [self.folder / name for name in files]
+
+
+Entry = tuple[float, str, str]
+"""Of a list of frames: time [s], name of the block, file beside the list."""
+
+
+def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:
+    """The PVD file ``STEM.pvd`` that lists VTU files at their times.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with replacing(folder / f"{stem}.pvd") as part:
+        part.write_text(_collection(entries), encoding="utf-8")
+
+
+def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
+    """Frames that a PVD file lists, in its order: time [s] and the files of its blocks that are there.
+
+    Raises
+    ------
+    OutputError
+        It is damaged.
+    """
+    import xml.etree.ElementTree as ET
+
+    out: dict[float, list[Path]] = {}
+    try:
+        for each in ET.parse(path).iter("DataSet"):
+            file = (path.parent / each.attrib["file"]).resolve()
+            if file.is_relative_to(path.parent.resolve()) and file.exists():
+                out.setdefault(float(each.attrib["timestep"]), []).append(file)
+    except (ET.ParseError, KeyError, ValueError, OSError) as error:
+        raise OutputError(f"{path}: must be a list of frames, got a damaged file") from error
+    return list(out.items())
+
+
+def _file_names(fields: Sequence[Block]) -> list[str]:
+    """Names for files, all different whatever the letters of the blocks' own."""
+    out: list[str] = []
+    for field in fields:
+        name = re.sub(r"[^A-Za-z0-9.-]", "_", field.name)
+        same = (f"{name}{k}" if k else name for k in count())
+        out.append(next(x for x in same if x.lower() not in {y.lower() for y in out}))
+    return out
+
+
+def remove_animation(folder: Path, stem: str) -> None:
+    """Delete the animation of an earlier run: ``STEM.pvd``, the frames in folder ``STEM``, whole or not, no more.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written, or a file in it cannot be removed.
+    """
+    ready_folder(folder)
+    frame, inside = re.compile(r".+_\d{4,}\.vtu"), folder / stem
+    try:
+        (folder / f"{stem}.pvd").unlink(missing_ok=True)
+        if not inside.is_dir():
+            return
+        for path in inside.iterdir():
+            if frame.fullmatch(path.name) or PART.fullmatch(path.name):
+                path.unlink()
+        if not any(inside.iterdir()):
+            inside.rmdir()
+    except OSError as error:
+        got = f"{Path(error.filename).name} that cannot be removed ({reason(error)})"
+        raise OutputError(f"{folder}: must be free of the frames of an earlier run, got {got}") from error
+
+
+def _collection(entries: Sequence[Entry]) -> str:
+    """The PVD file; parts are numbered within their time."""
+    rows, last, part = [], None, 0
+    for time, name, file in entries:
+        part, last = (part + 1 if time == last else 0), time
+        at = f'timestep="{time!r}" part="{part}" name={quoteattr(name)} file={quoteattr(file)}'
+        rows.append(f"    <DataSet {at}/>\n")
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+    return head + "".join(rows) + "  </Collection>\n</VTKFile>\n"

@@ -1,0 +1,121 @@
+"""What frames show: links, rigid links and joints, with values at their points."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.output.array_names import (
+    ACCELERATION,
+    DISPLACEMENT,
+    JOINTS,
+    LARGEST,
+    SMALLEST,
+    STRESS,
+    VELOCITY,
+    VON_MISES,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkField:
+    """One link in one frame of the animation.
+
+    Parameters
+    ----------
+    name
+        The link's name.
+    cell_type
+        meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``.
+    cells : (e, k) [-]
+        Node numbers in VTK's order.
+    points : (n, 3) [m]
+        Where the nodes are drawn: rigid motion plus the exaggerated elastic displacement.
+    displacement : (n, 3) [m]
+        Elastic displacement δ, world components, not exaggerated.
+    stress : (n, 6) [Pa]
+        xx, yy, zz, xy, yz, zx in the world's axes; nan of beams, whose stress is known along their axis.
+    von_mises : (n,) [Pa]
+    principal : (n, 2) [Pa]
+        Smallest and largest principal stress.
+    section : height and thickness [m] of a beam that is drawn as a line, and whether they are diameters of an ellipse
+    """
+
+    name: str
+    cell_type: str
+    cells: Int[np.ndarray, "e k"]
+    points: Float[np.ndarray, "n 3"]
+    displacement: Float[np.ndarray, "n 3"]
+    stress: Float[np.ndarray, "n 6"]
+    von_mises: Float[np.ndarray, " n"]
+    principal: Float[np.ndarray, "n 2"]
+    section: tuple[float, float, bool] | None = None
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What each node has, by names with units."""
+        least, most = self.principal.T
+        return {
+            DISPLACEMENT: self.displacement,
+            VON_MISES: self.von_mises,
+            STRESS: self.stress,
+            LARGEST: most,
+            SMALLEST: least,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class RigidField:
+    """One rigid link in one frame of the animation.
+
+    Parameters
+    ----------
+    name, cell_type, cells, points
+        As of :class:`LinkField`; cells are surfaces, lines or a vertex.
+    velocity, acceleration : (n, 3) [m/s, m/s²]
+        World components.
+    """
+
+    name: str
+    cell_type: str
+    cells: Int[np.ndarray, "e k"]
+    points: Float[np.ndarray, "n 3"]
+    velocity: Float[np.ndarray, "n 3"]
+    acceleration: Float[np.ndarray, "n 3"]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What each node has, by names with units."""
+        return {VELOCITY: self.velocity, ACCELERATION: self.acceleration}
+
+
+@dataclass(frozen=True, slots=True)
+class JointField:
+    """What joints and drives exert in one frame, at points for arrows.
+
+    Parameters
+    ----------
+    names
+        Of the joints.
+    points : (n, 3) [m]
+        Where they are in the rigid-body motion.
+    vectors
+        (n, 3) by names with units: world components.
+    """
+
+    names: tuple[str, ...]
+    points: Float[np.ndarray, "n 3"]
+    vectors: Mapping[str, Float[np.ndarray, "n 3"]]
+    name: str = JOINTS
+    cell_type: str = "vertex"
+
+    @property
+    def cells(self) -> Int[np.ndarray, "n 1"]:
+        """Each point is one."""
+        return np.arange(len(self.points))[:, None]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What each joint has, by names with units."""
+        return dict(self.vectors)
+
+
+Block = LinkField | RigidField | JointField
