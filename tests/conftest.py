@@ -27,9 +27,7 @@ ALL = [
     for file in PACKAGE.rglob("*.py")
     if file.stem != "__init__" and not file.stem.endswith("kernel")  # numba compiles the kernels itself
 ]
-FIRST = (
-    20  # calls of a function in a test whose arrays are checked: all of them would take longer than the tests
-)
+FIRST = 20  # calls of a function in a test whose arrays are checked: to check all takes longer than the tests
 CALLS = Counter[FunctionType]()
 NUMERICAL = {"laws", "verification", "hard_cases"}  # folders
 
