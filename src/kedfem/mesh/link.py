@@ -74,10 +74,7 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
             key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
             mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
         case _:
-            plate = link_plate(where, link, folder, kept_whole)
-            elements = len(plate.quads[1]) * _layers(link)
-            check_room(where, 3.0 * NODES_EACH[str(link.element)] * elements, link.fidelity != "rigid")
-            mesh = swept_mesh(plate, _layers(link))
+            mesh = _swept(where, link, link_plate(where, link, folder, kept_whole))
     mesh = FORMS[str(link.element)](mesh)
     check_room(where, 3.0 * len(mesh.points), link.fidelity != "rigid")
     return checked_mesh(where, mesh, link.min_quality)
@@ -133,7 +130,7 @@ def link_plate(where: str, link: LinkScene, folder: Path, kept_whole: KeptWhole 
     def unknowns(plate: Plate) -> int:
         if link.family == "plane":
             return 2 * len(plate.quads[0])
-        return 3 * len(FORMS[str(link.element)](swept_mesh(plate, _layers(link))).points)
+        return 3 * len(FORMS[str(link.element)](_swept(where, link, plate)).points)
 
     def sized(size: float) -> tuple[Plate, int]:
         plate = _plate(where, link, link.mesh.model_copy(update={"size": size}), folder, kept_whole)
@@ -145,6 +142,14 @@ def link_plate(where: str, link: LinkScene, folder: Path, kept_whole: KeptWhole 
     most = float(np.linalg.norm(np.ptp(points, axis=0))) / 2
     plate, told = nearest(wanted, size * math.sqrt(unknowns(usual) / wanted), most, 2.0, sized)
     return replace(plate, way="; ".join(filter(None, (plate.way, told))))
+
+
+def _swept(where: str, link: LinkScene, plate: Plate) -> SolidMesh:
+    """A plate as a solid, if it fits in the memory."""
+    layers = _layers(link)
+    unknowns = 3.0 * NODES_EACH[str(link.element)] * len(plate.quads[1]) * layers
+    check_room(where, unknowns, link.fidelity != "rigid")
+    return swept_mesh(plate, layers)
 
 
 def _plate(where: str, link: LinkScene, mesh: Meshing, folder: Path, kept_whole: KeptWhole) -> Plate:

@@ -24,13 +24,14 @@ def nearest(
     mesh_of : the mesh with elements of a size, and its unknowns
     """
     found: list[tuple[float, T]] = []
-    ratios: list[float] = []
     for _ in range(TRIES):
         mesh, unknowns = mesh_of(min(size, most))
-        ratios.append(unknowns / wanted)
-        found.append((abs(np.log(ratios[-1])), mesh))
-        if 1 / NEAR < ratios[-1] < NEAR or ratios[-1] in ratios[:-1]:
+        ratio = unknowns / wanted
+        known = any(ratio == before for before, _ in found)
+        found.append((ratio, mesh))
+        if known or 1 / NEAR < ratio < NEAR:
             break
-        size *= ratios[-1] ** (1 / power)
-    off, mesh = min(found, key=lambda each: each[0])
-    return mesh, "" if off <= np.log(NEAR) else f"the nearest found to the {wanted:,} unknowns asked for"
+        size *= ratio ** (1 / power)
+    ratio, mesh = min(found, key=lambda each: abs(np.log(each[0])))
+    told = f"the nearest found to the {wanted:,} unknowns asked for"
+    return mesh, "" if 1 / NEAR < ratio < NEAR else told
