@@ -48,8 +48,8 @@ class Browser:
         async def connected() -> Any:
             return await websocket_connect(page["webSocketDebuggerUrl"], max_message_size=10**9)
 
-        self._loop = asyncio.new_event_loop()
-        self._socket = self._loop.run_until_complete(connected())
+        self._runner = asyncio.Runner()
+        self._socket = self._runner.run(connected())
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
         self.resize(self.width, self.height)
@@ -58,10 +58,13 @@ class Browser:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._socket.close()
+        async def closed() -> None:  # outside a loop, tornado makes another one, which nobody closes
+            self._socket.close()
+
+        self._runner.run(closed())
         self._process.kill()
         self._process.wait()
-        self._loop.close()
+        self._runner.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def call(self, method: str, **parameters: Any) -> Any:
@@ -80,7 +83,7 @@ class Browser:
                     return message["result"]
                 self.events.append(message)
 
-        return self._loop.run_until_complete(answered())
+        return self._runner.run(answered())
 
     def value(self, script: str) -> Any:
         """What an expression of JavaScript is in the page."""
