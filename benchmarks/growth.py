@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.pages import ROOT, script, seconds, table, write_loglog, write_page
 from kedfem.errors import SolveError
+from kedfem.mesh.memory_forecast import least_bytes
 from kedfem.processes import most_memory
 
 SIZES = ((40, 8, 2), (64, 14, 2), (110, 24, 2), (200, 44, 2))  # a plate, 1 m x 0.22 m x 20 mm
@@ -31,16 +32,23 @@ def bench_growth(folder: Path, quick: bool) -> None:
         found.append(json.loads(done.stdout))
     rows = [
         (f"{f['unknowns']:,}", f"{f['assemble']:.2f}", f"{f['factor']:.2f}", f"{1e3 * f['solve']:.1f}",
-         f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}")
+         f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}", f"{told(f) / 1e9:.2f}",
+         f"{told(f) / f['memory']:.2f}")
         for f in found
     ]  # fmt: skip
-    header = ("unknowns", "assemble [s]", "factor [s]", "solve [ms]", "assemble / factor", "peak memory [GB]")
+    header = ("unknowns", "assemble [s]", "factor [s]", "solve [ms]", "assemble / factor", "peak memory [GB]",
+              "memory forecast before meshing [GB]", "ratio")  # fmt: skip
     slopes = [(key, f"{_slope(found, key):.2f}") for key in ("factor", "solve", "memory")]
     grown = table(("between the last two sizes", "power of the unknowns"), slopes)
     write_page(folder, "performance/growth", [table(header, rows), grown])
     N = [f["unknowns"] for f in found]
     curves = {name: (N, [f[name] for f in found]) for name in ("assemble", "factor", "solve")}
     write_loglog(folder, "growth", curves, ("unknowns in one link", "seconds"))
+
+
+def told(measured: dict[str, float]) -> float:
+    """Bytes that are forecast from the number of unknowns: more than the machine has is refused before it is meshed."""
+    return sum(least_bytes(measured["unknowns"]))
 
 
 def _slope(found: list[dict[str, float]], key: str) -> float:

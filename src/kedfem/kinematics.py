@@ -14,7 +14,7 @@ from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.nominal import all_motions
 from kedfem.errors import MeshError
-from kedfem.links.build import bare_link
+from kedfem.links.build import bare_link, part_meshes
 from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
@@ -105,13 +105,16 @@ def rigid_links(scene: Scene) -> dict[str, Link]:
     MeshError
         If a link cannot be meshed.
     """
-    out = {}
-    for name, link in scene.links.items():
-        if link.shape is None or link.material is None:
-            continue
+    named = {
+        name: link
+        for name, link in scene.links.items()
+        if link.shape is not None and link.material is not None
+    }
+    out, meshes = {}, part_meshes(scene, named)
+    for name, link in named.items():
         simple = scene.model_copy(update={"links": {name: coarse(link)}})
         try:
-            out[name] = bare_link(simple, name)
+            out[name] = bare_link(simple, name, mesh=meshes.get(name))
         except MeshError:
             out[name] = bare_link(scene, name)
     return out

@@ -22,6 +22,7 @@ INTERRUPTIONS = ("SIGTERM", "SIGBREAK", "SIGHUP")
 POLL = 0.5  # seconds between two looks for the parent
 AGAIN = 0.05  # seconds until an interruption that was dropped is raised again
 LATE = 75  # the exit status of a worker that was ended by `at_most`
+BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _asked: list[int] = []  # the signals that have interrupted this process
 
 
@@ -162,8 +163,17 @@ def bounded(seconds: float, memory: float) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))
 
 
+def one_blas_thread() -> None:
+    """Give BLAS one thread where the user does not say how many; called before numpy is loaded.
+
+    On kedfem's sizes two are no faster, and beside another busy process they wait for each other most of the time.
+    """
+    if not any(name in os.environ for name in BLAS_THREADS):
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+
 def threads() -> int:
-    """How many threads may work at once: as many as BLAS is given, else one a processor."""
+    """How many threads may work at once: as many as OMP_NUM_THREADS says, else one a processor."""
     given = os.environ.get("OMP_NUM_THREADS", "")
     return int(given) if given.isdecimal() and int(given) > 0 else os.cpu_count() or 1
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.links.build import part_meshes, solid_mesh
 from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.session import gmsh_model
+from kedfem.scene import read_scene
 from kedfem.scene.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, VOLUME, edited, parts_in, read, refused, written
 
@@ -206,3 +208,16 @@ class TestUnits:
         )
         assert message.endswith("in FILE; set `scale`, the metres per unit of the file")
         assert got in message
+
+
+def test_parts_are_meshed_side_by_side_as_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEDFEM_CACHE", "off")
+    scene = read_scene(Path(__file__).parents[2] / "examples" / "connecting_rod" / "scene.toml")
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    found = part_meshes(scene, ["crank", "slider"])
+    assert list(found) == ["crank", "slider"]
+    for name, mesh in found.items():
+        alone = solid_mesh(scene, name)
+        assert np.array_equal(mesh.points, alone.points)
+        assert np.array_equal(mesh.cells, alone.cells)
+        assert mesh.way == alone.way

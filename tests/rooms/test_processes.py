@@ -7,14 +7,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import kedfem
 from kedfem.errors import MeshError
-from kedfem.mesh.isolated import LONGEST, PART, apart
-from kedfem.processes import POLL, at_most
+from kedfem.mesh.isolated import LONGEST, PART, apart, side_by_side
+from kedfem.processes import BLAS_THREADS, POLL, at_most
 
 BUSY = """
 import os, sys, time
@@ -97,6 +98,54 @@ def test_a_part_that_hangs_as_it_is_read_is_tried_in_three_processes(tmp_path: P
     ):
         apart("part", PART, LONGEST, reading, file, 9)
     assert file.read_text() == "xxx"
+
+
+def together(here: Path, other: Path) -> int:
+    """Work that ends once that in another process has begun too; the number of its process."""
+    here.touch()
+    assert within(60.0, other.exists)
+    return os.getpid()
+
+
+def test_two_pieces_of_work_are_done_at_once_in_two_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    one, other = tmp_path / "one", tmp_path / "other"
+    works = {"a": (one, other), "b": (other, one)}
+    found = side_by_side(
+        {name: partial(apart, "part", PART, LONGEST, together, *files) for name, files in works.items()}
+    )
+    assert list(found) == ["a", "b"]
+    assert found["a"] != found["b"]
+    assert os.getpid() not in found.values()
+
+
+def waiting(file: Path) -> None:
+    file.write_text(str(os.getpid()))
+    time.sleep(120.0)
+
+
+def wrong(file: Path) -> None:
+    assert within(60.0, lambda: file.exists() and file.read_text() != "")
+    raise MeshError("wrong")
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at /proc")
+def test_what_goes_on_beside_a_mistake_is_ended_and_what_has_not_begun_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    begun, never = tmp_path / "begun", tmp_path / "never"
+    works = {"first": (wrong, begun), "second": (waiting, begun), "third": (waiting, never)}
+    since = time.monotonic()
+    with pytest.raises(MeshError, match=r"^wrong$"):
+        side_by_side(
+            {name: partial(apart, "part", PART, LONGEST, work, file) for name, (work, file) in works.items()}
+        )
+    assert time.monotonic() - since < 60.0
+    assert within(10.0, lambda: not alive(int(begun.read_text())))
+    assert apart("part", PART, LONGEST, abs, -4) == 4
 
 
 def test_a_process_that_is_no_worker_is_not_ended() -> None:
@@ -239,3 +288,21 @@ def test_drawing_scripts_end_with_their_parent() -> None:
     for name in ("rendering", "mesh_rendering"):
         text = (package / "output" / f"{name}.py").read_text(encoding="utf-8")
         assert 'if __name__ == "__main__":\n    end_with_parent()\n' in text
+
+
+@pytest.mark.parametrize(
+    ("given", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, None), ({"OPENBLAS_NUM_THREADS": "2"}, "2")]
+)
+def test_the_command_line_gives_blas_one_thread_before_it_is_loaded(
+    given: dict[str, str], threads: str | None
+) -> None:
+    told = (
+        "import atexit, os, sys; import kedfem.cli; before = 'numpy' in sys.modules\n"
+        "atexit.register(lambda: print(before, os.environ.get('OPENBLAS_NUM_THREADS')))\n"
+        "sys.argv = ['kedfem', '--help']; kedfem.cli.main()"
+    )
+    free = {name: value for name, value in os.environ.items() if name not in BLAS_THREADS}
+    done = subprocess.run(
+        [sys.executable, "-c", told], env=free | given, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == f"False {threads}"

@@ -243,9 +243,9 @@ def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, 
     kept = {link.name: link for link in small.model.links if link.meshed and link.fit is None}
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft
-    from kedfem.links.build import bare_link
+    from kedfem.links.build import bare_links
 
-    bare = {name: bare_link(finer, name) for name, link in finer.links.items() if link.shape is not None}
+    bare = bare_links(finer)
     whole = first_reduced(
         replace(small, scene=finer, model=elastic_model(finer, small.linkage, bare, small.path)), FUNCTIONS
     ) if kept else small  # fmt: skip

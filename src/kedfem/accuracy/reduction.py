@@ -270,7 +270,7 @@ def _enriched(
     full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]
 ) -> Functions:
     """Functions with the answers to the residual at some moments added."""
-    answers = [residual_deflections(full.model, parts, small.model, snapshot) for snapshot in kept]
+    answers = residual_deflections(full.model, parts, small.model, kept)
     return [
         None if link is whole else enriched(link, each, ADDED)
         for whole, link, each in zip(

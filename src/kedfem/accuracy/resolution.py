@@ -66,7 +66,7 @@ def resolution(ready: Prepared) -> Resolution | None:
     motion = rigid_motion(ready.linkage, ready.path, t, phi)
     try:
         parts = static_parts(ready.model)
-        lowest = [frozen_frequencies(ready.model, parts, at)[:1] for at in instants(ready.model, motion)]
+        lowest = frozen_frequencies(ready.model, parts, instants(ready.model, motion))
     except SolveError:  # nothing holds a link
         return None
     excited = [k for k, found in enumerate(lowest) if len(found)]

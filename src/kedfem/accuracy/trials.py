@@ -14,7 +14,7 @@ from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.accuracy.variants import shortened
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.links.build import bare_link
+from kedfem.links.build import bare_links
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -72,11 +72,8 @@ class Trials:
         joined, along = self._moving(scene)
         key = scene.model_dump_json(exclude={"analysis"})
         if key not in self.models:
-            bare = {
-                name: self._bare(scene, name) for name in scene.links if scene.links[name].shape is not None
-            }
             self.models[key] = self._reduced(
-                Prepared(scene, joined, along, elastic_model(scene, joined, bare, along))
+                Prepared(scene, joined, along, elastic_model(scene, joined, self._bare(scene), along))
             )
         return replace(self.models[key], scene=scene, path=along)
 
@@ -87,11 +84,11 @@ class Trials:
             self.motion = moving(scene)
         return self.motion
 
-    def _bare(self, scene: Scene, name: str) -> Link:
-        key = _text(scene, name)
-        if key not in self.links:
-            self.links[key] = bare_link(scene, name)
-        return self.links[key]
+    def _bare(self, scene: Scene) -> dict[str, Link]:
+        texts = {name: _text(scene, name) for name, link in scene.links.items() if link.shape is not None}
+        fresh = bare_links(scene, [name for name, text in texts.items() if text not in self.links])
+        self.links |= {texts[name]: link for name, link in fresh.items()}
+        return {name: self.links[text] for name, text in texts.items()}
 
     def _reduced(self, full: Prepared) -> Prepared:
         """With the modes of links that an earlier trial had too: the difference is then of the others alone."""

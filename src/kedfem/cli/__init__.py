@@ -16,7 +16,7 @@ from kedfem.cli.reporting import WRITTEN, report, view
 from kedfem.cli.screen import err, out, progress, show, stages
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
-from kedfem.processes import end_as_interrupted, interruption_asked
+from kedfem.processes import end_as_interrupted, interruption_asked, one_blas_thread
 
 __all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
 
@@ -401,6 +401,7 @@ def _say_where(folder: Path) -> None:
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
     end_as_interrupted()
+    one_blas_thread()
     try:
         app()
     except KedfemError as error:

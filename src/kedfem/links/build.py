@@ -1,5 +1,7 @@
 """Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included."""
 
+from collections.abc import Collection, Iterable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,7 +27,7 @@ from kedfem.links.segments import (
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.choosing import with_chosen_faces
 from kedfem.links.surfaces.coupling_surfaces import joint_seat
-from kedfem.mesh import link_mesh, plane_mesh
+from kedfem.mesh import SolidMesh, link_mesh, plane_mesh, side_by_side
 from kedfem.scene import (
     Bar,
     Cad,
@@ -47,18 +49,54 @@ SAME = 1e-6  # of a segment's length: what is so near is at one place
 SEGMENTS = 6  # of a solid or plane link with co-rotational frames, where none are given
 
 
-def bare_links(scene: Scene) -> dict[str, Link]:
+def bare_links(scene: Scene, wanted: Collection[str] | None = None) -> dict[str, Link]:
     """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
+
+    Parameters
+    ----------
+    wanted : names of those that are asked for, if not all
 
     Raises
     ------
     MeshError
         If a link cannot be meshed well enough.
     """
-    spatial = spatial_beams(scene)
-    return {
-        name: bare_link(scene, name, spatial) for name, link in scene.links.items() if link.shape is not None
-    }
+    names = [
+        name
+        for name, link in scene.links.items()
+        if link.shape is not None and (wanted is None or name in wanted)
+    ]
+    spatial, meshes = spatial_beams(scene), part_meshes(scene, names)
+    return {name: bare_link(scene, name, spatial, meshes.get(name)) for name in names}
+
+
+def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
+    """Meshes of those solid links that are parts from CAD or mesh files, made side by side.
+
+    Raises
+    ------
+    MeshError
+        If one cannot be meshed well enough.
+    """
+    solids = (name for name in names if scene.links[name].family == "solid")
+    return side_by_side(
+        {
+            name: partial(solid_mesh, scene, name)
+            for name in solids
+            if isinstance(scene.links[name].shape, Cad | MeshFile)
+        }
+    )
+
+
+def solid_mesh(scene: Scene, name: str) -> SolidMesh:
+    """The mesh of a solid link.
+
+    Raises
+    ------
+    MeshError
+        If it cannot be meshed well enough.
+    """
+    return link_mesh(name, scene.links[name], scene.folder, touched(scene, name))
 
 
 def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
@@ -76,12 +114,15 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
             return np.eye(3)
 
 
-def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None) -> Link:
+def bare_link(
+    scene: Scene, name: str, spatial: frozenset[str] | None = None, mesh: SolidMesh | None = None
+) -> Link:
     """The record of one link that has a shape, without attached bodies.
 
     Parameters
     ----------
     spatial : the beams of the scene that move in space, where that is known already
+    mesh : of a solid link, where it is made already
 
     Raises
     ------
@@ -91,8 +132,8 @@ def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None) ->
     link = scene.links[name]
     material = scene.materials[str(link.material)]
     if link.family == "solid":
-        mesh = link_mesh(name, link, scene.folder, touched(scene, name))
-        return with_chosen_faces(scene, solid_link(name, mesh, material, link_axes(link)))
+        made = mesh or solid_mesh(scene, name)
+        return with_chosen_faces(scene, solid_link(name, made, material, link_axes(link)))
     if link.family == "plane":
         return plane_link(
             name, plane_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)

@@ -1,17 +1,22 @@
-"""Work of libraries in a process of its own: what they write stays there, where they break down or hang is an error."""
+"""Work of libraries in processes of their own: what they write stays there, where they break down or hang is an error."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.file import silent
-from kedfem.processes import LATE, bounded, end_with_parent
+from kedfem.mesh.memory_forecast import memory
+from kedfem.processes import LATE, bounded, end_with_parent, threads
 
 LONGEST = 180  # seconds of processor time after which a part is given up
 READING = 60  # seconds of processor time after which a mesh file is given up
 TRIES = 3  # processes that are tried with a part that cannot be read in time
+AGAIN = 0.05  # seconds between two tries to end what is not wanted any more
 MOST_MEMORY = 6e9  # bytes that the process may hold
 PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
 PART = (
@@ -24,7 +29,33 @@ MESH_FILE = (
 )
 
 T = TypeVar("T")
-_used: set[int] = set()  # the executors whose process has had work before
+
+
+@dataclass(eq=False, slots=True)
+class _Worker:
+    """A process that does one piece of work after the other; `used` once it had some, `ended` at its end."""
+
+    executor: Any
+    used: bool = False
+    ended: bool = False
+
+    @classmethod
+    def waiting(cls) -> "_Worker":
+        """One that waits for work, or a new one."""
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        with suppress(IndexError):
+            return _idle.pop()
+        return cls(ProcessPoolExecutor(max_workers=1, timeout=LONGEST))
+
+    def end(self) -> None:
+        """End the process at once."""
+        self.ended = True
+        self.executor.shutdown(kill_workers=True)
+
+
+_idle: list[_Worker] = []
+_busy: list[_Worker] = []
 
 
 def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
@@ -45,24 +76,22 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
         The process broke down, took longer or more than MOST_MEMORY; or what the function raises.
     """
     from joblib.externals.loky import TimeoutError as LateError
-    from joblib.externals.loky import get_reusable_executor
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     reason = ""
     for tried in range(1, TRIES + 1):
-        executor = get_reusable_executor(max_workers=1, timeout=LONGEST)
-        used = executor.executor_id in _used
-        _used.add(executor.executor_id)
+        worker = _Worker.waiting()
+        used, worker.used = worker.used, True
+        _busy.append(worker)
         try:
-            found: T = executor.submit(limited, str(Path.cwd()), seconds, work, *given).result(
-                timeout=PATIENCE
-            )
+            task = worker.executor.submit(limited, str(Path.cwd()), seconds, work, *given)
+            found: T = task.result(timeout=PATIENCE)
         except LateError:
-            executor.shutdown(kill_workers=True)
+            worker.end()
             reason = f"got none within {PATIENCE} s"
             break
         except MemoryError:
-            executor.shutdown(kill_workers=True)
+            worker.end()
             reason = f"got one for which they need more than {MOST_MEMORY / 1e9:g} GB of memory"
             break
         except TerminatedWorkerError as error:
@@ -74,13 +103,18 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
                 if late
                 else "got one at which they broke down"
             )
-            if not reading and (tried == TRIES - 1 or (late and not used)):
+            unwanted, worker.ended = worker.ended, True
+            if unwanted or (not reading and (tried == TRIES - 1 or (late and not used))):
                 break
-        except Exception:
-            executor.shutdown(kill_workers=True)
+        except BaseException:
+            worker.end()
             raise
         else:
             return found
+        finally:
+            _busy.remove(worker)
+            if not worker.ended:
+                _idle.append(worker)
     wanted, advice = words
     raise MeshError(f"{where}: {wanted}, {reason}; {advice}")
 
@@ -101,3 +135,27 @@ def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) ->
     os.chdir(folder)
     with bounded(seconds, MOST_MEMORY), silent():
         return work(*given)
+
+
+def side_by_side(works: Mapping[str, Callable[[], T]]) -> dict[str, T]:
+    """What functions return that have their work done `apart`: as many at once as there are threads, and memory.
+
+    Raises
+    ------
+    MeshError
+        What the first of them raises, in their order; those that go on are ended.
+    """
+    at_once = min(threads(), max(int(memory() / MOST_MEMORY), 1))
+    if at_once == 1 or len(works) < 2:
+        return {name: work() for name, work in works.items()}
+    with ThreadPoolExecutor(at_once) as pool:
+        tasks = {name: pool.submit(work) for name, work in works.items()}
+        try:
+            return {name: task.result() for name, task in tasks.items()}
+        except BaseException:
+            for task in tasks.values():
+                task.cancel()
+            while wait(tasks.values(), timeout=AGAIN).not_done:  # one may just have begun
+                for worker in (*_busy,):
+                    worker.end()
+            raise

@@ -18,6 +18,11 @@ def memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
 
 
+def least_bytes(unknowns: float, factored: bool = True, plane: bool = False) -> tuple[float, float]:
+    """Bytes of a link's matrices, and of their factor; parameters as of `check_room`."""
+    return LINK_BYTES * unknowns, FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
+
+
 def check_room(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
     """Refuse a link that this machine's memory cannot hold: the least that its matrices and their factor take.
 
@@ -33,8 +38,7 @@ def check_room(where: str, unknowns: float, factored: bool = True, plane: bool =
     MeshError
         With the forecast, and what to change.
     """
-    kept = LINK_BYTES * unknowns
-    factor = FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
+    kept, factor = least_bytes(unknowns, factored, plane)
     if kept + factor > memory():
         raise MeshError(
             f"{where}: must fit in this machine's memory of {memory() / 1e9:.3g} GB, got about {unknowns:,.0f} unknowns, "

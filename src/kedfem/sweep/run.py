@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from kedfem.errors import KedfemError, OutputError, SceneError
-from kedfem.processes import end_with_parent
+from kedfem.processes import BLAS_THREADS, end_with_parent
 from kedfem.results import claimed
 from kedfem.scene import scene_from
 from kedfem.scene.timing import scene_speed
@@ -24,9 +24,7 @@ from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
 from kedfem.sweep.sharing import Ends
 
 AHEAD = 2  # points that wait for each worker, so that none is idle
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
+ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
 
 
 @dataclass(frozen=True, slots=True)

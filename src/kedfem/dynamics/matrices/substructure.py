@@ -35,12 +35,14 @@ class Substructure:
         [λ; μ] = S ([W g; 0] − Cᵀ y),   S = (Cᵀ Ã⁻¹ C − diag(0, 1/κ))⁻¹,   g = y + Ã⁻¹ C [λ; μ].
 
     solve : (n, d) → (n, d), Ã⁻¹
+    solve_many : the same of columns, (dn, k) → (dn, k)
     Y : (dn, q + e) Ã⁻¹ C
     S : (q + e, q + e)
     anchors : (e,) components of the state
     """
 
     solve: Callable[[Nodal], Nodal]
+    solve_many: Callable[[np.ndarray], np.ndarray]
     attachment: Attachment
     Y: Float[np.ndarray, "k c"]
     S: Float[np.ndarray, "c c"]
@@ -72,7 +74,7 @@ def substructure(
     if kappa is not None:
         at = np.arange(len(F) - len(held), len(F))
         F[at, at] -= 1 / kappa
-    return Substructure(solve, attachment, Y, _stiffness(F, len(held)), held)
+    return Substructure(solve, solve_many, attachment, Y, _stiffness(F, len(held)), held)
 
 
 def _stiffness(F: Float[np.ndarray, "c c"], anchored: int) -> Float[np.ndarray, "c c"]:
@@ -109,7 +111,29 @@ def coupled(
     g : per link (n, d), link frame
     forces : per link (q,) λ on the link at its ports, link frame
     """
-    y = [part.solve(r) for part, r in zip(parts, rhs, strict=True)]
+    return _closed(parts, R, [part.solve(r) for part, r in zip(parts, rhs, strict=True)], tie)
+
+
+def coupled_all(
+    parts: Sequence[Substructure], cases: Sequence[tuple[Sequence[Rotation], Sequence[NodalOf], Tie | None]]
+) -> list[list[NodalOf]]:
+    """g of several sets of R, rhs and tie, as of `coupled`: with each link's solves of all sets together."""
+    if not cases:
+        return []
+    answers = [
+        part.solve_many(np.stack([rhs[k].ravel() for _, rhs, _ in cases], axis=1))
+        for k, part in enumerate(parts)
+    ]
+    return [
+        _closed(parts, R, [X[:, k].reshape(r.shape) for X, r in zip(answers, rhs, strict=True)], tie)[0]
+        for k, (R, rhs, tie) in enumerate(cases)
+    ]
+
+
+def _closed(
+    parts: Sequence[Substructure], R: Sequence[Rotation], y: Sequence[NodalOf], tie: Tie | None
+) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
+    """`coupled`, from y = Ã⁻¹ r."""
     v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
     held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
     RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]

@@ -42,10 +42,7 @@ def bases(
     parts : `static_parts` of the model
     only : names of the links that need one; all if not given
     """
-    deflections: list[list[NodalOf]] = [[] for _ in model.links]
-    for instant in moments:
-        for kept, found in zip(deflections, excited(model, parts, instant), strict=True):
-            kept.extend(found)
+    deflections = excited(model, parts, moments)
     return [
         _basis(model, k, part, found) if only is None or model.links[k].name in only else None
         for k, (part, found) in enumerate(zip(parts, deflections, strict=True))

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.matrices.substructure import Substructure, coupled, factored
+from kedfem.dynamics.matrices.substructure import Substructure, coupled_all, factored
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stepping.state import NodalOf
@@ -61,67 +61,94 @@ def static_parts(model: Model) -> list[Substructure]:
 
 
 def excited(
-    model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
+    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int = LANCZOS
 ) -> list[list[NodalOf]]:
-    """Static deflection at an instant, and its shares in the modes of the frozen linkage that it excites; per link."""
-    static = _static(parts, instant)
-    out = [[x] for x in static]
-    if not any(x.any() for x in static):
-        return out
-    vectors, images, T = _lanczos(model, parts, instant, static, levels)
-    _, Z = np.linalg.eigh(T)
-    share = Z.T @ np.array([_dot(M_b, static) for M_b in images])
-    for mode, amount in zip(Z.T, share, strict=True):
-        for kept, *several in zip(out, *vectors, strict=True):
-            kept.append(amount * sum(c * x for c, x in zip(mode, several, strict=True)))
+    """Static deflections at instants, and their shares in the modes of the frozen linkage that they excite; per link."""
+    out: list[list[NodalOf]] = [[] for _ in model.links]
+    for krylov in _krylov(model, parts, instants, levels):
+        for kept, x in zip(out, krylov.static, strict=True):
+            kept.append(x)
+        _, Z = np.linalg.eigh(krylov.T)
+        share = Z.T @ np.array([_dot(M_b, krylov.static) for M_b in krylov.images])
+        for mode, amount in zip(Z.T, share, strict=True):
+            for kept, *several in zip(out, *krylov.vectors, strict=True):
+                kept.append(amount * sum(c * x for c, x in zip(mode, several, strict=True)))
     return out
 
 
 def frozen_frequencies(
-    model: Model, parts: Sequence[Substructure], instant: Instant, levels: int = LANCZOS
-) -> Float[np.ndarray, " f"]:
+    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int = LANCZOS
+) -> list[Float[np.ndarray, " f"]]:
     """Lowest circular frequencies of the linkage standing still, drive held, among modes that its loads excite [rad/s].
 
-    1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less.
+    1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less. None where nothing is loaded.
     """
-    static = _static(parts, instant)
-    if not any(x.any() for x in static):
-        return np.zeros(0)
-    values = np.linalg.eigvalsh(_lanczos(model, parts, instant, static, levels)[2])[::-1]
-    return np.asarray(1 / np.sqrt(values[values > REPEATED * values[0]]))
+    out = []
+    for krylov in _krylov(model, parts, instants, levels):
+        values = np.linalg.eigvalsh(krylov.T)[::-1]
+        out.append(np.asarray(1 / np.sqrt(values[values > REPEATED * values[:1]])))
+    return out
 
 
-def _static(parts: Sequence[Substructure], instant: Instant) -> list[NodalOf]:
-    """The linkage's static deflection under P − M R0'' at an instant, link frames."""
-    R = [now.R for now in instant.at]
-    return _copied(coupled(parts, R, [now.F @ now.R for now in instant.at], instant.tie)[0])
+class _Krylov:
+    """Mass-orthonormal deflections b of a frozen linkage by K⁻¹ M from its static one, M b, and T = Bᵀ M K⁻¹ M B."""
 
+    def __init__(self, model: Model, static: list[NodalOf], levels: int) -> None:
+        self.static = static
+        self.vectors: list[list[NodalOf]] = []
+        self.images: list[list[NodalOf]] = []
+        self._T = np.zeros((levels, levels))
+        self._model, self._next, self._size = model, static, _mass_norm(model, static)[0]
 
-def _lanczos(
-    model: Model, parts: Sequence[Substructure], instant: Instant, start: list[NodalOf], levels: int
-) -> tuple[list[list[NodalOf]], list[list[NodalOf]], Float[np.ndarray, "l l"]]:
-    """Mass-orthonormal deflections b of the linkage by K⁻¹ M from a first one, M b, and T = Bᵀ M K⁻¹ M B."""
-    vectors: list[list[NodalOf]] = []
-    images: list[list[NodalOf]] = []
-    T = np.zeros((levels, levels))
-    x, size = start, _mass_norm(model, start)[0]
-    for level in range(levels):
-        whole = size
+    @property
+    def T(self) -> Float[np.ndarray, "l l"]:
+        """Of as many deflections as there are."""
+        found = len(self.vectors)
+        return self._T[:found, :found]
+
+    def grows(self) -> bool:
+        """Whether there is one more deflection b, the last of `vectors`; its K⁻¹ M b is to be given to `add`."""
+        x, whole = self._next, self._size
         for _ in range(2):
-            for b, M_b in zip(vectors, images, strict=True):
+            for b, M_b in zip(self.vectors, self.images, strict=True):
                 c = _dot(M_b, x)
                 x = [y - c * z for y, z in zip(x, b, strict=True)]
-        size, Mx = _mass_norm(model, x)
+        size, Mx = _mass_norm(self._model, x)
         if size <= REPEATED * whole:
-            break
-        vectors.append([y / size for y in x])
-        images.append([y / size for y in Mx])
-        x = _copied(coupled(parts, [now.R for now in instant.at], images[-1], instant.tie)[0])
-        size = _mass_norm(model, x)[0]
-        for k, M_b in enumerate(images):
-            T[level, k] = T[k, level] = _dot(M_b, x)
-    found = len(vectors)
-    return vectors, images, T[:found, :found]
+            return False
+        self.vectors.append([y / size for y in x])
+        self.images.append([y / size for y in Mx])
+        return True
+
+    def add(self, x: list[NodalOf]) -> None:
+        """The static deflection K⁻¹ M b under the last one's inertia."""
+        self._next, self._size = x, _mass_norm(self._model, x)[0]
+        level = len(self.vectors) - 1
+        for k, M_b in enumerate(self.images):
+            self._T[level, k] = self._T[k, level] = _dot(M_b, x)
+
+
+def _krylov(
+    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int
+) -> list[_Krylov]:
+    """Of the linkage frozen at some instants, from its static deflection under P − M R0'' there, link frames.
+
+    All instants go level by level, so that their solves go together.
+    """
+
+    def answers(instants: Sequence[Instant], loads: Sequence[Sequence[NodalOf]]) -> list[list[NodalOf]]:
+        each = zip(instants, loads, strict=True)
+        return coupled_all(parts, [([now.R for now in at.at], rhs, at.tie) for at, rhs in each])
+
+    loads = [[now.F @ now.R for now in instant.at] for instant in instants]
+    found = [_Krylov(model, static, levels) for static in answers(instants, loads)]
+    growing = [(at, each) for at, each in zip(instants, found, strict=True)]
+    for _ in range(levels):
+        growing = [(at, each) for at, each in growing if each.grows()]
+        new = answers([at for at, _ in growing], [each.images[-1] for _, each in growing])
+        for (_, each), x in zip(growing, new, strict=True):
+            each.add(x)
+    return found
 
 
 def _mass_norm(model: Model, x: Sequence[NodalOf]) -> tuple[float, list[NodalOf]]:
@@ -192,8 +219,3 @@ def orthonormal(
 
 def _dot(a: Sequence[NodalOf], b: Sequence[NodalOf]) -> float:
     return sum(float(np.vdot(x, y)) for x, y in zip(a, b, strict=True))
-
-
-def _copied(vectors: Sequence[NodalOf]) -> list[NodalOf]:
-    """Solutions live in the factor's buffer; these stay."""
-    return [x.copy() for x in vectors]

@@ -9,18 +9,19 @@ from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.interface import static_tie
-from kedfem.dynamics.matrices.substructure import Substructure, coupled
+from kedfem.dynamics.matrices.substructure import Substructure, coupled_all
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.stepping.start import damping_times
 from kedfem.dynamics.stepping.state import NodalOf, Rayleigh
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix
+from kedfem.motion.rigid import RigidMotion
 
 
 def residual_deflections(
-    full: Model, parts: Sequence[Substructure], model: Model, snapshot: Snapshot
-) -> list[NodalOf]:
+    full: Model, parts: Sequence[Substructure], model: Model, snapshots: Sequence[Snapshot]
+) -> list[list[NodalOf]]:
     """Static answers of the linkage to r = P − M R0'' − M δ'' − C δ' − K δ + Wᵀ λ, [KED, eq. (20)], link frames.
 
     Their strain energy is the residual in the norm dual to the energy's.
@@ -29,23 +30,34 @@ def residual_deflections(
     ----------
     full : the model that was reduced
     parts : `static_parts` of it
-    model, snapshot : the reduced model and its state at one time
+    model, snapshots : the reduced model and its states at some times
+
+    Returns
+    -------
+    (n, d) of each link, at each of these times
     """
-    k = snapshot.k
-    motion = snapshot.motion.part(k, k + 1)
+    cases = []
+    for snapshot in snapshots:
+        motion = snapshot.motion.part(snapshot.k, snapshot.k + 1)
+        rows = joint_rows(full.rows, motion)
+        tie = None if rows is None else static_tie(rows, 0)
+        R = [state.R for state in snapshot.states]
+        cases.append((R, _residuals(full, model, motion, snapshot.states), tie))
+    return coupled_all(parts, cases)
+
+
+def _residuals(full: Model, model: Model, motion: RigidMotion, states: Sequence[LinkMoment]) -> list[NodalOf]:
+    """r of each link, at one time."""
     W = cross_matrix(motion.omega[0])
-    forcing = forcings(full, motion)
-    rhs = [
+    out = [
         _residual(link, full.damping, small, state, each.F[0], W[body, : link.d, : link.d])
         for link, small, state, each, body in zip(
-            full.links, model.links, snapshot.states, forcing, full.bodies, strict=True
+            full.links, model.links, states, forcings(full, motion), full.bodies, strict=True
         )
     ]
-    for r, joint, state in zip(rhs, full.joints, snapshot.states, strict=True):
+    for r, joint, state in zip(out, full.joints, states, strict=True):
         add_port_forces(r, joint, state.port_forces)
-    rows = joint_rows(full.rows, motion)
-    tie = None if rows is None else static_tie(rows, 0)
-    return [x.copy() for x in coupled(parts, [state.R for state in snapshot.states], rhs, tie)[0]]
+    return out
 
 
 def _residual(
