@@ -22,6 +22,12 @@ def test_a_random_mechanism_keeps_all_laws(seed: int) -> None:
 
 
 @pytest.mark.long
+def test_kept_tangents_with_which_the_oracle_runs_away_are_assembled_anew() -> None:
+    what, found = outcome(11413, most=6)
+    assert what == "fine", found
+
+
+@pytest.mark.long
 def test_twenty_random_mechanisms_keep_all_laws() -> None:
     """But for a few whose steps do not converge, which say so; 0 and 3 are free bodies on screws."""
     found = [outcome(seed, most=4)[0] for seed in range(20)]

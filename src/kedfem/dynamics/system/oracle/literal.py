@@ -35,6 +35,7 @@ from kedfem.motion.rigid import RigidMotion
 ITERATIONS = 40
 RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
+DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
@@ -147,6 +148,8 @@ class Literal:
             lam += change[self.N + self.k : self.N + self.k + q]
             m[hard] += change[self.N + self.k + q :]
             before, size = size, float(np.abs(change[: self.N]).max())
+            if not size < DIVERGED:
+                break
             slow = slow + 1 if size > SLOW * before else 0
             self.kept = None if slow > patience else self.kept
             if size <= 1e-14 * max(1.0, np.abs(now.u).max()) or (size < 1e-11 and size > 0.5 * before):
