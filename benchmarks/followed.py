@@ -13,7 +13,9 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.stepping.transient import Steps, begun, started, steps_of, transient
+from kedfem.dynamics.stepping.first_state import begun, started
+from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.steps import SystemSteps

@@ -13,7 +13,7 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.nominal import forcings, motions
-from kedfem.dynamics.stepping.transient import steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 

@@ -11,7 +11,8 @@ from benchmarks.pages import script, table, write_page
 from benchmarks.scenes import plate_four_bar
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.results.recording import recording

@@ -12,7 +12,8 @@ from benchmarks.pages import script, table, write_loglog, write_page
 from benchmarks.scenes import bar_four_bar
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.history import LinkMoment
-from kedfem.dynamics.stepping.transient import snapshots, steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.steps import SystemSteps
 

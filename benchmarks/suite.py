@@ -11,7 +11,8 @@ from kedfem.accuracy.histories import worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import Reduction, reduced
 from kedfem.analysis import Clock
-from kedfem.dynamics.stepping.transient import Steps, steps_of, transient
+from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 

@@ -12,8 +12,10 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.nominal import forcings, motions
 from kedfem.dynamics.segment import CONVERGED
+from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.transient import started, steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march, ready
 from kedfem.dynamics.system.sparse import SparsePart

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.start import rest

@@ -9,7 +9,8 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from, time_grid
 

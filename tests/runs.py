@@ -8,7 +8,8 @@ import numpy as np
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import on_segment
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.record import in_space, mass_times
 from kedfem.links.recovery import point_rows
 from kedfem.results.recording import recording

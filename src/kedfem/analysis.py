@@ -24,9 +24,10 @@ from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
+from kedfem.dynamics.stepping.first_state import period_map
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.literal import LiteralSteps
-from kedfem.dynamics.stepping.transient import Steps, eased_warning, period_map
+from kedfem.dynamics.stepping.solvers import Steps, eased_warning
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.errors import SceneError

@@ -18,7 +18,7 @@ from kedfem.dynamics.model import segments, ways
 from kedfem.dynamics.stepping.levels import leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Marks
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import AnimationWriter

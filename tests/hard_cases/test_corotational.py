@@ -9,7 +9,8 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.stability import stability_warning
 from kedfem.analysis import analyse
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SolveError
 from kedfem.links.record import mass_times
 from kedfem.results import read_results

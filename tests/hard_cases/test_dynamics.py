@@ -13,7 +13,8 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import resolution, resolution_warnings
 from kedfem.accuracy.stability import stability_warning
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SolveError
 from kedfem.links.build import bare_link
 from kedfem.mesh import SolidMesh, mesh_quality

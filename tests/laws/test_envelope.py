@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.reduction import prepared
 from kedfem.analysis import Run, analyse
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
 from kedfem.links.singular_stress import re_entrant, reach
 from kedfem.output.array_names import VON_MISES

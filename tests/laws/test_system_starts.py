@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics.stepping.transient import first_states
+from kedfem.dynamics.stepping.first_state import first_states
 from kedfem.dynamics.system.march import displacements, march
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
 from kedfem.dynamics.system.starts.instant import Instant

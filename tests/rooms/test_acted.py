@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording

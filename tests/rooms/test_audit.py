@@ -11,7 +11,8 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.analysis import analyse
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance
 from kedfem.scene import read_scene, scene_from

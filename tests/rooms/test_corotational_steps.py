@@ -9,7 +9,8 @@ import pytest
 import kedfem.dynamics.stepping.transient as runs
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.segment import FREE
-from kedfem.dynamics.stepping.transient import Steps, steps_of, transient
+from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system import layout
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.results.audit import Account

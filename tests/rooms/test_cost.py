@@ -6,7 +6,7 @@ import pytest
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping import cost
-from kedfem.dynamics.stepping.transient import steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.scene import scene_from, time_grid
 from kedfem.stepping import frame_steps, stepped

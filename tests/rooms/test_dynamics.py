@@ -17,7 +17,8 @@ from kedfem.dynamics.matrices.substructure import mass_substructure
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.literal import LiteralSteps
-from kedfem.dynamics.stepping.transient import Steps, snapshots, steps_of
+from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage

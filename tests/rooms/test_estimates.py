@@ -15,7 +15,8 @@ from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.variants import with_steps
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.build import bare_link
 from kedfem.links.indicator import indicator
 from kedfem.links.singular_stress import re_entrant

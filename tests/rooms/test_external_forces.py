@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.loads import amounts, patterns
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SceneError
 from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import linkage

@@ -184,7 +184,7 @@ def test_cuts_between_segments_are_no_surface(kind: str) -> None:
 
 def test_a_run_that_goes_on_finds_the_same_damage(settled: Run, tmp_path: Path) -> None:
     from kedfem.dynamics import nominal
-    from kedfem.dynamics.stepping import transient
+    from kedfem.dynamics.stepping import solvers
 
     scene = scene_from(swung(initial="quasi-static"), tmp_path)
 
@@ -193,7 +193,7 @@ def test_a_run_that_goes_on_finds_the_same_damage(settled: Run, tmp_path: Path) 
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (nominal, transient):
+        for module in (nominal, solvers):
             patch.setattr(module, "POINTS", 16)
         patch.setattr("kedfem.resume.SHARE", 0.0)
         with pytest.raises(KeyboardInterrupt):

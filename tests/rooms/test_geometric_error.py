@@ -11,7 +11,8 @@ from kedfem.accuracy.geometric import GeometricError, axial_forces, geometric_wa
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
 from tests import scenes

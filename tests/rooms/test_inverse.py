@@ -19,7 +19,8 @@ from kedfem.dynamics.inertias import (
 )
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.nominal import motions
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.build import bare_links
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.results.recording import recording, rows

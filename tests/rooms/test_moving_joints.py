@@ -12,7 +12,8 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.first_rows import interface_values
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SceneError
 from kedfem.results.probes import probe_channels
 from kedfem.scene import scene_from

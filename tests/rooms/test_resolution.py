@@ -17,7 +17,8 @@ from kedfem.accuracy.resolution import (
     step_error,
 )
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.scene import scene_from
 from tests import scenes
 from tests.scenes import bar, constant_speed, material

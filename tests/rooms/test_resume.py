@@ -12,7 +12,7 @@ import pytest
 from kedfem.accuracy.histories import Histories, relative_errors
 from kedfem.analysis import Run, analyse
 from kedfem.dynamics import nominal
-from kedfem.dynamics.stepping import transient
+from kedfem.dynamics.stepping import solvers
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
 from kedfem.results import read_results
@@ -23,7 +23,7 @@ from tests.laws.test_levels import linkage
 from tests.scenes import constant_speed, four_bar, material
 
 STEPS = 96  # of an analysis
-LOOPS = {  # as `dynamics.stepping.transient` chooses them, each in one of the ways to begin and to combine levels
+LOOPS = {  # as `dynamics.stepping.solvers` chooses them, each in one of the ways to begin and to combine levels
     "dense": ("rigid-body", {"extrapolation_levels": 1}),
     "dense, two levels": ("rigid-body", {"extrapolation_levels": 2}),
     "system": ("springs", {"extrapolation_levels": 1}),
@@ -74,7 +74,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
 def _states_at_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of few steps, and a state after each, however long that takes."""
     monkeypatch.setattr(nominal, "POINTS", 16)
-    monkeypatch.setattr(transient, "POINTS", 16)
+    monkeypatch.setattr(solvers, "POINTS", 16)
     monkeypatch.setattr("kedfem.resume.SHARE", 0.0)
 
 
@@ -129,9 +129,9 @@ import sys
 from pathlib import Path
 from kedfem.analysis import analyse
 from kedfem.dynamics import nominal
-from kedfem.dynamics.stepping import transient
+from kedfem.dynamics.stepping import solvers
 from tests.rooms.test_resume import turning
-nominal.POINTS = transient.POINTS = 16
+nominal.POINTS = solvers.POINTS = 16
 run = analyse(turning(Path(sys.argv[1]), frames=sys.argv[2], extrapolation_levels=2), resumes=True)
 print(max(run.step.errors.values()))
 """

@@ -18,7 +18,8 @@ from kedfem.dynamics.model import Model, restored_model, segments, stored_model
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.nominal import instants
-from kedfem.dynamics.stepping.transient import snapshots, steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery

@@ -8,7 +8,7 @@ import pytest
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.loads import coarse_steps
-from kedfem.dynamics.stepping import transient
+from kedfem.dynamics.stepping import solvers, transient
 from kedfem.dynamics.stepping.transient import _finite
 from kedfem.dynamics.system import layout
 from kedfem.errors import SceneError, SolveError
@@ -60,11 +60,10 @@ def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> N
     ready = meshed(scene_from(raw))
 
     def eased() -> int:
-        steps = transient.steps_of(ready.scene, ready.model)
+        steps = solvers.steps_of(ready.scene, ready.model)
         list(transient.transient(ready.scene, ready.linkage, ready.path, ready.model, steps))
         assert (
-            transient.eased_warning([steps]) == ()
-            or "the iterations of" in transient.eased_warning([steps])[0]
+            solvers.eased_warning([steps]) == () or "the iterations of" in solvers.eased_warning([steps])[0]
         )
         return int(steps.eased)  # type: ignore[union-attr]
 

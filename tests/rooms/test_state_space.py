@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import meshed, moving
 from kedfem.dynamics.model import elastic_model
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import OutputError, SceneError
 from kedfem.export import StateSpace, read_state_space, state_space, write_state_space
 from kedfem.frequencies import Wanted, frequencies

@@ -14,9 +14,11 @@ from kedfem.dynamics import stiffening
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.transient import started, steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.steps import SystemSteps

@@ -10,7 +10,8 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.transient import Steps, steps_of, transient
+from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import SystemSteps, nominal_system
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording

@@ -6,7 +6,8 @@ from scipy.sparse.linalg import spsolve
 
 from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.stepping.transient import snapshots, steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.record import Link
 from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import face_seat

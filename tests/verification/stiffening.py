@@ -9,7 +9,8 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_axis import straight_axis
 from kedfem.links.beams.section import Section, rectangle, tube

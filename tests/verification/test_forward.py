@@ -7,7 +7,8 @@ import pytest
 from scipy.special import ellipk
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from

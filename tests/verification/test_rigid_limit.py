@@ -9,7 +9,8 @@ import pytest
 from benchmarks.scenes import mechanisms
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.stepping.transient import steps_of, transient
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
 

@@ -30,7 +30,7 @@ from kedfem.accuracy.variants import refined, with_analysis, with_links
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model, elastic_model
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
 from kedfem.links.record import Link

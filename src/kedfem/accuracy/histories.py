@@ -12,7 +12,7 @@ from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.period.map import Carried, carried
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.results import Channel

@@ -24,7 +24,7 @@ from kedfem.accuracy.error_budget import Share
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.sparse import Part, SparsePart, momentum

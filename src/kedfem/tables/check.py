@@ -16,7 +16,7 @@ from kedfem.accuracy.singular import SingularPasses
 from kedfem.dynamics.force_elements import actions
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
-from kedfem.dynamics.stepping.transient import Steps
+from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.initial import initial_twists

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.transient import Steps, block_length
+from kedfem.dynamics.stepping.solvers import Steps, block_length
 from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 

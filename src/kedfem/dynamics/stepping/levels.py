@@ -25,10 +25,12 @@ from jaxtyping import Float
 from kedfem.dynamics.history import Block, exerted_together, joined
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.combined import Combination, level_weights
+from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Mark, Marks
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.stepping.transient import Steps, block_length, started, steps_of, transient
+from kedfem.dynamics.stepping.solvers import Steps, block_length, steps_of
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.errors import SolveError
 from kedfem.mesh.memory_forecast import memory

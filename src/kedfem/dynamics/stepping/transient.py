@@ -1,6 +1,6 @@
 """The elastic motion step by step: M δ'' + C δ' + K δ = P − M R0'', [KED, eq. (20)]."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -8,67 +8,28 @@ import numpy as np
 
 from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
-from kedfem.dynamics.joints.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.modes.coarse import coarse_model
-from kedfem.dynamics.nominal import POINTS, forcings, instants, motions, rows_at_start
-from kedfem.dynamics.segment import CONVERGED, FREE
+from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.stepping.first_state import Start, begun, motion_of, started
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Mark
-from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.start import Deflected, initial_rates, initial_states, quasi_static
-from kedfem.dynamics.stepping.state import LinkState
-from kedfem.dynamics.stiffening import Stiffening, stiffening
+from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length
 from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
-from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, Motion
-from kedfem.dynamics.system.period.map import PeriodMap
-from kedfem.dynamics.system.period.search import periodic, residual_of
+from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
+from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.start import from_links
-from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, corotational, path_parameter, time_grid, without_vibration
+from kedfem.scene import Scene, path_parameter, time_grid, without_vibration
 
-BLOCK_BYTES = 64_000_000
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
-
-ByLink = LiteralSteps | SystemSteps
-Steps = ByLink | CorotationalSteps
-Start = list[LinkState] | State
 STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
-
-
-def steps_of(scene: Scene, model: Model) -> Steps:
-    """The solver that the scene asks for, its matrices factored.
-
-    Raises
-    ------
-    SolveError
-        If an effective matrix is not positive definite.
-    MeshError
-        If a force element finds no coupling surface on its link that tells how it turns.
-    """
-    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    if corotational(scene):
-        return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
-    literal = scene.analysis.solver == "monolithic"
-    stresses = stiffening(model) if scene.analysis.stiffening else None
-    elements = scene.springs or scene.motors or scene.limits
-    if elements or scene.analysis.initial_deflection or _dampers_count(model) or not literal:
-        return SystemSteps(scene, nominal_system(scene, model, stresses), model, scheme, literal)
-    return LiteralSteps(model.links, model.joints, scheme, model.damping, stresses)
-
-
-def _dampers_count(model: Model) -> bool:
-    """Whether quasi-static starts feel dampers of bushings: beside rigid cross-section nodes they would lose digits."""
-    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
-    return not hubs and any(row.damping.any() for row in model.rows)
 
 
 def transient(
@@ -104,7 +65,7 @@ def transient(
         state = begun(scene, linkage, along, model, solver, states)
     length = block_length(model)
 
-    motion_at = _motion(scene, linkage, along)
+    motion_at = motion_of(scene, linkage, along)
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
@@ -135,7 +96,7 @@ def _corotational(
 ) -> Iterator[Block]:
     """All time points of a system with co-rotational frames; see `transient`."""
 
-    motion_at = _motion(scene, linkage, along)
+    motion_at = motion_of(scene, linkage, along)
     state, since, length = mark.state, mark.step, block_length(model)
     if state is None:
         begins = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
@@ -169,7 +130,7 @@ def _positions(
     """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
     if isinstance(solver, LiteralSteps):
         raise ValueError("a balance must be that of a system, got the monolithic solver's")
-    grid, motion_at, of, state = time_grid(scene), _motion(scene, linkage, along), solver.ready, mark.state
+    grid, motion_at, of, state = time_grid(scene), motion_of(scene, linkage, along), solver.ready, mark.state
     shared = Instant(of, motion_at, 0.0)
     for k in range(mark.step, grid.steps + 1):
         mark.set(k, state, solver)
@@ -207,93 +168,12 @@ def _unbalanced(scene: Scene, motion: RigidMotion) -> str:
     )
 
 
-def _motion(scene: Scene, linkage: Linkage, along: Path) -> Motion:
-    """The rigid-body motion at given times."""
-    return lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t))
-
-
-def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
-    """How the elastic motion begins: at rest, quasi-static, or with the steady state of the solver's own steps.
-
-    Raises
-    ------
-    SolveError
-        If no quasi-static deflection is found, or no steady state.
-    """
-    start = _begun(scene, linkage, along, model, solver)
-    if scene.analysis.kind != "steady":
-        return start
-    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
-        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
-
-    over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
-    small = coarse_map(scene, linkage, along, model) if over.linear else None
-    solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed, small)
-    if isinstance(solver, SystemSteps):
-        solver.over = over
-    return solver.steady.state
-
-
 def _marched(solver: Steps, last: Any) -> None:
     """What a period leaves of a steady state, from the state with which the recorded one ends."""
     if isinstance(solver, SystemSteps) and solver.steady is not None and solver.over is not None:
         over, steady = solver.over, solver.steady
         left = residual_of(over, over.vector(steady.state), over.vector(last), steady.scale)
         solver.steady = replace(steady, residual=max(left, steady.residual))
-
-
-def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> PeriodMap | None:
-    """The map of the steps of the model with its large links reduced; None if it has none."""
-    small = coarse_model(scene, linkage, along, model)
-    if small is None:
-        return None
-    solver = steps_of(scene, small)
-    start = _begun(scene, linkage, along, small, solver)
-    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
-        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
-    return period_map(scene, linkage, along, small, solver, start)
-
-
-def period_map(
-    scene: Scene,
-    linkage: Linkage,
-    along: Path,
-    model: Model,
-    solver: SystemSteps | CorotationalSteps,
-    start: State,
-) -> PeriodMap:
-    """The map of a solver's steps over the period of a steady motion."""
-    motion_at = _motion(scene, linkage, along)
-    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
-
-
-def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
-    """As `started`, of a motion that begins as it is told to; of a steady one the search for it begins there."""
-    motion_at = _motion(scene, linkage, along)
-    if isinstance(solver, CorotationalSteps):
-        return solver.begin(motion_at)
-    if not isinstance(solver, SystemSteps):
-        return first_states(scene, linkage, along, model, solver.stiffening)
-    at_rest = scene.analysis.initial == "rest"
-    pulled = scene.springs or scene.motors or scene.limits
-    plain = (solver.ready.c.single and not pulled) or solver.stiffening is not None
-    damped = _dampers_count(model)
-    # nodal rows lose digits of links a million times as stiff as others
-    stiff = bool(model.rows) and any(link.rigid for link in model.links) and solver.stiffening is None
-    if plain and (at_rest or not (damped or stiff)) and not scene.analysis.initial_deflection:
-        states = first_states(scene, linkage, along, model, solver.stiffening)
-        return from_links(Instant(solver.ready, motion_at, 0.0), states)
-    return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])
-
-
-def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByLink, states: Start) -> Any:
-    """A solver's state at the first time point."""
-    if isinstance(states, State) or isinstance(solver, SystemSteps):
-        return states
-    if not model.rows:
-        return solver.begin(states)
-    rows = rows_at_start(scene, linkage, along, model)
-    return solver.begin(states, None if rows is None else rows.state(model.joints, states))
 
 
 def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
@@ -323,53 +203,10 @@ def _finer(model: Model, failed: ConvergenceError) -> str:
     return "give it more elements or segments" + needed * (failed.moves in beams)
 
 
-def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
-    """A warning where iterations of steps were taken as converged at an eased tolerance."""
-    eased = sum(each.eased for each in solvers if isinstance(each, CorotationalSteps))
-    if not eased:
-        return ()
-    return (
-        f"the iterations of {eased} steps with co-rotational frames converged to a hundred times the tolerance only "
-        "(stiff springs or hubs): take a smaller step to see whether results change",
-    )
-
-
 def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
     """All time points of `transient`, one by one."""
     for block in transient(scene, linkage, along, model, solver):
         yield from (block.at(k) for k in range(len(block)))
-
-
-def block_length(model: Model) -> int:
-    """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
-    return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
-
-
-def first_states(
-    scene: Scene, linkage: Linkage, along: Path, model: Model,
-    stresses: Stiffening | None = None,
-) -> list[LinkState]:  # fmt: skip
-    """States at t = 0: at rest, or quasi-static with its rate, of fourth order, from five instants."""
-    at_rest = scene.analysis.initial == "rest"
-    grid = time_grid(scene)
-    h = min(grid.step, grid.end / (INSTANTS - 1))
-    t = h * np.arange(1 if at_rest else INSTANTS)
-    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    moments = instants(model, motion, stresses)
-    if at_rest:
-        start = [Deflected(0 * v, v, 0 * v) for v in initial_rates(scene, linkage, model)]
-        rows = rows_at_start(scene, linkage, along, model)
-        return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
-    u = quasi_static(model.links, model.joints, moments)
-    g = [[x @ now.R for x, now in zip(us, each.at, strict=True)] for us, each in zip(u, moments, strict=True)]
-    rates = ([np.tensordot(FIRST, each, 1) / h for each in zip(*x, strict=True)] for x in (u, g))
-    start = [Deflected(*x) for x in zip(u[0], *rates, strict=True)]
-    if moments[0].turnings is not None:
-        start = [
-            replace(x, stressed=k(now)) for x, k, now in zip(start, moments[0].turnings, g[0], strict=True)
-        ]
-    rows = rows_at_start(scene, linkage, along, model)
-    return initial_states(model.links, model.joints, moments[0].at, model.damping, start, rows)
 
 
 def _finite(block: Block) -> Iterator[Block]:

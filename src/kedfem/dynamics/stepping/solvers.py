@@ -1,0 +1,61 @@
+"""The solver of a scene: which one marches its steps, and how many time points it keeps together."""
+
+from collections.abc import Sequence
+
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.nominal import POINTS
+from kedfem.dynamics.segment import CONVERGED, FREE
+from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stiffening import stiffening
+from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.scene import Scene, corotational, time_grid
+
+BLOCK_BYTES = 64_000_000
+
+ByLink = LiteralSteps | SystemSteps
+Steps = ByLink | CorotationalSteps
+
+
+def steps_of(scene: Scene, model: Model) -> Steps:
+    """The solver that the scene asks for, its matrices factored.
+
+    Raises
+    ------
+    SolveError
+        If an effective matrix is not positive definite.
+    MeshError
+        If a force element finds no coupling surface on its link that tells how it turns.
+    """
+    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
+    if corotational(scene):
+        return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
+    literal = scene.analysis.solver == "monolithic"
+    stresses = stiffening(model) if scene.analysis.stiffening else None
+    elements = scene.springs or scene.motors or scene.limits
+    if elements or scene.analysis.initial_deflection or dampers_count(model) or not literal:
+        return SystemSteps(scene, nominal_system(scene, model, stresses), model, scheme, literal)
+    return LiteralSteps(model.links, model.joints, scheme, model.damping, stresses)
+
+
+def dampers_count(model: Model) -> bool:
+    """Whether quasi-static starts feel dampers of bushings: beside rigid cross-section nodes they would lose digits."""
+    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
+    return not hubs and any(row.damping.any() for row in model.rows)
+
+
+def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
+    """A warning where iterations of steps were taken as converged at an eased tolerance."""
+    eased = sum(each.eased for each in solvers if isinstance(each, CorotationalSteps))
+    if not eased:
+        return ()
+    return (
+        f"the iterations of {eased} steps with co-rotational frames converged to a hundred times the tolerance only "
+        "(stiff springs or hubs): take a smaller step to see whether results change",
+    )
+
+
+def block_length(model: Model) -> int:
+    """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
+    return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))
