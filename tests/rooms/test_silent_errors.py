@@ -68,7 +68,7 @@ def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> N
         return int(steps.eased)  # type: ignore[union-attr]
 
     assert eased() == 0
-    monkeypatch.setattr(transient, "CONVERGED", 1e-12)
+    monkeypatch.setattr(solvers, "CONVERGED", 1e-12)
     monkeypatch.setattr(layout, "SMALLEST", 0.0)
     assert eased() > 0
 
