@@ -3,15 +3,18 @@
 from collections.abc import Mapping
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.errors import SceneError
-from kedfem.links.bodies import with_body
+from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_seat
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid, without_vibration
 
+LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
+COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
 # ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
 # fail
@@ -36,7 +39,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
     elastic = [link for key, link in links.items() if key not in made]
     out, soft = dict(links), _mounts(scene)
     for key in made:
-        link = _thickened(links[key]) if thicken else links[key]
+        link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
@@ -55,6 +58,25 @@ def _thickened(link: Link) -> Link:
     return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
 
 
+def _spread(link: Link) -> Link:
+    """A planar beam that is light beside a body on it, with half of the body's inertia spread over its line.
+
+    Its own modes are made as stiff as they are heavy: with next to no mass of its own it would give.
+    """
+    if link.kind != "beam":
+        return link
+    turning = float(link.one @ (link.mass[2] @ link.one))
+    P = rigid_functions(link)
+    P[:, 1:] -= np.outer(
+        link.one, link.one @ np.asarray(link.mass[0] @ P[:, 1:]) / (link.one @ link.m1[:, 0])
+    )
+    if float(np.einsum("nk,nk->", P[:, 1:], np.asarray(link.mass[0] @ P[:, 1:]))) > LIGHT * turning:
+        return link
+    Y = np.linalg.pinv(P)[1:]
+    xy = sp.csr_array(link.mass[0] + turning / (2 * len(Y)) * (Y.T @ Y))
+    return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] / 2)))
+
+
 def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
     """Of its mass about the centre, the least first [kg m²]."""
     F = rigid_functions(link)
@@ -63,14 +85,22 @@ def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
 
 
 def _with_extent(link: Link) -> None:
-    """Refuse a rigid link whose mass has no extent along one of its directions: nothing tells its functions along it.
+    """Refuse a rigid link whose mass has no extent along one of its directions, or nearly none at all.
+
+    Nothing tells its functions along it; and as it is made as stiff as it is heavy, its joints would give.
 
     Raises
     ------
     SceneError
-        If the least second moment of its mass about the centre is nothing beside the largest.
+        If the least second moment of its mass about the centre is nothing beside the largest, or the largest beside its
+        length.
     """
     second = _second_moments(link)
+    if second[-1] < COMPACT * float(link.m1[:, 0] @ link.one) * reach(link) ** 2:
+        raise SceneError(
+            f"links.{link.name}: a rigid link must have mass in more than one place, got nearly all of it in one (a point "
+            "mass on a link of next to no mass): give the link a denser material, or the body some inertia"
+        )
     if second[0] < LAMINA * second[-1]:
         raise SceneError(
             f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "

@@ -64,7 +64,7 @@ def with_body(
     gamma[1:, 1:] = G
     W4 = sp.csr_array(seat.fit)
     m = sp.csr_array(link.mass[0] + W4.T @ sp.csr_array(gamma) @ W4)
-    return _with_mass(link, (m,) * link.d)
+    return with_mass(link, (m,) * link.d)
 
 
 def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -> Link:
@@ -72,17 +72,18 @@ def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -
     w = sp.csr_array(weights[None, :])
     lump = sp.csr_array(mass * (w.T @ w))
     m = sp.csr_array(link.mass[0] + lump)
-    return _with_mass(link, (m, m, link.mass[2]) if link.kind == "beam" else (m,) * link.d)
+    return with_mass(link, (m, m, link.mass[2]) if link.kind == "beam" else (m,) * link.d)
 
 
 def _with_node_body(link: Link, seat: CouplingSurface, mass: float, inertia: float) -> Link:
     w = sp.csr_array(seat.fit[:1])
     lump = sp.csr_array(w.T @ w)
     xy = sp.csr_array(link.mass[0] + mass * lump)
-    return _with_mass(link, (xy, xy, sp.csr_array(link.mass[2] + inertia * lump)))
+    return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] + inertia * lump)))
 
 
-def _with_mass(link: Link, mass: Mass) -> Link:
+def with_mass(link: Link, mass: Mass) -> Link:
+    """A link with another mass, one matrix for each component."""
     m1, mX = mass_constants(mass, link.one, link.X * [1, 1, 0 if link.planar else 1])
     read_only(m1, mX)
     return replace(link, mass=mass, m1=m1, mX=mX)

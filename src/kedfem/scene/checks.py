@@ -74,6 +74,10 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
     slides = slides or link.name in moving_grounds_of(parts)
+    if link.has("inertia") or link.has(
+        "centre"
+    ):  # a rigid body by numbers, with a fault that its record tells
+        return
     if link.has("shape"):
         if not link.has("material"):
             yield link.fault("material", "is required for a rigid link with a shape, got nothing")
@@ -84,7 +88,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
         if not slides and not sketched.get():
             wanted = (
                 "is required for a rigid link that is neither a slider (a prismatic joint to the ground) nor a "
-                "moving part of the ground (held by a driven joint alone)"
+                "moving part of the ground (held by a driven joint alone); or give its mass, centre and inertia"
             )
             yield link.fault("shape", f"{wanted}, got nothing")
         if sketched.get() and not rides and link.record is not None and link.record.mass:

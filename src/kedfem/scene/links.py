@@ -10,12 +10,13 @@ from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_valida
 
 from kedfem.errors import SceneError
 from kedfem.scene.apart import Apart, JointPoint, apart
-from kedfem.scene.base import FileName, Record, refuse
+from kedfem.scene.base import Fault, FileName, Record, refuse
 from kedfem.scene.bushings import Bushing
 from kedfem.scene.faces import ChosenFace, Faces
 from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
-from kedfem.scene.points import XYZ, Axis
+from kedfem.scene.inertia import Inertia, impossible
+from kedfem.scene.points import XYZ, Axis, Point
 from kedfem.scene.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
 from kedfem.scene.wording import shown, unknown_name
@@ -95,12 +96,17 @@ class LinkScene(Record):
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
-    """its shape; not for a rigid slider or a moving part of the ground"""
+    """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""
     step: FileName | None = None
     """a CAD file (STEP, IGES or BREP): short for `shape = { kind = "cad", file = … }`"""
     mass: Mass = 0.0
-    """mass of a rigid link without a shape: a slider, or a part of the ground that drives alone move (no other joint
-    holds it), which these bear"""
+    """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
+    that drives alone move (no other joint holds it), which these bear"""
+    centre: Point | None = None
+    """of a rigid link given by mass, centre and inertia instead of a shape: its centre in the reference position"""
+    inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia] | None = None
+    """of the same: tensor about its centre in the reference position: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm
+    and so on"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Element | None = None
@@ -129,10 +135,37 @@ class LinkScene(Record):
     def _defaults(self) -> Self:
         if self.step is not None and not (isinstance(self.shape, Cad) and self.shape.file == self.step):
             refuse([(("step",), "cannot be combined with shape, got both")])
+        refuse(self._body_faults())
         if self.fidelity == "reduced":
             self.fill(fidelity=self.family, reduced=True)
         element = self.element or self._usual_element()
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
+
+    def _body_faults(self) -> list[Fault]:
+        """What is wrong with a link given by mass, centre and inertia."""
+        if self.centre is None and self.inertia is None:
+            return []
+        if self.fidelity != "rigid":
+            keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
+            return [
+                ((key,), f"must be given for a rigid link only, got fidelity {self.fidelity!r}")
+                for key in keys
+            ]
+        present = [key for key in ("shape", "material") if getattr(self, key) is not None]
+        if present:
+            together = " and ".join(present)
+            return [((present[0],), f"cannot be combined with centre and inertia, got {together}")]
+        lacking = [
+            ((key,), f"is required for a rigid link given by mass, centre and inertia [{unit}], got {got}")
+            for key, unit, got in (
+                ("mass", "kg", "0"),
+                ("centre", "m", "nothing"),
+                ("inertia", "kg*m^2", "nothing"),
+            )
+            if not getattr(self, key)
+        ]
+        wrong = impossible(self.inertia) if self.inertia is not None else ""
+        return [*lacking, *([(("inertia",), wrong)] if wrong else [])]
 
     def _usual_element(self) -> str | None:
         """Of a part from CAD, which may be curved all over, the one whose geometry is as rich as can be."""

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Fault, FileName, Record, refuse
 from kedfem.scene.drives import table_faults
+from kedfem.scene.inertia import Inertia, impossible
 from kedfem.scene.points import Point, as_vector
 from kedfem.scene.units import Mass, Number, Pressure, Quantity, Time
 
@@ -20,7 +20,6 @@ ForcePerVolume = Annotated[float, Quantity("N/m^3")]
 Abscissa = Annotated[Any, Field()]
 """A place in a table: its unit depends on what the table is over."""
 Torque = Annotated[float, Quantity("N*m")]
-Inertia = Annotated[float, Quantity("kg*m^2")]
 PositiveInertia = Annotated[float, Quantity("kg*m^2", above=0.0)]
 ForceVector = Annotated[tuple[Force, Force, Force], BeforeValidator(as_vector)]
 TorqueVector = Annotated[tuple[Torque, Torque, Torque], BeforeValidator(as_vector)]
@@ -254,20 +253,9 @@ class RigidBody(Record):
 
     @model_validator(mode="after")
     def _possible_inertia(self) -> Self:
-        a, b, c = np.linalg.eigvalsh(inertia_tensor(self.inertia))
-        wrong = a < -1e-9 * abs(c) or c > (a + b) * (1.0 + 1e-9)
-        message = (
-            "must have principal moments that are positive, none larger than the sum of the others [kg*m^2], "
-            f"got {a:.6g}, {b:.6g} and {c:.6g}"
-        )
-        refuse([(("inertia",), message)] if wrong else [])
+        wrong = impossible(self.inertia)
+        refuse([(("inertia",), wrong)] if wrong else [])
         return self
 
 
 Body = Annotated[Flywheel | PointMass | RigidBody, Field(discriminator="kind")]
-
-
-def inertia_tensor(inertia: tuple[float, ...]) -> np.ndarray:
-    """The (3, 3) tensor [kg m²] of Ixx, Iyy, Izz, Ixy, Iyz, Izx."""
-    xx, yy, zz, xy, yz, zx = inertia
-    return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])

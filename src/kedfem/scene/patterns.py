@@ -174,7 +174,11 @@ class _Copy:
                 )
             if raw.get("kind") == "revolute" and "axis" not in raw and tilted:
                 made = {**made, "axis": self.R[:, 2].tolist()}
-        if section == "bodies" and raw.get("kind") == "rigid_body" and isinstance(raw.get("inertia"), list):
+        if (
+            section in {"bodies", "links"}
+            and isinstance(raw.get("inertia"), list)
+            and len(raw["inertia"]) == 6
+        ):
             xx, yy, zz, xy, yz, zx = (INERTIA.number(x) for x in raw["inertia"])
             J = self.R @ np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]) @ self.R.T
             made = {**made, "inertia": J[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]].tolist()}

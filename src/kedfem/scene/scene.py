@@ -45,6 +45,7 @@ from kedfem.scene.patterns import Pattern, in_patterns, steep_faults, with_patte
 from kedfem.scene.placing import Placement
 from kedfem.scene.planes import beam_faults
 from kedfem.scene.points import UNPLACED, XYZ, AccelerationVector, Point, known_points
+from kedfem.scene.rigid_links import with_rigid_bodies
 from kedfem.scene.springs import Spring
 from kedfem.scene.stops import Limit
 from kedfem.scene.timing import time_grid
@@ -197,6 +198,7 @@ class Scene(Record):
         if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
             faults.append("joints: is required with a drive, got nothing")
         with known_points(placement):
+            raw = with_rigid_bodies(raw)
             try:
                 scene = handler(prepared(raw, points))
             except ValidationError as error:
