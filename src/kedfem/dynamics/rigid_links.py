@@ -98,8 +98,8 @@ def _with_extent(link: Link) -> None:
     second = _second_moments(link)
     if second[-1] < COMPACT * float(link.m1[:, 0] @ link.one) * reach(link) ** 2:
         raise SceneError(
-            f"links.{link.name}: a rigid link must have mass in more than one place, got nearly all of it in one (a point "
-            "mass on a link of next to no mass): give the link a denser material, or the body some inertia"
+            f"links.{link.name}: a rigid link must have mass in more than one place, got nearly all of it in one (a "
+            "point mass on a link of next to no mass): give the link a denser material, or the body some inertia"
         )
     if second[0] < LAMINA * second[-1]:
         raise SceneError(
