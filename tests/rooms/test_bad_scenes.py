@@ -275,8 +275,8 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
-        "links.rocker.colour: unknown key, known: fidelity, reduced, modes, material, shape, step, mass, mesh, "
-        "element, min_quality, shear_coefficient, beam, frames, segments",
+        "links.rocker.colour: unknown key, known: fidelity, reduced, modes, material, shape, step, mass, centre, "
+        "inertia, mesh, element, min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
         "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
         "of 0.164575",
