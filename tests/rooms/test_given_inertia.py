@@ -277,3 +277,19 @@ def test_a_pattern_turns_their_inertia() -> None:
 def test_what_is_lacking_or_impossible_is_told(given: dict[str, Any], told: str) -> None:
     with pytest.raises(SceneError, match=told):
         scene_from(pendulum(np.eye(3), **given))
+
+
+@pytest.mark.parametrize(
+    ("section", "told"),
+    [
+        ({"joints": {"H": {"kind": "revolute", "links": 5, "at": [0, 0]}}}, r"joints\.H\.links: "),
+        ({"joints": {"H": {"kind": "revolute", "links": ["ground", "p"], "at": "Q"}}}, r"joints\.H\.at: "),
+        ({"springs": {"s": {"kind": "spring", "between": 7, "stiffness": 1}}}, r"springs\.s\.between: "),
+        ({"bodies": 3}, r"bodies: must be a table"),
+        ({"points": {"C": {"from": "D", "distance": 1, "angle": 0}}}, r"points\.C\.from: must .* 'D'"),
+    ],
+)
+def test_faults_around_them_are_told_in_words(section: dict[str, Any], told: str) -> None:
+    centre = {"centre": "C"} if "points" in section else {}
+    with pytest.raises(SceneError, match=told):
+        scene_from(pendulum(np.eye(3), **centre) | section)

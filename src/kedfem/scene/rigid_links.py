@@ -15,7 +15,7 @@ from kedfem.scene.apart import Apart, JointPoint
 from kedfem.scene.base import plain
 from kedfem.scene.inertia import impossible, inertia_tensor
 from kedfem.scene.loads import RigidBody
-from kedfem.scene.points import XYZ, Point
+from kedfem.scene.points import XYZ
 
 LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)
 SLENDER = 0.05  # of the line's extent: its width
@@ -24,7 +24,6 @@ NOTHING = 1e-9  # of the extent: points that near are one
 
 Tables = dict[str, Any]
 _JOINT_POINT: TypeAdapter[XYZ] = TypeAdapter(JointPoint)
-_POINT: TypeAdapter[XYZ] = TypeAdapter(Point)
 
 
 def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
@@ -49,7 +48,8 @@ def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
             })  # fmt: skip
         except (KeyError, ValidationError):
             continue
-        _carry(out, str(name), body)
+        if all(map(math.isfinite, body.centre)):  # else the point that it names has a fault
+            _carry(out, str(name), body)
     return out
 
 
@@ -109,20 +109,21 @@ def _steiner(d: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 
 def _held(raw: Mapping[str, Any], name: str) -> Iterator[XYZ]:
     """Where joints and springs hold a link, as far as they are good."""
-    for joint in _tables(raw.get("joints")):
-        if name in (joint.get("links") or ()):
-            try:
-                at = _JOINT_POINT.validate_python(joint.get("at"))
-            except ValidationError:
-                continue
-            yield at.points.get(name, at) if isinstance(at, Apart) else at
-    for spring in _tables(raw.get("springs")):
-        for end in spring.get("between") or ():
-            if isinstance(end, Mapping) and end.get("link") == name:
-                try:
-                    yield _POINT.validate_python(end.get("at"))
-                except ValidationError:
-                    continue
+    joints = [x.get("at") for x in _tables(raw.get("joints")) if name in _list(x.get("links"))]
+    ends = [x for spring in _tables(raw.get("springs")) for x in _list(spring.get("between"))]
+    springs = [x.get("at") for x in ends if isinstance(x, Mapping) and x.get("link") == name]
+    for at in (*joints, *springs):
+        try:
+            found = _JOINT_POINT.validate_python(at)
+        except ValidationError:
+            continue
+        point = found.points.get(name, found) if isinstance(found, Apart) else found
+        if all(map(math.isfinite, point)):
+            yield point
+
+
+def _list(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else []
 
 
 def _tables(section: Any) -> list[Mapping[str, Any]]:
