@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import kedfem.dynamics.stepping.transient as runs
+import kedfem.dynamics.stepping.solvers as runs
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.segment import FREE
 from kedfem.dynamics.stepping.solvers import Steps, steps_of

@@ -59,7 +59,7 @@ def _thickened(link: Link) -> Link:
 
 
 def _spread(link: Link) -> Link:
-    """A planar beam that is light beside a body on it, with half of the body's inertia spread over its line.
+    """A planar beam that is light beside a body on it, with part of the body's inertia spread over its line.
 
     Its own modes are made as stiff as they are heavy: with next to no mass of its own it would give.
     """
@@ -73,8 +73,9 @@ def _spread(link: Link) -> Link:
     if float(np.einsum("nk,nk->", P[:, 1:], np.asarray(link.mass[0] @ P[:, 1:]))) > LIGHT * turning:
         return link
     Y = np.linalg.pinv(P)[1:]
-    xy = sp.csr_array(link.mass[0] + turning / (2 * len(Y)) * (Y.T @ Y))
-    return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] / 2)))
+    share = min(turning / 2, float(link.one @ link.m1[:, 0]) * reach(link) ** 2 / 12)
+    xy = sp.csr_array(link.mass[0] + share / len(Y) * (Y.T @ Y))
+    return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] * (1 - share / turning))))
 
 
 def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
