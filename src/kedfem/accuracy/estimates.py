@@ -240,15 +240,10 @@ def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> d
 def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
     """Of a scene with both beams and meshed links: each by itself, added up."""
     soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
-    kept = {link.name: link for link in small.model.links if link.meshed and link.fit is None}
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft
-    from kedfem.links.build import bare_links
-
-    bare = bare_links(finer)
-    whole = first_reduced(
-        replace(small, scene=finer, model=elastic_model(finer, small.linkage, bare, small.path)), FUNCTIONS
-    ) if kept else small  # fmt: skip
+    model = elastic_model(finer, small.linkage, along=small.path)
+    whole = first_reduced(replace(small, scene=finer, model=model), FUNCTIONS)
     other = relative_errors(base, histories(whole))
     return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
 

@@ -66,13 +66,9 @@ def _spread(link: Link) -> Link:
     if link.kind != "beam":
         return link
     turning = float(link.one @ (link.mass[2] @ link.one))
-    P = rigid_functions(link)
-    P[:, 1:] -= np.outer(
-        link.one, link.one @ np.asarray(link.mass[0] @ P[:, 1:]) / (link.one @ link.m1[:, 0])
-    )
-    if float(np.einsum("nk,nk->", P[:, 1:], np.asarray(link.mass[0] @ P[:, 1:]))) > LIGHT * turning:
+    if _second_moments(link).sum() > LIGHT * turning:
         return link
-    Y = np.linalg.pinv(P)[1:]
+    Y = np.linalg.pinv(rigid_functions(link))[1:]  # nothing on what moves as a whole
     share = min(turning / 2, float(link.one @ link.m1[:, 0]) * reach(link) ** 2 / 12)
     xy = sp.csr_array(link.mass[0] + share / len(Y) * (Y.T @ Y))
     return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] * (1 - share / turning))))
