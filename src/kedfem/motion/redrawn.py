@@ -30,6 +30,7 @@ from kedfem.scene import (
     Scene,
     Spring,
     inertia_tensor,
+    moments_of_inertia,
 )
 from kedfem.scene.base import Record
 from kedfem.scene.faces import FaceName
@@ -124,7 +125,7 @@ def _carried(record: AnyRecord, shift: Shift) -> AnyRecord:
         change["vector"] = shift.turned(record.vector)
     if isinstance(record, RigidBody):
         J = shift.R @ inertia_tensor(record.inertia) @ shift.R.T
-        change["inertia"] = tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)))
+        change["inertia"] = moments_of_inertia(J)
     return record.model_copy(update=change)
 
 

@@ -10,7 +10,7 @@ from kedfem.dynamics.model import Model, segments
 from kedfem.links.bodies import inertia_of
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
-from kedfem.scene import Scene
+from kedfem.scene import Scene, moments_of_inertia
 
 ELEMENTS = {
     "hexahedron27": "hex27",
@@ -67,5 +67,8 @@ def _masses(inertias: Inertias, body: int) -> Mapping[str, Any]:
     mass, arm = float(inertias.mass[body]), centre - inertias.centre
     J = inertia_of(inertias.second[body] - mass * np.outer(arm, arm))
     J[2, 2] += inertias.spin[body]
-    six = J[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
-    return {"mass [kg]": mass, "centre of mass [m]": centre, "inertia [kg m^2]": six}
+    return {
+        "mass [kg]": mass,
+        "centre of mass [m]": centre,
+        "inertia [kg m^2]": np.array(moments_of_inertia(J)),
+    }

@@ -17,7 +17,7 @@ from kedfem.scene.faces import ChosenFace
 from kedfem.scene.fatigue import Fatigue, FatigueData, StrainLife
 from kedfem.scene.files import part_geometry
 from kedfem.scene.frames import corotational, corotational_links, link_frames
-from kedfem.scene.inertia import inertia_tensor
+from kedfem.scene.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.initial import InitialMotion
 from kedfem.scene.laws import drive_angle, factor_table, factors, is_constant, load_factor, path_parameter
 from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing, require_elastic
@@ -127,6 +127,7 @@ __all__ = [
     "link_from",
     "load_factor",
     "material_from",
+    "moments_of_inertia",
     "moving_grounds",
     "part_geometry",
     "path_parameter",

@@ -15,7 +15,7 @@ from kedfem.scene.bushings import Bushing
 from kedfem.scene.faces import ChosenFace, Faces
 from kedfem.scene.faults import one_of
 from kedfem.scene.frames import Frames
-from kedfem.scene.inertia import Inertia, impossible
+from kedfem.scene.inertia import Inertia, inertia_faults
 from kedfem.scene.points import XYZ, Axis, Point
 from kedfem.scene.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.units import Mass, PositiveLength, Quantity, fault
@@ -164,8 +164,7 @@ class LinkScene(Record):
             )
             if not getattr(self, key)
         ]
-        wrong = impossible(self.inertia) if self.inertia is not None else ""
-        return [*lacking, *([(("inertia",), wrong)] if wrong else [])]
+        return [*lacking, *(inertia_faults(self.inertia) if self.inertia is not None else ())]
 
     def _usual_element(self) -> str | None:
         """Of a part from CAD, which may be curved all over, the one whose geometry is as rich as can be."""

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.scene.base import Fault, FileName, Record, refuse
 from kedfem.scene.drives import table_faults
-from kedfem.scene.inertia import Inertia, impossible
+from kedfem.scene.inertia import Inertia, inertia_faults
 from kedfem.scene.points import Point, as_vector
 from kedfem.scene.units import Mass, Number, Pressure, Quantity, Time
 
@@ -253,8 +253,7 @@ class RigidBody(Record):
 
     @model_validator(mode="after")
     def _possible_inertia(self) -> Self:
-        wrong = impossible(self.inertia)
-        refuse([(("inertia",), wrong)] if wrong else [])
+        refuse(inertia_faults(self.inertia))
         return self
 
 

@@ -15,6 +15,7 @@ from pydantic_core import PydanticCustomError
 from kedfem.scene.base import Record, refuse
 from kedfem.scene.faults import fault_lines, line
 from kedfem.scene.hints import Where, below, members, quantities
+from kedfem.scene.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.links import Count, spelt_out
 from kedfem.scene.points import XYZ, Axis, Point, as_vector
 from kedfem.scene.shapes import STEEP, Bar, Polyline
@@ -179,9 +180,8 @@ class _Copy:
             and isinstance(raw.get("inertia"), list)
             and len(raw["inertia"]) == 6
         ):
-            xx, yy, zz, xy, yz, zx = (INERTIA.number(x) for x in raw["inertia"])
-            J = self.R @ np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]) @ self.R.T
-            made = {**made, "inertia": J[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]].tolist()}
+            J = inertia_tensor([INERTIA.number(x) for x in raw["inertia"]])
+            made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
         shape = spelt_out(raw).get("shape") if section == "links" else None
         kind = shape.get("kind") if isinstance(shape, Mapping) else None
         if kind in PLACED:

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from kedfem.scene.apart import Apart, JointPoint
 from kedfem.scene.base import plain
-from kedfem.scene.inertia import impossible, inertia_tensor
+from kedfem.scene.inertia import inertia_faults, inertia_tensor, moments_of_inertia
 from kedfem.scene.loads import RigidBody
 from kedfem.scene.points import XYZ
 
@@ -95,9 +95,9 @@ def _beside_line(body: RigidBody, points: Float[np.ndarray, "p 3"], width: float
     rest = body.mass - m.sum()
     shift = (m @ (centre - middles)) / rest
     J = inertia_tensor(body.inertia) - line - rest * _steiner(shift)
-    inertia = J[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]].tolist()
-    if impossible(inertia):
-        inertia = [x * (1 - LIGHT) for x in body.inertia]
+    inertia = moments_of_inertia(J)
+    if inertia_faults(inertia):
+        inertia = moments_of_inertia((1 - LIGHT) * inertia_tensor(body.inertia))
     own_centre = (centre + shift).tolist()
     return RigidBody(link=body.link, at=body.centre, mass=rest, centre=own_centre, inertia=inertia)
 
