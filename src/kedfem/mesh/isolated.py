@@ -1,5 +1,6 @@
 """Work of libraries in processes of their own: what they write stays there, where they break down or hang is an error."""
 
+import atexit
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -55,6 +56,7 @@ class _Worker:
 
 
 _idle: list[_Worker] = []
+atexit.register(_idle.clear)  # while there is what loky tells of their end: later, it would write of an error
 _busy: list[_Worker] = []
 
 
