@@ -21,7 +21,7 @@ from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.errors import KedfemError
-from kedfem.scene.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
+from kedfem.scene.checks.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
 from tests.moving import beam_in_space
 from tests.partners import IN_PLANE, chain
 from tests.systems import Begun, begun, by_oracle, marched, rows

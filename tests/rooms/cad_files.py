@@ -11,7 +11,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.session import gmsh_model
-from kedfem.scene.shapes import Cad
+from kedfem.scene.records.shapes import Cad
 
 FORMATS = ("step", "igs", "brep")
 # of a plate 60 × 20 × 8 with a boss of radius 8 and height 14 at (50, 10), bored with 4, and a bore of 3 at (10, 10)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from kedfem.errors import SceneError
+from kedfem.motion.linkage import linkage
 from kedfem.scene import Bar, Scene, read_scene, scene_from
 
 GOOD = """
@@ -283,14 +284,16 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
     ]
 
 
-def test_the_error_is_the_same_from_a_model_and_from_a_dict():
-    raw = changed(GOOD, {"links/crank/shape/width": -1, "links/crank/material": "stel"})
-    assert faults_of(Scene.model_validate, raw) == faults_of(scene_from, raw)
-    assert faults_of(lambda: Scene(**raw)) == faults_of(scene_from, raw)
+def test_a_record_that_nobody_checked_is_refused():
+    bare = Scene(**dict(scene_from(tomllib.loads(GOOD))))
+    wanted = "the scene: must be made by scene_from or read_scene, got a record that nobody checked"
+    assert faults_of(linkage, bare) == [wanted]
+    assert scene_from(bare) == scene_from(tomllib.loads(GOOD))
+    linkage(scene_from(bare))
 
 
 def test_a_scene_must_be_a_table():
-    assert faults_of(Scene.model_validate, [1]) == ["must be a table of keys, got [1]"]
+    assert faults_of(scene_from, [1]) == ["must be a table of keys, got [1]"]
 
 
 def test_a_name_cannot_be_looked_up_outside_a_scene():

@@ -14,7 +14,7 @@ from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import read_scene
-from kedfem.scene.shapes import Cad
+from kedfem.scene.records.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, VOLUME, edited, parts_in, read, refused, written
 
 

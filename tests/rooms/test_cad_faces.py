@@ -17,7 +17,7 @@ from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.elements.hexahedra import Face, SolidMesh
 from kedfem.mesh.files.raw import from_meshio
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.scene.shapes import Cad
+from kedfem.scene.records.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, written
 
 

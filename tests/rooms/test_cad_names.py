@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.mesh.cad.model import _alike, solid_model
 from kedfem.mesh.cad.text import step_bodies, step_text
-from kedfem.scene.shapes import Cad
+from kedfem.scene.records.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, edited, parts_in, read, refused, written
 
 

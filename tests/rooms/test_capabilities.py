@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from kedfem.errors import SceneError
-from kedfem.scene import capabilities, scene_from
-from kedfem.scene.capabilities import KINDS, REFUSALS, refusals
+from kedfem.scene import scene_from
 from kedfem.scene.capability_page import COLUMNS, JOINTS, capabilities_page
+from kedfem.scene.checks import capabilities
+from kedfem.scene.checks.capabilities import KINDS, REFUSALS, refusals
 from tests.cells import as_said
 from tests.moving import bar, driven_slide, inverted, turning
 from tests.partners import chain

@@ -11,7 +11,7 @@ from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import Scene
+from kedfem.scene import Scene, scene_from
 from tests.linkages import (
     JointTable,
     Z,
@@ -109,9 +109,9 @@ def test_nominal_frames_leave_nothing_free() -> None:
     raw = scene.model_dump(by_alias=True, exclude_none=True)
     raw["links"]["upper"]["frames"] = "co-rotational"
     with pytest.raises(MotionError, match="link 'lower' can turn"):
-        linkage(Scene.model_validate(raw))
+        linkage(scene_from(raw))
     raw["links"]["lower"]["frames"] = "co-rotational"
-    assert linkage(Scene.model_validate(raw)).mobility == 1
+    assert linkage(scene_from(raw)).mobility == 1
 
 
 # -- velocities at the start --------------------------------------------------------------------------------

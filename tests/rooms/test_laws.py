@@ -25,7 +25,7 @@ from kedfem.scene import (
     rayleigh,
     time_grid,
 )
-from kedfem.scene.laws import table_noise
+from kedfem.scene.questions.laws import table_noise
 
 TIMES = tuple(np.linspace(0.0, 2.0, 9))
 LAWS = {

@@ -8,7 +8,7 @@ import pytest
 
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
-from kedfem.scene.old_words import KEYS, VALUES
+from kedfem.scene.records.wording import KEYS, VALUES
 from tests.scenes import arm, bar, constant_speed
 
 TABLE = Path(__file__).parents[2] / "docs" / "notation.md"

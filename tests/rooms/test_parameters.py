@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from kedfem.errors import SceneError
 from kedfem.resume import flat
 from kedfem.scene import read_scene, scene_from
-from kedfem.scene.expressions import evaluated
-from kedfem.scene.parameters import Parameters
+from kedfem.scene.read.parameters import Parameters
+from kedfem.scene.records.expressions import evaluated
 
 GOOD = """
 [parameters]

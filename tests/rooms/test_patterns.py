@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
-from kedfem.scene.files import outside
+from kedfem.scene.read.files import outside
 
 Raw = dict[str, Any]
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.01}

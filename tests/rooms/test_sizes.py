@@ -10,7 +10,7 @@ from kedfem.accuracy.sizes import size_warnings, sizes
 from kedfem.errors import MeshError
 from kedfem.kinematics import rigid_links
 from kedfem.scene import Cad, Scene, read_scene, scene_from
-from kedfem.scene.units import si_number
+from kedfem.scene.records.units import si_number
 from kedfem.tables import size_line
 
 ROOT = Path(__file__).parents[2]

@@ -25,7 +25,7 @@ from kedfem.mesh.swept.core import disc
 from kedfem.mesh.swept.path_sweep import carried_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.scene import Material, link_from
-from kedfem.scene.shapes import Cad
+from kedfem.scene.records.shapes import Cad
 from tests.verification.linear import frequencies
 
 STEEL = Material(density=7850.0, youngs_modulus=2.1e11, poisson_ratio=0.3)

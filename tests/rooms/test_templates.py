@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from kedfem.analysis import analyse
 from kedfem.results import Results
 from kedfem.scene import scene_from
-from kedfem.scene.units import si_number
+from kedfem.scene.records.units import si_number
 
 G = 9.81
 STEEL, ALUMINIUM = 7850.0, 2700.0  # kg/m³, of the materials that scenes know by name

@@ -13,7 +13,7 @@ from kedfem.frequencies import Part, link_of_scene, part_from_file
 from kedfem.mesh import SolidMesh
 from kedfem.output.vtu import write_mesh
 from kedfem.scene import Material, link_from, scene_from
-from kedfem.scene.read import face_from
+from kedfem.scene.read.scenes import face_from
 
 from .cases import Row, case
 from .meshes import box, mapped_mesh

@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.scene import ConstantSpeed, Material, Ramp, Scene
-from kedfem.scene.units import RPM
+from kedfem.scene.records.units import RPM
 
 LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
 MASSES = 1e-9, 1e6  # kg, of a link

@@ -261,7 +261,7 @@ def new(
     from importlib.resources import files
 
     if kind not in KINDS or scale is not None:
-        from kedfem.scene.faults import one_of
+        from kedfem.scene.records.wording import one_of
 
         if scale is not None:
             raise SceneError("--scale: must be combined with --from, got it alone")
@@ -348,7 +348,7 @@ app.command()(view)
 def _quick(scene: Any) -> Any:
     """The scene with plain defaults for what it leaves open; the step is stated where no turns of a drive tell it."""
     from kedfem.scene import time_grid
-    from kedfem.scene.timing import scene_speed
+    from kedfem.scene.questions.timing import scene_speed
 
     analysis = scene.analysis.model_copy(update={"accuracy": "quick"})
     quick = scene.model_copy(update={"analysis": analysis})

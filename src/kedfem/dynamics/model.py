@@ -48,7 +48,7 @@ from kedfem.scene import (
     moving_grounds,
     rayleigh,
 )
-from kedfem.scene.capabilities import SLIDERS
+from kedfem.scene.checks.capabilities import SLIDERS
 
 T = TypeVar("T")
 

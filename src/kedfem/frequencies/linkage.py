@@ -36,7 +36,7 @@ from kedfem.results.frequencies import (
     write_summary,
 )
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
-from kedfem.scene.units import RPM
+from kedfem.scene.records.units import RPM
 
 Watch = Callable[[str, int, int], None]
 #: of the drive's, at which stiffening is looked at; a Campbell plot ends with the last

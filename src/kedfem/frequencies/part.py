@@ -34,7 +34,7 @@ from kedfem.output.shapes import Shape, write_shapes
 from kedfem.results import claimed
 from kedfem.results.frequencies import write_part_frequencies
 from kedfem.scene import ChosenFace, LinkScene, Material, Scene, require_elastic
-from kedfem.scene.faults import either, one_of
+from kedfem.scene.records.wording import either, one_of
 
 Watch = Callable[[str, int, int], None]
 HELD = ("revolute", "spherical", "weld")  # joints of which what they hold needs no other link

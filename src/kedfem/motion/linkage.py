@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float
 
-from kedfem.errors import MotionError
+from kedfem.errors import MotionError, SceneError
 from kedfem.motion.blocks import Blocks, blocks
 from kedfem.motion.constraints import (
     ConstraintEquation,
@@ -84,10 +84,16 @@ def linkage(scene: Scene) -> Linkage:
 
     Raises
     ------
+    SceneError
+        A record that was made beside `scene_from`, so that nobody checked its tables against each other.
     MotionError
         If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with rigid-body
         frames.
     """
+    if not scene.checked:
+        raise SceneError(
+            "the scene: must be made by scene_from or read_scene, got a record that nobody checked"
+        )
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
     rows, driven, drawn = _drawn(scene)

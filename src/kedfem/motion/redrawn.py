@@ -32,9 +32,9 @@ from kedfem.scene import (
     inertia_tensor,
     moments_of_inertia,
 )
-from kedfem.scene.base import Record
-from kedfem.scene.faces import FaceName
-from kedfem.scene.points import XYZ
+from kedfem.scene.records.base import Record
+from kedfem.scene.records.faces import FaceName
+from kedfem.scene.records.points import XYZ
 
 TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding
 AnyRecord = TypeVar("AnyRecord", bound=Record)

@@ -1,8 +1,22 @@
 """The scene: what a user describes, validated completely; SI units, points as coordinates."""
 
-from kedfem.scene.analysis import Analysis, Animation, Output, Probe
-from kedfem.scene.damping import Damping, rayleigh
-from kedfem.scene.drives import (
+from kedfem.scene.questions.frames import corotational, corotational_links, link_frames
+from kedfem.scene.questions.laws import (
+    drive_angle,
+    factor_table,
+    factors,
+    is_constant,
+    load_factor,
+    path_parameter,
+)
+from kedfem.scene.questions.moving_joints import enforced_by_equations, moving_grounds
+from kedfem.scene.questions.planes import spatial_beams
+from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
+from kedfem.scene.read.files import part_geometry
+from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from
+from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
+from kedfem.scene.records.damping import Damping, rayleigh
+from kedfem.scene.records.drives import (
     ConstantSpeed,
     Cycloidal,
     Drive,
@@ -13,15 +27,12 @@ from kedfem.scene.drives import (
     Ramp,
     Table,
 )
-from kedfem.scene.faces import ChosenFace
-from kedfem.scene.fatigue import Fatigue, FatigueData, StrainLife
-from kedfem.scene.files import part_geometry
-from kedfem.scene.frames import corotational, corotational_links, link_frames
-from kedfem.scene.inertia import inertia_tensor, moments_of_inertia
-from kedfem.scene.initial import InitialMotion
-from kedfem.scene.laws import drive_angle, factor_table, factors, is_constant, load_factor, path_parameter
-from kedfem.scene.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing, require_elastic
-from kedfem.scene.loads import (
+from kedfem.scene.records.faces import ChosenFace
+from kedfem.scene.records.fatigue import Fatigue, FatigueData, StrainLife
+from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
+from kedfem.scene.records.initial import InitialMotion
+from kedfem.scene.records.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing, require_elastic
+from kedfem.scene.records.loads import (
     Body,
     BodyLoad,
     Factor,
@@ -34,18 +45,30 @@ from kedfem.scene.loads import (
     SurfaceLoad,
     TorqueLoad,
 )
-from kedfem.scene.materials import Material
-from kedfem.scene.motors import ForceCurve, Motor, TorqueCurve
-from kedfem.scene.moving_joints import enforced_by_equations, moving_grounds
-from kedfem.scene.outlines import Arc, Hole
-from kedfem.scene.planes import spatial_beams
-from kedfem.scene.read import face_from, link_from, material_from, read_keys, read_scene, scene_from
-from kedfem.scene.scene import Scene
-from kedfem.scene.sections import ConstantsSection, RectangleSection, RoundSection, SectionShape, TubeSection
-from kedfem.scene.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
-from kedfem.scene.springs import LineSpring, Spring, SpringEnd, TorsionSpring
-from kedfem.scene.stops import AngleLimit, Limit, TravelLimit
-from kedfem.scene.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
+from kedfem.scene.records.materials import Material
+from kedfem.scene.records.motors import ForceCurve, Motor, TorqueCurve
+from kedfem.scene.records.outlines import Arc, Hole
+from kedfem.scene.records.scene import Scene
+from kedfem.scene.records.sections import (
+    ConstantsSection,
+    RectangleSection,
+    RoundSection,
+    SectionShape,
+    TubeSection,
+)
+from kedfem.scene.records.shapes import (
+    Bar,
+    Cad,
+    Extrusion,
+    MeshFile,
+    Part,
+    PartGeometry,
+    PlateLink,
+    Polyline,
+    Shape,
+)
+from kedfem.scene.records.springs import LineSpring, Spring, SpringEnd, TorsionSpring
+from kedfem.scene.records.stops import AngleLimit, Limit, TravelLimit
 
 __all__ = [
     "DIRECTED",

@@ -14,9 +14,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from kedfem.scene import (
+from kedfem.scene.checks.hints import field_hint, keys, kind_of, models, options
+from kedfem.scene.records import (
     analysis,
-    apart,
     bushings,
     damping,
     drives,
@@ -29,7 +29,6 @@ from kedfem.scene import (
     materials,
     motors,
     outlines,
-    parameters,
     patterns,
     points,
     scene,
@@ -38,9 +37,8 @@ from kedfem.scene import (
     springs,
     stops,
 )
-from kedfem.scene.hints import field_hint, keys, kind_of, models, options
+from kedfem.scene.records.units import Quantity
 from kedfem.scene.reference_examples import EXAMPLES
-from kedfem.scene.units import Quantity
 
 INTRODUCTION = """\
 # The scene file
@@ -152,13 +150,13 @@ SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
 ]
 
 NAMED = {
-    dict[parameters.ParameterName, parameters.Parameter]: (
+    dict[expressions.ParameterName, expressions.Parameter]: (
         "numbers, texts with units or expressions by name",
         "",
     ),
     patterns.Entries: ("tables by name", ""),
     points.Point: ("point", "m"),
-    apart.JointPoint: ("point, or points by link", "m"),
+    points.JointPoint: ("point, or points by link", "m"),
     points.Axis: ("axis", ""),
     points.AccelerationVector: ("vector", "m/s²"),
     loads.ForceVector: ("vector", "N"),

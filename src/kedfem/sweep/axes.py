@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import SceneError
-from kedfem.scene.faults import place
-from kedfem.scene.hints import Where
-from kedfem.scene.units import NUMBER, UNIT, UNREADABLE, unit_registry
-from kedfem.scene.wording import shown
+from kedfem.scene.checks.faults import place
+from kedfem.scene.checks.hints import Where
+from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, unit_registry
+from kedfem.scene.records.wording import shown
 from kedfem.sweep.keys import located
 
 Value = bool | int | float | str

@@ -6,9 +6,9 @@ from typing import Any
 
 from kedfem.errors import SceneError
 from kedfem.scene import Scene
-from kedfem.scene.faults import place
-from kedfem.scene.hints import Where, below, known_keys
-from kedfem.scene.wording import nearest
+from kedfem.scene.checks.faults import place
+from kedfem.scene.checks.hints import Where, below, known_keys
+from kedfem.scene.records.wording import nearest
 
 PARAMETERS = "parameters"
 

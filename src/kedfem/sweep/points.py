@@ -20,8 +20,8 @@ from kedfem.errors import KedfemError, SceneError
 from kedfem.motion.assembly import assembled
 from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
-from kedfem.scene.faults import place
-from kedfem.scene.hints import Where
+from kedfem.scene.checks.faults import place
+from kedfem.scene.checks.hints import Where
 from kedfem.sweep.axes import Value
 from kedfem.sweep.extremes import Extreme, change, extremes
 from kedfem.sweep.keys import with_values

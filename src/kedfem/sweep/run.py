@@ -12,7 +12,7 @@ from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import BLAS_THREADS, end_with_parent
 from kedfem.results import claimed
 from kedfem.scene import scene_from
-from kedfem.scene.timing import scene_speed
+from kedfem.scene.questions.timing import scene_speed
 from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges

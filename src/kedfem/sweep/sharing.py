@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from kedfem.accuracy.shared_modes import alike
 from kedfem.errors import SceneError
-from kedfem.scene.hints import Where
-from kedfem.scene.timing import scene_speed
+from kedfem.scene.checks.hints import Where
+from kedfem.scene.questions.timing import scene_speed
 from kedfem.sweep.axes import Value
 from kedfem.sweep.points import Job
 

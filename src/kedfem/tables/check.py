@@ -32,7 +32,7 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.force_elements import measured_actions
 from kedfem.results.recording import recording
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
-from kedfem.scene.timing import turn_steps
+from kedfem.scene.questions.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
 from kedfem.tables.links import link_table, way_tables
 from kedfem.tables.mobility import mobility_table

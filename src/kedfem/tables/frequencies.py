@@ -9,7 +9,7 @@ from rich.text import Text
 from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
 from kedfem.output.words import moment, with_prefix
 from kedfem.scene import Scene
-from kedfem.scene.units import RPM
+from kedfem.scene.records.units import RPM
 
 WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
 MODES = 8  # side by side

@@ -56,7 +56,7 @@ from kedfem.scene import (
     is_constant,
     load_factor,
 )
-from kedfem.scene.capabilities import SLOTS
+from kedfem.scene.checks.capabilities import SLOTS
 
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
 ELEMENTS = ("springs", "motors", "limits")  # sections of a scene

@@ -16,8 +16,8 @@ from kedfem.mesh.cad.solid_faces import SAME_VOLUME, cad_faces, enclosed_volume,
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.cad.text import Body, own_name, step_bodies, step_products, step_text
 from kedfem.mesh.session import gmsh_model
-from kedfem.scene.shapes import Cad
-from kedfem.scene.wording import nearest
+from kedfem.scene.records.shapes import Cad
+from kedfem.scene.records.wording import nearest
 
 MOST_FACES = 3000  # each takes some 10 ms, and pairs of them are compared
 _SAME = 1e-5  # of the solid's size: how far corners may be off where the file's text says

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.scene.outlines import Arc, Profile
+from kedfem.scene.records.outlines import Arc, Profile
 
 _STRAIGHT = (np.nan, np.nan)
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.plots.drawing import figure_saved
-from kedfem.scene.units import RPM
+from kedfem.scene.records.units import RPM
 
 
 def write_over_turn(

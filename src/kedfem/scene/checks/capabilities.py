@@ -1,0 +1,208 @@
+"""The table of capabilities: combinations of options that are refused, with the reason and what to take instead.
+
+What no line of `REFUSALS` meets is allowed. The checks of scenes, docs/capabilities.md (`capability_page`) and tests read
+this one table: a refusal that is lifted is a line taken out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+from kedfem.scene.records.analysis import WITHOUT_VIBRATION
+from kedfem.scene.records.links import JointKind
+
+Facts = Mapping[str, str]
+"""Level of each factor that is known of a part of a scene."""
+
+KINDS: tuple[str, ...] = get_args(JointKind)
+TURNED = ("revolute", "cylindrical", "screw")  # kinds with one turn, which a torque or torsion spring acts on
+SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
+DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive prescribes
+CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
+SHARED = "shared points"  # and one that holds points of its links together for good
+MIXED = "plane link and one in space"  # what a joint joins
+BESIDE = "plane link and a rigid one"  # of which the rigid one moves freely in space
+
+
+def others(*kinds: str) -> tuple[str, ...]:
+    """All kinds of joint but these."""
+    return tuple(kind for kind in KINDS if kind not in kinds)
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A combination that is refused; its texts may hold {words} of the part of a scene that meets it.
+
+    of : section of the scene whose parts may meet it
+    when : levels of factors, all of which are met
+    where : place that the message names
+    must, why, got, take : what is required, the reason, what was given, what to take instead
+    """
+
+    of: str
+    when: Mapping[str, tuple[str, ...]]
+    where: str
+    must: str
+    why: str
+    got: str
+    take: str
+
+    def meets(self, facts: Facts) -> bool:
+        """Whether a part of a scene is such a combination."""
+        return all(facts.get(factor) in levels for factor, levels in self.when.items())
+
+    def said(self, words: Mapping[str, str]) -> str:
+        """The message."""
+        text = f"{self.where}: must {self.must} ({self.why}), got {self.got}: {self.take}"
+        return text.format_map(words)
+
+
+SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",
+    'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion tells",
+    "a slot", 'take frames = "rigid-body", or a slide with a hinge')  # fmt: skip
+SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
+    "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",
+    "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
+REFUSALS = (
+    SLOTS,
+    SLIDERS,
+    Refusal("joints", {"enforced": (CONSTRAINED,), "stiffening": ("on",)}, "{where}.{key}",
+        "not be combined with analysis.stiffening", "which knows no constraint equations", "{noun}",
+        'take frames = "co-rotational", which know all of it'),
+    Refusal("joints", {"enforced": (CONSTRAINED,), "rho_inf": ("1",)}, "analysis.rho_inf",
+        "be less than 1 with {where}", "its force would swing from step to step, and grow", "1", "take 0.95"),
+    Refusal("joints", {"joint": ("spherical", "slot"), "bushing": ("against rotations",)},
+        "{where}.bushing.rotational_stiffness", "be given for a joint that constrains rotations",
+        "there is none that it could resist", "a {kind} joint, which leaves all free",
+        "leave it out, or take another kind of joint"),
+    Refusal("joints", {"joint": ("weld", "prismatic"), "partners": (MIXED,)}, "{where}.kind",
+        "be revolute or spherical between a plane link and a solid or beam in space",
+        "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same fidelity"),
+    Refusal("joints", {"joint": ("weld",), "partners": (BESIDE,)}, "{where}.kind",
+        "be revolute or spherical between a plane link and a rigid one that moves freely",
+        "a plane link constrains no rotation out of its plane", "'weld' of {names}",
+        "take a hinge, or two links of one kind"),
+    Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", "name a revolute or prismatic joint",
+        "a drive prescribes the one motion of a joint", "{name!r}, which is {kind}",
+        "drive a hinge or a slide beside it, or take a motor"),
+    Refusal("drives", {"joint": ("prismatic",), "shaft": ("given",)}, "{where}.shaft_stiffness",
+        "be given for a hinge", "a shaft gives as it is twisted", "{name!r}, which is prismatic",
+        "take a bushing, or a spring along the slide"),
+    Refusal("gears", {"stiffening": ("on",)}, "{where}", "not be combined with analysis.stiffening",
+        "which knows no constraint equations", "it", 'take frames = "co-rotational", which know all of it'),
+    Refusal("gears", {"element": ("gear",), "joint": others("revolute")}, "{where}",
+        "be revolute, as joints of gears are", "these couple rotations", "{name!r}, which is {kind}", "take hinges"),
+    Refusal("gears", {"element": ("rack",), "joint": others("prismatic")}, "{where}",
+        "be prismatic as the second joint of a rack", "a rack slides", "{name!r}, which is {kind}",
+        "take a slide, or a ratio instead of the radius"),
+    Refusal("motors", {"element": ("torque",), "joint": others(*TURNED)}, "{where}.joint",
+        "name a revolute or cylindrical or screw joint for a torque", "no other joint has one rotation",
+        "{name!r}, which is {kind}", "take loads of kind torque on its links"),
+    Refusal("motors", {"element": ("force",), "joint": others(*SLID)}, "{where}.joint",
+        "name a prismatic or cylindrical joint for a force", "no other joint has one travel",
+        "{name!r}, which is {kind}", "take loads of kind force on its links"),
+    Refusal("springs", {"element": ("torsion",), "joint": others(*TURNED)}, "{where}.joint",
+        "name a revolute or cylindrical or screw joint", "no other joint has one rotation",
+        "{name!r}, which is {kind}", "take a bushing with rotational_stiffness"),
+    Refusal("springs", {"element": ("along",), "joint": others(*SLID)}, "{where}.joint",
+        "name a prismatic or cylindrical joint", "no other joint has one travel",
+        "{name!r}, which is {kind}", "take a spring between two points"),
+    Refusal("limits", {"element": ("angle limit",), "joint": others(*TURNED)}, "{where}.joint",
+        "name a revolute or cylindrical or screw joint for an angle", "no other joint has one rotation",
+        "{name!r}, which is {kind}", "take a limit of a hinge beside it"),
+    Refusal("limits", {"element": ("travel limit",), "joint": others(*SLID)}, "{where}.joint",
+        "name a prismatic or cylindrical joint for a travel", "no other joint has one travel",
+        "{name!r}, which is {kind}", "take a limit of a slide beside it"),
+    Refusal("limits", {"moved": ("prescribed",)}, "{where}.joint", "name a joint that no drive moves",
+        "a drive prescribes how far its joint goes", "{name!r}, which is driven", "limit another joint, or take a motor"),
+    Refusal("analysis", {"element": ("limit",), "solver": ("monolithic",)}, "{where}.solver",
+        "be 'condensed' with limits", "the monolithic solver does not iterate on contact", "'monolithic' with {elements}",
+        "leave it out"),
+    Refusal("analysis", {"element": ("limit",), "levels": ("several",)}, "{where}.extrapolation_levels",
+        "be 1 with limits", "levels are combined where motion is smooth in time, and it is not where stops are met",
+        "more with {elements}", "take a smaller step"),
+    Refusal("analysis", {"element": ("limit",), "start": ("initial_deflection",)}, "{where}.initial_deflection",
+        "not be combined with limits", "static balance against stops is not sought", "it with {elements}",
+        "take loads, or initial speeds"),
+    Refusal("analysis", {"drive": ("none",), "frames": ("rigid-body",)}, "{where}.frames",
+        "be 'co-rotational' in a scene without a drive", "there is no rigid-body motion", "'rigid-body'",
+        "leave it out, or give a drive"),
+    Refusal("links", {"drive": ("none",), "frames": ("rigid-body",)}, "{where}.frames",
+        "be 'co-rotational' in a scene without a drive", "there is no rigid-body motion", "'rigid-body'",
+        "leave it out, or give a drive"),
+    Refusal("analysis", {"stiffening": ("on",), "frames": ("co-rotational",)}, "{where}.stiffening",
+        "be combined with rigid-body frames", "co-rotational ones know all of it", "it with co-rotational frames",
+        "leave stiffening out"),
+    Refusal("analysis", {"stiffening": ("on",), "element": ("force element",)}, "{where}.stiffening",
+        "not be combined with motors, springs and limits", "whose stresses it does not know", "{elements}",
+        'take frames = "co-rotational", which know all of it'),
+    Refusal("analysis", {"solver": ("monolithic",), "frames": ("co-rotational",)}, "{where}.solver",
+        "be 'condensed' for co-rotational frames", "the monolithic solver of scenes knows rigid-body ones alone",
+        "'monolithic'",
+        'leave it out, or take frames = "rigid-body"'),
+    *(Refusal("analysis", {"frames": ("rigid-body",), "start": (key,)}, f"{{where}}.{key}",
+        'be combined with frames = "co-rotational"', "rigid-body ones begin as the drive moves them",
+        "{given} with rigid-body ones",
+        'take frames = "co-rotational"') for key in ("initial_speeds", "initial_motions")),
+    Refusal("analysis", {"kind": ("steady",), "drive": ("none",)}, "{where}.kind", "be combined with a drive as 'steady'",
+        "a mechanism that moves freely has no period", "'steady' without one", "give a drive, or take 'transient'"),
+    Refusal("analysis", {"kind": ("quasi-static",), "drive": ("none",)}, "{where}.kind",
+        "be combined with a drive as 'quasi-static'", "nothing else says how a mechanism moves on", "it without one",
+        "give a drive, or take 'static' or 'transient'"),
+    Refusal("analysis", {"kind": ("steady", *WITHOUT_VIBRATION), "solver": ("monolithic",)}, "{where}.solver",
+        "be 'condensed' for a {kind} analysis", "the monolithic solver marches from a start", "'monolithic'",
+        "leave it out"),
+    Refusal("analysis", {"kind": WITHOUT_VIBRATION, "stiffening": ("on",)}, "{where}.stiffening",
+        "be left out of a {kind} analysis", "whose balance knows no stresses of the rigid-body motion", "it",
+        'take frames = "co-rotational", which know all of it'),
+    Refusal("analysis", {"kind": WITHOUT_VIBRATION, "levels": ("several",)}, "{where}.extrapolation_levels",
+        "be left out of a {kind} analysis", "which has no time steps", "more than 1", "leave it out"),
+    Refusal("analysis", {"kind": ("steady",), "rho_inf": ("1",)}, "{where}.rho_inf", "be less than 1 for a steady motion",
+        "vibrations that a step cannot resolve would have no end", "1", "take 0.95"),
+    *(Refusal("analysis", {"kind": ("steady", *WITHOUT_VIBRATION), "start": (key,)}, f"{{where}}.{key}",
+        "be left out of a {kind} analysis", "which does not depend on how the motion began", "{given}",
+        "leave it out, or take kind = 'transient'")
+        for key in ("initial_speeds", "initial_motions", "initial_deflection")),
+    Refusal("analysis", {"start": ("initial_deflection",), "stiffening": ("on",)}, "{where}.initial_deflection",
+        "not be combined with analysis.stiffening", "whose start knows no forces that are let go", "{given}",
+        'take frames = "co-rotational", which know all of it'),
+    Refusal("analysis", {"start": ("initial_deflection",), "drive": ("given",), "beside": ("rest",)}, "{where}.initial",
+        "be 'quasi-static' with an initial deflection and a drive", "these forces deflect links beside their motion",
+        "'rest'", 'take initial = "quasi-static"'),
+    Refusal("analysis", {"start": ("initial_deflection",), "beside": ("speeds",)}, "{where}.initial_deflection",
+        "not be combined with initial speeds and motions", "what is let go has been at rest", "{given}",
+        "take one of them, or loads that end soon"),
+    *(Refusal("analysis", {"drive": ("none",), "time": (key,)}, f"{{where}}.{key}", "be combined with a drive",
+        "it counts the drive's revolutions", "a scene without one", f"take {instead} [s]")
+        for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step"))),
+    Refusal("damping", {"drive": ("none",), "damping": ("in proportion to mass",)}, "{where}.{key}",
+        "be given as beta alone in a scene without a drive, such as beta = {beta} [s]",
+        "alpha resists the motion as a whole", "alpha = {alpha} 1/s", "leave alpha out"),
+    Refusal("fatigue", {"drive": ("none",), "period": ("none",)}, "{where}.period", "be given without a drive",
+        "nothing else says after which time stresses repeat", "nothing", "give it [s], or a drive, or leave fatigue out"),
+    *(Refusal("loads", {"element": (kind,), "link": ("beam", "slider")}, "{where}.link",
+        f"name a solid or a plane link for a {noun}", "a beam and a slider have no faces",
+        "{name!r}, which is {noun}", "take loads of kind force or torque")
+        for kind, noun in (("surface", "surface load"), ("pressure", "pressure"))),
+    Refusal("loads", {"element": ("torque",), "link": ("slider",)}, "{where}.link",
+        "name a link with a shape for a torque", "a slider without a shape has no rotation", "{name!r}, a slider",
+        "give it a shape"),
+    Refusal("loads", {"element": ("body",), "link": ("slider",)}, "{where}.link",
+        "name a link with a shape for a body load", "a slider without a shape has no volume",
+        "{name!r}, which is rigid", "take a load of kind force, or give it a shape"),
+    *(Refusal(section, {"factor": ("angle",), "drive": ("none",)}, f"{{where}}.{key}.over",
+        "be combined with a drive over whose angle it is", "no other angle is prescribed", "a scene without one",
+        "take a factor over time") for section, key in (("loads", "factor"), ("springs", "stiffness_factor"))),
+)  # fmt: skip
+
+
+def refusals(of: str, facts: Facts) -> Iterator[Refusal]:
+    """All lines of the table that a part of a scene meets.
+
+    Parameters
+    ----------
+    of : its section
+    """
+    return (each for each in REFUSALS if each.of == of and each.meets(facts))

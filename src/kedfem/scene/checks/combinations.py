@@ -1,0 +1,243 @@
+"""What a scene combines, in the factors of the table of capabilities: its refusals as fault lines, for its validation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from kedfem.scene.checks.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
+from kedfem.scene.checks.faults import place
+from kedfem.scene.checks.parts import Entry, Parts, category, link_names
+from kedfem.scene.questions.frames import default_frames
+from kedfem.scene.questions.moving_joints import enforced_by_equations
+from kedfem.scene.questions.planes import rigid_in_space, spatial_beams
+from kedfem.scene.records.damping import rayleigh
+from kedfem.scene.records.scene import Scene
+from kedfem.scene.records.wording import NOUNS, shown
+
+Told = tuple[str, Facts, Mapping[str, str]]
+"""Section, factors and words of a part of a scene."""
+
+
+def combination_faults(parts: Parts) -> Iterator[str]:
+    """All combinations of the scene that the table of capabilities refuses."""
+    common = common_facts(parts)
+    for told in (joints, drives, gears, elements, analysis, fatigue, links, loads):
+        for of, facts, words in told(parts):
+            for refusal in refusals(of, {**common, **facts}):
+                yield refusal.said(words)
+
+
+def frames_of(parts: Parts, link: Entry | None = None) -> str:
+    """Frames of a link, or of the analysis, as given or left open."""
+    own = None if link is None else link.word("frames")
+    return own or parts.analysis.word("frames") or default_frames(parts.driven)
+
+
+def any_corotational(parts: Parts) -> bool:
+    """Whether any link has co-rotational frames."""
+    return any(frames_of(parts, link) == "co-rotational" for link in parts.links.values())
+
+
+def common_facts(parts: Parts) -> dict[str, str]:
+    """What the whole scene says."""
+    record = parts.analysis.record
+    return {
+        "frames": "co-rotational" if any_corotational(parts) else "rigid-body",
+        "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
+        "drive": "given" if parts.driven else "none",
+        "rho_inf": "1" if record is not None and record.rho_inf == 1.0 else "below 1",
+        "solver": parts.analysis.word("solver") or "condensed",
+    }
+
+
+def joints(parts: Parts) -> Iterator[Told]:
+    """Good joints: how each is enforced, and what it joins."""
+    moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
+    mixed = any(category(link) == "plane" for link in parts.links.values())
+    spatial = spatial_beams(parts.good) if mixed else frozenset[str]()  # asked for beside plane links only
+    for joint in parts.joints.values():
+        kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
+        facts = {"joint": kind, "partners": partners(parts.good, held, spatial)}
+        words = {"where": place(joint.where), "kind": kind, "key": "kind", "names": named(held)}
+        if joint.record is None:
+            yield "joints", facts, words
+            continue
+        facts["enforced"] = CONSTRAINED if joint.name in moving else SHARED
+        driven = "driven " if joint.name in parts.driven_joints else ""
+        words["noun"] = f"a {driven}{kind} joint"
+        if joint.record.bushing is not None:
+            words |= {"key": "bushing", "noun": "one"}
+            turns = joint.record.bushing.rotational_stiffness is not None
+            facts["bushing"] = "against rotations" if turns else "given"
+        yield "joints", facts, words
+
+
+def partners(good: Scene, held: list[Entry], spatial: frozenset[str]) -> str:
+    """What a joint joins, as far as the table asks for it.
+
+    Parameters
+    ----------
+    good : the scene of records without a fault
+    spatial : names of the beams in space
+    """
+    if not any(category(link) == "plane" for link in held):
+        return ""
+    if any(category(link) == "solid" or link.name in spatial for link in held):
+        return MIXED
+    return BESIDE if any(link.name in good.links and rigid_in_space(good, link.name) for link in held) else ""
+
+
+def named(held: list[Entry]) -> str:
+    """Links with what they are."""
+    return " and ".join(f"{link.name!r}, a {NOUNS.get(category(link), 'rigid link')}" for link in held)
+
+
+def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, str]]:
+    """What a drive, gear, motor or spring is on."""
+    joint = parts.joints.get(name or "")
+    if joint is None:
+        return {}, {}
+    kind = str(joint.word("kind"))
+    return {"joint": kind}, {"name": joint.name, "kind": kind}
+
+
+def drives(parts: Parts) -> Iterator[Told]:
+    """Drives and their shafts."""
+    for drive in parts.all_drives:
+        facts, words = on_joint(parts, drive.word("joint"))
+        shaft = "given" if drive.has("shaft_stiffness") else "none"
+        yield "drives", {**facts, "shaft": shaft}, {**words, "where": place(drive.where)}
+
+
+def gears(parts: Parts) -> Iterator[Told]:
+    """Gears as a whole, and their joints."""
+    for gear in parts.gears.values():
+        yield "gears", {}, {"where": place(gear.where)}
+        names = gear.raw.get("joints")
+        if not isinstance(names, (list, tuple)) or len(names) != 2:
+            continue
+        for i, name in enumerate(names):
+            facts, words = on_joint(parts, name if isinstance(name, str) else None)
+            element = "rack" if gear.has("radius") and i == 1 else "gear"
+            where = place((*gear.where, "joints", i))
+            yield "gears", {**facts, "element": element, "stiffening": ""}, {**words, "where": where}
+
+
+def elements(parts: Parts) -> Iterator[Told]:
+    """Motors, springs on joints, and limits of these."""
+    for motor in parts.motors.values():
+        facts, words = on_joint(parts, motor.word("joint"))
+        element = next((key for key in ("torque", "force") if motor.has(key)), "")
+        yield "motors", {**facts, "element": element}, {**words, "where": place(motor.where)}
+    for spring in parts.springs.values():
+        facts, words = on_joint(parts, spring.word("joint"))
+        element = "torsion" if spring.word("kind") == "torsion" else "along"
+        facts |= {"element": element, "factor": spring.word("stiffness_factor", "over") or ""}
+        yield "springs", facts, {**words, "where": place(spring.where)}
+    for limit in parts.limits.values():
+        facts, words = on_joint(parts, limit.word("joint"))
+        moved = "prescribed" if limit.word("joint") in parts.driven_joints else "free"
+        facts |= {"element": f"{limit.word('kind')} limit", "moved": moved}
+        yield "limits", facts, {**words, "where": place(limit.where)}
+
+
+def analysis(parts: Parts) -> Iterator[Told]:
+    """The analysis with its start and times, and damping."""
+    entry, damping = parts.analysis, parts.damping
+    words = {"where": place(entry.where)}
+    if given := [*parts.motors, *parts.springs, *parts.limits]:
+        yield "analysis", {"element": "force element", "frames": ""}, {**words, "elements": shown(given)}
+    if parts.limits:
+        yield "analysis", limited(parts), {**words, "elements": shown(list(parts.limits))}
+    yield "analysis", {"drive": ""}, words
+    yield from kinds(parts, words)
+    if entry.word("frames"):
+        yield "analysis", only(frames=str(entry.word("frames"))), words
+    if entry.word("initial"):
+        yield "analysis", only(start=str(entry.word("initial"))), words
+    for key in ("revolutions", "steps_per_revolution"):
+        if entry.has(key):
+            yield "analysis", only(time=key), words
+    for key in ("initial_speeds", "initial_motions"):
+        speeds = entry.raw.get(key)
+        if isinstance(speeds, Mapping) and speeds and parts.links:
+            facts = {"start": key, "stiffening": "", "solver": "", "drive": ""}
+            yield "analysis", facts, {**words, "given": shown(list(speeds))}
+    forces = entry.raw.get("initial_deflection")
+    if isinstance(forces, Mapping) and forces:
+        speeds = any(entry.raw.get(key) for key in ("initial_speeds", "initial_motions"))
+        for each in (*(["speeds"] if speeds else []), entry.word("initial") or "rest"):
+            facts = {"start": "initial_deflection", "beside": each, "frames": "", "solver": ""}
+            yield "analysis", facts, {**words, "given": shown(list(forces))}
+    alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
+    if alpha:
+        words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
+        words["key"] = "ratio" if damping.has("ratio") else "alpha"
+        yield "damping", {"damping": "in proportion to mass"}, words
+
+
+def kinds(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
+    """What a steady motion, and positions without vibration, are combined with."""
+    entry = parts.analysis
+    kind = entry.word("kind") or "transient"
+    if kind == "transient":
+        return
+    facts, words = only(kind=kind), {**words, "kind": kind}
+    yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, words
+    stiffening = "on" if entry.raw.get("stiffening") is True else "off"
+    levels = "one" if entry.record is None or (entry.record.extrapolation_levels or 1) == 1 else "several"
+    for more in ({"stiffening": stiffening}, {"levels": levels}):
+        yield "analysis", {**facts, "drive": "", "rho_inf": "", **more}, words
+    for key in ("initial_speeds", "initial_motions", "initial_deflection"):
+        given = entry.raw.get(key)
+        if isinstance(given, Mapping) and given:
+            yield (
+                "analysis",
+                {**facts, "start": key, "drive": "", "rho_inf": ""},
+                {**words, "given": shown(list(given))},
+            )
+
+
+def fatigue(parts: Parts) -> Iterator[Told]:
+    """Damage over a period."""
+    if parts.fatigue.where:
+        period = "given" if parts.fatigue.has("period") else "none"
+        yield "fatigue", only(period=period), {"where": place(parts.fatigue.where)}
+
+
+def limited(parts: Parts) -> dict[str, str]:
+    """Factors of an analysis with limits of joints."""
+    several = parts.analysis.record is not None and (parts.analysis.record.extrapolation_levels or 1) > 1
+    deflected = "initial_deflection" if parts.analysis.raw.get("initial_deflection") else ""
+    return only(element="limit", levels="several" if several else "one", start=deflected) | {
+        "solver": parts.analysis.word("solver") or "condensed"
+    }
+
+
+def only(**facts: str) -> dict[str, str]:
+    """Factors of one key of the analysis, beside which those of others were told already."""
+    return {"frames": "", "stiffening": "", "solver": "", **facts}
+
+
+def links(parts: Parts) -> Iterator[Told]:
+    """Links with frames of their own."""
+    for link in parts.links.values():
+        if link.word("frames") and not slider(link):
+            yield "links", {"frames": str(link.word("frames"))}, {"where": place(link.where)}
+
+
+def loads(parts: Parts) -> Iterator[Told]:
+    """Loads on kinds of links, and their factors."""
+    for load in parts.loads.values():
+        link = parts.links.get(load.word("link") or "")
+        if link is None:
+            continue
+        kind = "slider" if slider(link) else category(link)
+        facts = {"element": str(load.word("kind")), "link": kind}
+        words = {"where": place(load.where), "name": link.name, "noun": category(link)}
+        yield "loads", {**facts, "factor": load.word("factor", "over") or ""}, words
+
+
+def slider(link: Entry) -> bool:
+    """Whether a link is rigid and has no shape."""
+    return category(link) == "rigid" and not link.has("shape")

@@ -1,0 +1,121 @@
+"""Faults of a scene as lines for the user: ``where: what was wanted, what was got``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from kedfem.scene.checks.hints import (
+    Where,
+    kind_of,
+    known_keys,
+    length_of,
+    models,
+    options,
+    quantities,
+    walked,
+)
+from kedfem.scene.records.wording import either, one_of, shown, unknown_key
+
+WANTED = {
+    "model_type": "must be a table of keys",
+    "model_attributes_type": "must be a table of keys",
+    "dict_type": "must be a table of keys",
+    "tuple_type": "must be a list",
+    "string_type": "must be a text",
+    "string_too_short": "must be a text that is not empty",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "invalid_key": "must be a key that is a text",
+}
+
+
+def place(where: Where) -> str:
+    """A place in the scene as text: ``links.crank.shape.between[1]``."""
+    text = ""
+    for part in where:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def line(where: Where, message: str) -> str:
+    """One fault as a line."""
+    return f"{place(where)}: {message}" if where else message
+
+
+def fault_lines(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[str]:
+    """The faults that pydantic found in raw input for a record, one line each.
+
+    Parameters
+    ----------
+    error : what pydantic raised
+    hint : the record, or another type, that was validated
+    raw : what it was validated from
+    prefix : where it stands in the scene
+    """
+    lines: dict[str, None] = {}  # a set in order: missing values of one list are one fault
+    for detail in error.errors(include_url=False):
+        where, message = described(detail, hint, raw)
+        lines[line((*prefix, *where), message)] = None
+    return list(lines)
+
+
+def described(detail: ErrorDetails, hint: Any, raw: Any) -> tuple[Where, str]:
+    """Place and message of one of pydantic's errors."""
+    where, here, _ = walked(detail["loc"], hint, raw)
+    _, _, holder = walked(detail["loc"][:-1], hint, raw)
+    if where and isinstance(where[-1], int) and isinstance(holder, (str, int, float)):
+        where = where[:-1]  # one number given for each of several
+    if where and detail["type"] == "missing" and isinstance(where[-1], int):
+        _, above, _ = walked(detail["loc"][:-1], hint, raw)
+        return where[:-1], f"must hold {length_of(above)} values, got {len(detail['input'])}"
+    if detail["type"] in {"union_tag_not_found", "union_tag_invalid"}:
+        return (*where, "kind"), kind_message(here, detail["input"])
+    if detail["type"] == "extra_forbidden":
+        _, above, inside = walked(detail["loc"][:-1], hint, raw)
+        known = known_keys(above, inside)
+        if len(where) > 1 and where[-1] in known_keys(hint, raw) and where[-1] not in known:
+            return where, f"unknown key, {where[-1]!r} belongs to the scene itself, before its first table"
+        return where, unknown_key(str(where[-1]), known)
+    return where, message(detail, here)
+
+
+def message(detail: ErrorDetails, hint: Any) -> str:
+    """The message of one of pydantic's errors about something of a given type."""
+    ctx, got = detail.get("ctx", {}), detail["input"]
+    match detail["type"]:
+        case "kedfem":
+            text = str(ctx["message"])
+        case "missing":
+            text = f"is required{choice(hint)}, got nothing"
+        case "literal_error":
+            text = one_of(options(hint), got)
+        case "greater_than_equal":
+            text = f"must be at least {ctx['ge']}, got {shown(got)}"
+        case "less_than_equal":
+            text = f"must be at most {ctx['le']}, got {shown(got)}"
+        case "too_short" | "too_long":
+            bound = f"at least {ctx['min_length']}" if "min_length" in ctx else f"at most {ctx['max_length']}"
+            text = f"must hold {bound}, got {ctx['actual_length']}"
+        case kind:
+            text = f"{WANTED.get(kind, detail['msg'])}, got {shown(got)}"
+    return text
+
+
+def kind_message(hint: Any, got: Any) -> str:
+    """The message about the `kind` of something that is one of several records."""
+    kinds = [kind for model in models(hint) if (kind := kind_of(model))]
+    if isinstance(got, dict) and "kind" in got:
+        return one_of(kinds, got["kind"])
+    return f"is required, {either(kinds)}, got nothing"
+
+
+def choice(hint: Any) -> str:
+    """The words to choose from, or the unit, as it stands after 'is required'."""
+    if options(hint):
+        return f", {either(options(hint))}"
+    brackets = {quantity.bracket for quantity in quantities(hint)}
+    return brackets.pop() if len(brackets) == 1 else ""

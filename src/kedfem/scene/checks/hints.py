@@ -1,0 +1,126 @@
+"""The types of the scene's keys, looked up by place: for messages and for the reference of keys."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from kedfem.scene.records.points import AxisPoints, construction_of, is_construction
+from kedfem.scene.records.units import Quantity
+
+Where = tuple[str | int, ...]
+
+
+def members(hint: Any) -> Iterator[Any]:
+    """The alternatives of a type: unions taken apart, annotations taken off."""
+    if get_origin(hint) is Annotated:
+        yield from members(get_args(hint)[0])
+    elif get_origin(hint) in {Union, types.UnionType}:
+        for part in get_args(hint):
+            yield from members(part)
+    else:
+        yield hint
+
+
+def models(hint: Any) -> list[type[BaseModel]]:
+    """The records among the alternatives of a type."""
+    return [part for part in members(hint) if isinstance(part, type) and issubclass(part, BaseModel)]
+
+
+def options(hint: Any) -> list[Any]:
+    """The values among the alternatives of a type that is a choice of fixed words or numbers."""
+    return [word for part in members(hint) if get_origin(part) is Literal for word in get_args(part)]
+
+
+def kind_of(model: type[BaseModel]) -> str | None:
+    """The word in the `kind` key of a record that is one of several."""
+    field = model.model_fields.get("kind")
+    one = field is not None and len(get_args(field.annotation)) == 1
+    return str(field.default) if field is not None and one and isinstance(field.default, str) else None
+
+
+def length_of(hint: Any) -> int:
+    """The number of values in a type that is a list of fixed length."""
+    return max((len(get_args(part)) for part in members(hint) if get_origin(part) is tuple), default=0)
+
+
+def field_hint(field: FieldInfo) -> Any:
+    """The type of a field with its annotations."""
+    hint: Any = field.annotation
+    for extra in field.metadata:
+        hint = Annotated[hint, extra]
+    return hint
+
+
+def keys(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The keys of a record as they are written in a scene, and their fields."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
+def quantities(hint: Any) -> set[Quantity]:
+    """The quantities in a type."""
+    found: set[Quantity] = (
+        {extra for extra in get_args(hint)[1:] if isinstance(extra, Quantity)}
+        if get_origin(hint) is Annotated
+        else set()
+    )
+    return found.union(*(quantities(part) for part in get_args(hint) if not isinstance(part, (str, int))))
+
+
+def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
+    """The record of a table that stands for a point or an axis; None if it stands for neither."""
+    units = {
+        frozenset(x.unit for x in quantities(part)) for part in members(hint) if get_origin(part) is tuple
+    }
+    if models(hint) and not is_construction(raw):
+        return None
+    if units == {frozenset({"m"})}:
+        return construction_of(raw)
+    return AxisPoints if units == {frozenset({"1"})} else None
+
+
+def below(hint: Any, part: str | int, raw: Any) -> Any:
+    """The type of one key or item of something of a given type; None if it has none."""
+    for member in members(hint):
+        inner = get_args(member)
+        if get_origin(member) is dict and isinstance(part, str):
+            return inner[1]
+        if get_origin(member) is tuple and isinstance(part, int):
+            return inner[0] if inner[-1] is Ellipsis or part >= len(inner) else inner[part]
+    if isinstance(raw, Mapping) and (constructed := construction(hint, raw)) is not None:
+        hint = constructed
+    for model in models(hint):
+        wanted = raw.get("kind") if isinstance(raw, dict) else None
+        if part in keys(model) and (kind_of(model) in [None, wanted]):
+            return field_hint(keys(model)[str(part)])
+    return None
+
+
+def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
+    """Where an error of pydantic is: the place without names of union members, the type and the raw input."""
+    where: list[str | int] = []
+    for part in loc:
+        known = {kind_of(model) for model in models(hint)} - {None}
+        if part == "[key]" or (len(known) > 1 and part in known):
+            continue
+        hint = below(hint, part, raw)
+        if isinstance(part, int) and isinstance(raw, Mapping):
+            continue  # one table given for a list of one
+        where.append(part)
+        try:
+            raw = raw[part]
+        except (KeyError, IndexError, TypeError):
+            raw = None
+    return tuple(where), hint, raw
+
+
+def known_keys(hint: Any, raw: Any) -> list[str]:
+    """The keys that a record of a given type may have, for raw input of one kind if there are several."""
+    kind = raw.get("kind") if isinstance(raw, dict) else None
+    made = construction(hint, raw) if isinstance(raw, Mapping) else None
+    hint = made or hint
+    return [key for model in models(hint) if kind_of(model) in [None, kind] for key in keys(model)]

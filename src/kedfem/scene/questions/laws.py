@@ -1,0 +1,213 @@
+"""The drives' angles or travels and the factors of loads and springs over time, in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import MotionError
+from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.records.loads import Factor
+from kedfem.scene.records.scene import Scene
+
+Times = Float[np.ndarray, " t"]
+Law = tuple[Times, Times, Times]
+
+
+def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
+    """Angle, or travel, of a driven joint and its derivatives.
+
+    Parameters
+    ----------
+    motion : law of motion of the drive; None where nothing is driven: the angle is zero
+    t : (t,) [s]
+        Times, from 0 on.
+
+    Returns
+    -------
+    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²; of a slide m, m/s, m/s²]
+        Relative to the reference position; right-hand derivatives where a law has a jump.
+
+    Raises
+    ------
+    MotionError
+        A time outside the table of a table law.
+    """
+    t = np.asarray(t, dtype=float)
+    match motion:
+        case ConstantSpeed(speed=w):
+            return w * t, np.full_like(t, w), np.zeros_like(t)
+        case Ramp():
+            return ramp(motion, t)
+        case Table():
+            return spline(motion, t)
+        case Cycloidal() | Polynomial():
+            return rise_dwell(motion, t)
+        case Harmonic(frequency=f):
+            w, a = 2 * np.pi * f, motion.height
+            sine, cosine = np.sin(w * t + motion.phase), np.cos(w * t + motion.phase)
+            return a * (sine - np.sin(motion.phase)), a * w * cosine, -a * w**2 * sine
+        case None:
+            return np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
+
+
+def path_parameter(scene: Scene, t: Times) -> Law:
+    """Place on the linkage's path and its derivatives: the drive's angle or travel; of several drives the time.
+
+    In a static analysis the mechanism stands still in each place: the derivatives are zero.
+
+    Parameters
+    ----------
+    t : (t,) [s]
+
+    Raises
+    ------
+    MotionError
+        A time outside the table of a table law.
+    """
+    t = np.asarray(t, dtype=float)
+    several = len(scene.driven_joints) > 1
+    found = (t, np.ones_like(t), np.zeros_like(t)) if several else drive_angle(scene.motion, t)
+    if scene.analysis.kind != "static":
+        return found
+    return found[0], np.zeros_like(found[0]), np.zeros_like(found[0])
+
+
+def ramp(motion: Ramp, t: Times) -> Law:
+    """A speed that rises from 0 to ω in T: linearly, or as ω/2 (1 − cos πt/T)."""
+    w, T = motion.speed, motion.time
+    up = np.minimum(t, T)
+    k = np.pi / T
+    if motion.shape == "smooth":
+        phi = 0.5 * w * (up - np.sin(k * up) / k)
+        dphi, ddphi = 0.5 * w * (1.0 - np.cos(k * up)), 0.5 * w * k * np.sin(k * up)
+    else:
+        phi, dphi, ddphi = 0.5 * w * up**2 / T, w * up / T, np.full_like(t, w / T)
+    return phi + w * (t - up), dphi, np.where(t < T, ddphi, 0.0)
+
+
+def spline(motion: Table, t: Times) -> Law:
+    """The cubic spline through a table; with a tolerance the smoothest quintic one that passes so close."""
+    from scipy.interpolate import BSpline, CubicSpline, splrep
+
+    first, last = motion.time[0], motion.time[-1]
+    slack = 1e-9 * (last - first)
+    if t.size and (t.min() < first - slack or t.max() > last + slack):
+        wrong = t.min() if t.min() < first - slack else t.max()
+        raise MotionError(
+            f"motion.time of a drive: must reach t = {wrong:.6g} s, got a table from {first:.6g} to {last:.6g} s"
+        )
+    if motion.smooth is None:
+        curve = CubicSpline(motion.time, motion.values)
+        return curve(t), curve(t, 1), curve(t, 2)
+    bound = len(motion.time) * motion.smooth**2
+    knots, coefficients, order = splrep(motion.time, motion.values, k=min(5, len(motion.time) - 1), s=bound)
+    smooth = BSpline(knots, coefficients, order)
+    return smooth(t), smooth(t, 1), smooth(t, 2)
+
+
+def table_noise(motion: Table) -> tuple[float, float]:
+    """How far the values of a table are out of a smooth curve, and what that makes of its acceleration.
+
+    Divided differences of growing order take away what is smooth; of independent errors of standard deviation σ a
+    difference whose weights have unit norm keeps σ. The least of those of orders 4 to 8 is the estimate (R. W. Hamming,
+    Numerical Methods for Scientists and Engineers, 1962, on the noise in a table). A second difference then has an
+    error of √6 σ/h², to be compared with the mean square of all of them. A harmonic motion sampled six times in a
+    period still counts as smooth; one of 30 deg amplitude at every degree of its phase, rounded to 0.01 deg, does not.
+
+    Returns
+    -------
+    σ [rad or m], and the share of the acceleration that is noise [-]; zeros of a table of fewer than 12 times
+    """
+    t, y = np.array(motion.time), np.array(motion.values)
+    if len(t) < 12:
+        return 0.0, 0.0
+    noise = min(_left_by_differences(t, y, order) for order in range(4, 9))
+    h = np.diff(t)
+    second = 2 * np.diff(np.diff(y) / h) / (h[1:] + h[:-1])
+    scale = float(np.sqrt(np.mean(second**2)))
+    rough = float(np.sqrt(6) * noise / np.median(h) ** 2)
+    return noise, rough / scale if scale > 0 else 0.0
+
+
+def _left_by_differences(t: Times, y: Times, order: int) -> float:
+    """Mean square of divided differences whose weights have unit norm."""
+    window = np.lib.stride_tricks.sliding_window_view
+    times, values = window(t, order + 1), window(y, order + 1)
+    apart = times[:, :, None] - times[:, None, :] + np.eye(order + 1)
+    span = (times[:, -1] - times[:, 0])[:, None, None] + 0 * apart
+    weights = 1 / np.prod(np.where(np.eye(order + 1) > 0, 1.0, apart / span), axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    left = ((values - values[:, :1]) * weights).sum(axis=1)
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def rise_dwell(motion: Cycloidal | Polynomial, t: Times) -> Law:
+    """Rise, dwell, return and dwell, repeated; without a return time only the rise."""
+    rise, back = motion.rise, motion.return_time
+    if back is None:
+        s, ds, dds = unit_rise(motion, np.clip(t / rise, 0.0, 1.0))
+        return motion.height * s, motion.height / rise * ds, motion.height / rise**2 * dds
+    top = rise + motion.dwell
+    tau = np.mod(t, top + back + motion.dwell_after)
+    falling = tau >= top
+    span = np.where(falling, back, rise)
+    s, ds, dds = unit_rise(motion, np.clip(np.where(falling, tau - top, tau) / span, 0.0, 1.0))
+    sign = np.where(falling, -1.0, 1.0) * motion.height
+    return np.where(falling, motion.height, 0.0) + sign * s, sign / span * ds, sign / span**2 * dds
+
+
+def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
+    """A law's rise from 0 to 1 over 0 ≤ x ≤ 1, and its two derivatives."""
+    if isinstance(motion, Cycloidal):
+        w = 2.0 * np.pi
+        return x - np.sin(w * x) / w, 1.0 - np.cos(w * x), w * np.sin(w * x)
+    if motion.order == 5:
+        return (
+            x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
+            30.0 * x**2 * (1.0 - x) ** 2,
+            60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+        )
+    return (
+        x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3),
+        140.0 * x**3 * (1.0 - x) ** 3,
+        420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x),
+    )
+
+
+def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
+    """A factor at times t (t,) [s] and angles phi (t,) of the drive [rad].
+
+    Linear between the table's points; held outside, or repeated after its period.
+    """
+    at, value = np.array(factor.at), np.array(factor.value)
+    x = np.asarray(t if factor.over == "time" or phi is None else phi, dtype=float)
+    if factor.period is not None:
+        x = at[0] + np.mod(x - at[0], factor.period)
+        at, value = np.append(at, at[0] + factor.period), np.append(value, value[0])
+    return np.asarray(np.interp(x, at, value))
+
+
+def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
+    """All tables of a scene that multiply something, each with where it stands: of loads, of springs."""
+    yield from ((f"loads.{name}.factor", load.factor) for name, load in scene.loads.items())
+    for name, spring in scene.springs.items():
+        yield f"springs.{name}.stiffness_factor", spring.stiffness_factor
+
+
+def is_constant(factor: Factor) -> bool:
+    """Whether it is the same always."""
+    return len(set(factor.value)) < 2
+
+
+def factor_table(factor: Factor, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Times from 0 to an end, and the factors there of one over time, linear between, its periods written out."""
+    at, value = np.array(factor.at), np.array(factor.value)
+    if factor.period is None:
+        return factor.at, factor.value
+    whole = np.arange(np.floor(-at[0] / factor.period) - 1, np.ceil((end - at[0]) / factor.period) + 1)
+    times = (at + factor.period * whole[:, None]).ravel()
+    new = np.concatenate([[True], np.diff(times) > 1e-12 * factor.period])
+    return tuple(times[new].tolist()), tuple(np.tile(value, len(whole))[new].tolist())

@@ -1,0 +1,82 @@
+"""Joints whose directions vary in time, as they slide or turn between links that move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kedfem.scene.records.drives import Drive
+from kedfem.scene.records.links import GROUND, Joint
+from kedfem.scene.records.scene import Scene
+
+SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
+
+
+def by_constraint_equations(
+    joint: Joint, drive: Drive | None = None, kinds: frozenset[str] = frozenset()
+) -> bool:
+    """Whether a joint cannot be said of points that its links share for good.
+
+    Parameters
+    ----------
+    drive : of the joint, if it is driven
+    kinds : what its links are meshed as: a plane link has no rotation that it could share with a beam
+    """
+    if joint.kind == "weld" and kinds == {"plane", "beam"}:
+        return True
+    if joint.bushing is not None or (drive is not None and drive.shaft_stiffness is not None):
+        return True
+    if joint.kind in SHARED:
+        return drive is not None and GROUND not in joint.links
+    return joint.kind != "prismatic" or drive is not None or GROUND not in joint.links
+
+
+def enforced_by_equations(scene: Scene, name: str) -> bool:
+    """Whether a joint of a scene is enforced by constraint equations."""
+    joint = scene.joints[name]
+    kinds = frozenset(scene.links[each].category for each in joint.links if each in scene.links)
+    return by_constraint_equations(joint, scene.driven_joints.get(name), kinds)
+
+
+def moving_grounds(scene: Scene) -> dict[str, str]:
+    """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint.
+
+    One that slides on the ground and whose other joints all share points is a slider instead: its mass rides on a link.
+    """
+    shapeless = {
+        name for name, link in scene.links.items() if link.fidelity == "rigid" and link.shape is None
+    }
+    return dict(_moved_by_drives(shapeless, scene)) if shapeless else {}
+
+
+def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, str]]:
+    """Links that are held by one driven joint, on the ground or on another such link, nearest to the ground first."""
+    known, left = {GROUND}, dict.fromkeys(shapeless)
+    while left:
+        found = [(name, hub) for name in left if (hub := _hub(name, known, shapeless, scene))]
+        if not found:
+            return
+        for name, hub in found:
+            known.add(name)
+            del left[name]
+            yield name, hub
+
+
+def _hub(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
+    """The driven joint that moves a link without a shape, "" if other joints hold it or there is none."""
+    drives, own = (
+        scene.driven_joints,
+        {key: joint for key, joint in scene.joints.items() if name in joint.links},
+    )
+    inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]
+    if len(inner) != 1 or (drive := drives.get(inner[0])) is None:
+        return ""
+    hub = own[inner[0]]
+    if hub.kind not in ("revolute", "prismatic") or hub.bushing or drive.shaft_stiffness is not None:
+        return ""
+    if hub.kind == "prismatic" and GROUND in hub.links:
+        others = {
+            key: joint for key, joint in own.items() if key != inner[0] and not shapeless >= set(joint.links)
+        }
+        if others and not any(by_constraint_equations(each, drives.get(key)) for key, each in others.items()):
+            return ""
+    return inner[0]

@@ -1,0 +1,191 @@
+"""Which beams are planar: those that nothing in the scene moves out of a plane z = constant.
+
+What moves one out of it is told as faults, each with its place, as a beam may be said to be planar.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from kedfem.scene.questions.moving_joints import enforced_by_equations
+from kedfem.scene.records.base import Fault
+from kedfem.scene.records.links import Joint
+from kedfem.scene.records.points import XYZ, Apart
+from kedfem.scene.records.scene import Scene
+from kedfem.scene.records.shapes import Bar, Polyline
+from kedfem.scene.records.wording import NOUNS
+
+FLAT = 1e-9  # how far from the plane, relative to the size of the scene
+Where = tuple[str | int, ...]
+Placed = tuple[Where, Any]
+"""A record and its place in the scene."""
+
+
+def spatial_beams(scene: Scene) -> frozenset[str]:
+    """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
+    kinds = {
+        name: link.beam for name, link in scene.links.items() if link.category == "beam" or link.rigid_line
+    }
+    open_ones = [name for name, kind in kinds.items() if kind is None]
+    found = {name for name, kind in kinds.items() if kind == "spatial"}
+    if any(_common_obstacles(scene, "")):
+        found.update(open_ones)
+    around = _by_link(scene)
+    found.update(name for name in open_ones if any(_own_obstacles(scene, name, around[name])))
+    welds = any(joint.kind == "weld" for joint in scene.joints.values())
+    beside = {name: welded(scene, name) for name in open_ones} if welds else {}
+    while more := {name for name, others in beside.items() if others & found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def rigid_in_space(scene: Scene, name: str) -> bool:
+    """Whether a rigid link moves as a body in space: it has a solid shape, and no drive simply carries it along."""
+    link = scene.links[name]
+    if link.category != "rigid" or link.rigid_line or link.shape is None:
+        return False
+    return not any(
+        name in scene.joints[each].links and not enforced_by_equations(scene, each)
+        for each in scene.driven_joints.keys() & scene.joints.keys()
+    )
+
+
+def welded(scene: Scene, name: str) -> set[str]:
+    """What is welded to a link."""
+    pairs = [joint.links for joint in scene.joints.values() if joint.kind == "weld"]
+    return {other for pair in pairs if name in pair for other in pair} - {name}
+
+
+def obstacles(scene: Scene, name: str) -> Iterator[Fault]:
+    """Why a beam cannot be planar."""
+    yield from _common_obstacles(scene, f"for the planar beam {name!r}")
+    yield from _own_obstacles(scene, name, _by_link(scene)[name])
+
+
+def _common_obstacles(scene: Scene, whose: str) -> Iterator[Fault]:
+    """What moves any beam of the scene out of the plane: axes of joints, gravity, loads."""
+    for name, joint in scene.joints.items():
+        yield from _joint_obstacles(("joints", name), joint, whose)
+    yield from leaving(scene, whose)
+
+
+def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterator[Fault]:
+    """What moves one beam out of the plane: its shape, and what is around it."""
+    whose, around, place = f"for the planar beam {name!r}", list(around), ("links", name, "shape")
+    shape = scene.links[name].shape
+    if isinstance(shape, Polyline):
+        for key in ("smooth", "up"):
+            if getattr(shape, key):
+                yield (*place, key), "must be left out for a planar beam, got one"
+    if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
+        yield (*place, "up"), f"must be along z {whose}, got {vector(shape.upward)}"
+    for where, record in around:
+        others = [x for x in getattr(record, "links", ()) if x in scene.links and x != name]
+        if getattr(record, "kind", None) == "weld" and others:
+            other = scene.links[others[0]].category
+            if other not in {"beam", "plane", "rigid"} or rigid_in_space(scene, others[0]):
+                noun = NOUNS.get(other, "rigid link")
+                yield (*where, "kind"), f"must be a hinge {whose}, got a weld to a {noun}"
+        centre = getattr(record, "centre", None)
+        if centre is not None and math.dist(centre, record.at) > FLAT:
+            at = f"must be its point {vector(record.at)} {whose} [m], got {vector(centre)}"
+            yield (*where, "centre"), at
+    yield from off_plane(around, f"the planar beam {name!r}")
+
+
+def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
+    """Gravity and forces out of the xy plane, and torques in it."""
+    if scene.gravity[2] != 0.0:
+        yield ("gravity",), f"must lie in the xy plane {whose} [m/s^2], got {vector(scene.gravity)}"
+    for name, load in scene.loads.items():
+        given = getattr(load, "vector", None)
+        if given is None:
+            continue
+        if load.kind == "torque" and any(given[:2]):
+            yield ("loads", name, "vector"), f"must be along z {whose}, got {vector(given)}"
+        elif load.kind != "torque" and given[2] != 0.0:
+            yield ("loads", name, "vector"), f"must lie in the xy plane {whose}, got {vector(given)}"
+
+
+def _joint_obstacles(where: Where, joint: Joint, whose: str) -> Iterator[Fault]:
+    """A joint that turns or moves something out of the plane."""
+    axis, kind = joint.axis, joint.kind
+    upright = kind in {"revolute", "cylindrical", "screw", "planar"}
+    if upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
+        yield (*where, "axis"), f"must be along z {whose}, got {vector(axis)}"
+    if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
+        yield (*where, "axis"), f"must lie in the xy plane {whose}, got {vector(axis)}"
+    if kind == "universal":
+        yield (*where, "kind"), f"must be one that turns about z only {whose}, got a universal joint"
+
+
+def vector(parts: tuple[float, ...]) -> str:
+    """A vector as text."""
+    return "(" + ", ".join(f"{part:.6g}" for part in parts) + ")"
+
+
+def off_plane(records: Iterable[Placed], of: str) -> Iterator[Fault]:
+    """Points of records that are not in the z plane of the first; `of` says what lies in it."""
+    placed = [
+        ((*where, *key), point)
+        for where, record in records
+        for key, point in _points(record)
+        if all(math.isfinite(part) for part in point)
+    ]
+    if not placed:
+        return
+    first = placed[0][1]
+    size = max(math.dist(point[:2], first[:2]) for _, point in placed) or 1.0
+    for where, point in placed:
+        if abs(point[2] - first[2]) > FLAT * size:
+            wanted = f"must lie in the plane z = {first[2]:.6g} of {of} [m]"
+            yield where, f"{wanted}, got z = {point[2]:.6g}"
+
+
+def _by_link(scene: Scene) -> dict[str, list[Placed]]:
+    """Each link, its joints and what acts on it or reads it."""
+    out: dict[str, list[Placed]] = {name: [(("links", name), link)] for name, link in scene.links.items()}
+    for name, joint in scene.joints.items():
+        for link in dict.fromkeys(joint.links):
+            out.get(link, []).append((("joints", name), joint))
+    for where, record in on_links(scene):
+        out.get(record.link, []).append((where, record))
+    for spring in scene.springs:
+        ends = spring_ends(scene, spring)
+        for link in dict.fromkeys(end.link for _, end in ends):
+            out.get(link, []).extend(ends)
+    return out
+
+
+def on_links(scene: Scene) -> Iterator[Placed]:
+    """Loads, bodies and probes."""
+    for name, load in scene.loads.items():
+        yield ("loads", name), load
+    for name, body in scene.bodies.items():
+        yield ("bodies", name), body
+    for name, probe in scene.output.probes.items():
+        yield ("output", "probes", name), probe
+
+
+def spring_ends(scene: Scene, name: str) -> list[Placed]:
+    """The ends of a spring between two points."""
+    ends = getattr(scene.springs[name], "between", None) or ()
+    return [(("springs", name, "between", i), end) for i, end in enumerate(ends)]
+
+
+def _points(record: Any) -> Iterator[tuple[Where, XYZ]]:
+    """The points of a link, joint, load, body or probe, with their keys."""
+    shape = getattr(record, "shape", None)
+    for key in ("between", "points"):
+        for i, point in enumerate(getattr(shape, key, ())):
+            yield ("shape", key, i), point
+    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
+        yield ("shape", "outline", i), getattr(item, "to", item)
+    at = getattr(record, "at", None)
+    for name, point in at.points.items() if isinstance(at, Apart) else ():
+        yield ("at", name), point
+    for key in ("at", "centre"):
+        if getattr(record, key, None) is not None:
+            yield (key,), getattr(record, key)

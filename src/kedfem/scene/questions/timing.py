@@ -1,0 +1,122 @@
+"""The time steps of an analysis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kedfem.scene.questions.laws import drive_angle
+from kedfem.scene.records.analysis import WITHOUT_VIBRATION
+from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp
+from kedfem.scene.records.scene import Scene
+
+STEPS_PER_REVOLUTION = 720
+POSITIONS = 72  # in a revolution where the mechanism does not vibrate
+
+
+@dataclass(frozen=True, slots=True)
+class TimeGrid:
+    """Equal time steps from t = 0.
+
+    Parameters
+    ----------
+    step : time step [s]
+    steps : number of steps; the analysis has one time point more.
+    """
+
+    step: float
+    steps: int
+
+    @property
+    def end(self) -> float:
+        """Time at the end [s]."""
+        return self.step * self.steps
+
+
+def turning_speed(motion: MotionLaw | None) -> float:
+    """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not, or where there is none."""
+    return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
+
+
+def scene_speed(scene: Scene) -> float:
+    """The speed [rad/s] at which the only drive of a scene goes on turning; 0 for a slide, for several and for none."""
+    slides = any(scene.joints[name].kind == "prismatic" for name in scene.driven_joints)
+    return 0.0 if slides else turning_speed(scene.motion)
+
+
+def cycle(motion: MotionLaw | None) -> float | None:
+    """Time [s] after which a drive's law repeats itself, a whole turn apart or not; None if it does not.
+
+    A ramp repeats itself once it has sped up.
+    """
+    if isinstance(motion, (ConstantSpeed, Ramp)):
+        return 2.0 * math.pi / abs(motion.speed) if motion.speed else None
+    if isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is not None:
+        return motion.rise + motion.dwell + motion.return_time + motion.dwell_after
+    return 1.0 / motion.frequency if isinstance(motion, Harmonic) else None
+
+
+def without_vibration(scene: Scene) -> bool:
+    """Whether each position is found by itself, static or quasi-static: there are no time steps then."""
+    return scene.analysis.kind in WITHOUT_VIBRATION
+
+
+def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
+    """Time [s] at which a drive that goes on turning has made so many turns."""
+    angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
+    if isinstance(motion, ConstantSpeed):
+        return angle / speed
+    if not isinstance(motion, Ramp):
+        raise ValueError(f"a {motion.kind} drive has no turns")
+    if angle >= 0.5 * speed * motion.time:  # the ramp, of either shape, takes half the angle of full speed
+        return angle / speed + 0.5 * motion.time
+    from scipy.optimize import brentq
+
+    def short_of(t: float) -> float:
+        return abs(float(drive_angle(motion, np.array([t]))[0][0])) - angle
+
+    return float(brentq(short_of, 0.0, motion.time, xtol=1e-15, rtol=1e-14))
+
+
+def time_grid(scene: Scene) -> TimeGrid:
+    """Step and number of steps of a scene's analysis.
+
+    With ``steps_per_revolution`` the step is the turn at the drive's final speed, divided, and the last step may
+    pass the end; ``step`` is shortened so that a whole number reaches the end. A steady motion has an even number of
+    steps, shortened so. Where the mechanism does not vibrate one revolution is enough, and a structure needs no time.
+    """
+    analysis, motion = scene.analysis, scene.motion
+    steady = analysis.kind == "steady"
+    end = analysis.end_time
+    if motion is not None and analysis.revolutions is not None:
+        end = time_of_revolutions(motion, analysis.revolutions)
+    if end is None and analysis.kind != "transient":
+        end = cycle(motion)
+    if end is None and analysis.kind == "static" and not scene.driven_joints:
+        return TimeGrid(1.0, 1) if analysis.step is None else _grid(scene, 1.0)
+    if end is None:
+        raise ValueError("an analysis needs turns or an end time")
+    grid = _grid(scene, end)
+    return TimeGrid(end / (steps := grid.steps + grid.steps % 2), steps) if steady else grid
+
+
+def _grid(scene: Scene, end: float) -> TimeGrid:
+    """Equal steps up to an end, or a little beyond."""
+    analysis = scene.analysis
+    if analysis.step is not None:
+        steps = max(1, math.ceil(end / analysis.step - 1e-9))
+        return TimeGrid(end / steps, steps)
+    speed = scene_speed(scene)
+    usual = POSITIONS if without_vibration(scene) else STEPS_PER_REVOLUTION
+    if not speed:
+        return TimeGrid(end / usual, usual)
+    step = 2.0 * math.pi / (speed * (analysis.steps_per_revolution or usual))
+    return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
+
+
+def turn_steps(scene: Scene) -> float | None:
+    """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
+    speed = scene_speed(scene)
+    return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

@@ -1,0 +1,172 @@
+"""Files beside the scene: TOML text, parts and motion tables."""
+
+from __future__ import annotations
+
+import math
+import re
+import stat
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from kedfem.errors import SceneError
+from kedfem.scene.checks.faults import fault_lines, place
+from kedfem.scene.checks.hints import Where
+from kedfem.scene.checks.parts import Parts
+from kedfem.scene.read.placing import Placement
+from kedfem.scene.records.points import known_points
+from kedfem.scene.records.shapes import Cad, MeshFile, Part, PartGeometry
+
+MOST_TEXT = 50_000_000  # bytes of a scene, part or table
+DEEPEST = 100  # tables in tables
+DOTTED = re.compile(rf"\s*\[*\s*(?:[\w\-]+\s*\.\s*){{{DEEPEST},}}")
+
+
+def file_text(path: Path) -> str:
+    """Text of a file, UTF-8 with or without a byte order mark.
+
+    Raises
+    ------
+    SceneError
+        No such file, not a file, not readable, not text.
+    """
+    try:
+        found = path.stat()
+        if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
+            raise SceneError(f"{path}: must be a regular file, got a pipe or a device")
+        if found.st_size > MOST_TEXT:
+            raise SceneError(
+                f"{path}: must be at most {MOST_TEXT / 1e6:g} MB, got {found.st_size / 1e6:.4g} MB"
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise SceneError(f"{path}: must be a file, got nothing there") from None
+    except UnicodeDecodeError as reason:
+        raise SceneError(
+            f"{path}: must be text in UTF-8, got other bytes at position {reason.start}"
+        ) from None
+    except ValueError:  # a zero byte in its name
+        raise SceneError("must be a path without control characters, got one with a zero byte") from None
+    except OSError as reason:
+        raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
+
+
+def outside(raw: Any, folder: Path) -> list[str]:
+    """Faults of all names of files and folders in a raw scene that lead out of its own folder, links followed."""
+    names: list[tuple[str, str]] = []
+
+    def noted(where: Where, name: str) -> str:
+        names.append((place(where), name))
+        return name
+
+    _with_names(raw, (), noted)
+    wanted = "must be within the scene's folder (--within)"
+    return [f"{where}: {wanted}, got {name!r}" for where, name in names if not inside(folder, name)]
+
+
+def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
+    """A raw scene with its names of files made relative to the folder that its own is `beside` of."""
+    changed: dict[str, Any] = _with_names(raw, (), lambda where, name: str(beside / name) if name else name)
+    return changed
+
+
+def _with_names(x: Any, where: Where, of: Callable[[Where, str], str]) -> Any:
+    """Raw input with something in place of its names of files and folders."""
+    if isinstance(x, list):
+        return [_with_names(each, (*where, k), of) for k, each in enumerate(x)]
+    if isinstance(x, Mapping):
+        return {key: _with_names(each, (*where, str(key)), of) for key, each in x.items()}
+    names = where and isinstance(x, str) and (where[-1] in {"file", "folder"} or is_step_file(where))
+    return of(where, x) if names else x
+
+
+def is_step_file(where: Where) -> bool:
+    """Whether a key is the CAD file of a link, not the step of an analysis."""
+    inner = where[2:] if where and where[0] == "patterns" else where
+    return len(inner) == 3 and inner[0] == "links" and inner[2] == "step"
+
+
+def inside(folder: Path, name: str | Path) -> bool:
+    """Whether a file is in a folder, links followed."""
+    try:
+        return (folder / name).resolve().is_relative_to(folder.resolve())
+    except (ValueError, OSError, RuntimeError):  # no name of a file at all, or links in a circle
+        return False
+
+
+def toml_table(path: Path) -> tuple[dict[str, Any], str]:
+    """Content and text of a TOML file.
+
+    Raises
+    ------
+    SceneError
+        Not readable, empty or not TOML; the line is named.
+    """
+    text = file_text(path)
+    for k, line in enumerate(text.splitlines(), start=1):
+        if DOTTED.match(line):
+            raise SceneError(f"{path}, line {k}: must be nested less than {DEEPEST} deep, got more")
+    try:
+        table = tomllib.loads(text)
+    except RecursionError:
+        raise SceneError(f"{path}: must be nested less than {DEEPEST} deep, got more") from None
+    except tomllib.TOMLDecodeError as reason:
+        found = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(reason), re.DOTALL)
+        number = found[2] if found else str(len(text.splitlines()))
+        raise SceneError(
+            f"{path}, line {number}: must be valid TOML, got: {found[1] if found else str(reason)}"
+        ) from None
+    if not table:
+        raise SceneError(f"{path}: must hold at least one key, got an empty file")
+    return table, text
+
+
+def part_geometry(path: Path) -> PartGeometry:
+    """The geometry of a part from its TOML file; may hold a table of `points` of its own, like a scene.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the file, each preceded by its name.
+    """
+    raw, _ = toml_table(path)
+    placement = Placement(raw.get("points"), {})
+    placement.place_all()
+    faults = placement.faults
+    shape = {key: value for key, value in raw.items() if key != "points"}
+    try:
+        with known_points(placement):
+            part = PartGeometry.model_validate(shape)
+    except ValidationError as error:
+        faults = faults + fault_lines(error, PartGeometry, shape)
+    if faults:
+        raise SceneError([f"{path.name}: {fault}" for fault in faults])
+    return part
+
+
+def file_faults(parts: Parts) -> Iterator[str]:
+    """Files of shapes that are missing, and parts that do not fit between their points."""
+    for link in parts.links.values():
+        shape = link.record.shape if link.record is not None else None
+        if isinstance(shape, MeshFile) and not (parts.folder / shape.file).is_file():
+            yield link.fault(
+                "shape", f"must be a mesh file, got nothing at {parts.folder / shape.file}", "file"
+            )
+        if isinstance(shape, Cad) and not (parts.folder / shape.file).is_file():
+            key, inner = ("step", ()) if link.has("step") else ("shape", ("file",))
+            yield link.fault(key, f"must be a CAD file, got nothing at {parts.folder / shape.file}", *inner)
+        if isinstance(shape, Part):
+            try:
+                part = part_geometry(parts.folder / shape.file)
+            except SceneError as error:
+                yield from (link.fault("shape", fault, "file") for fault in error.faults)
+                continue
+            wanted, got = math.dist(*shape.between), math.dist(part.origin, part.x_point)
+            if abs(wanted - got) > 1e-6 * got:
+                message = (
+                    f"must be as far apart as origin and x_point of the part {got:.9g} [m], got {wanted:.9g}"
+                )
+                yield link.fault("shape", message, "between")

@@ -1,0 +1,125 @@
+"""`include`: the tables of other scene files, in those of a scene."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from kedfem.errors import SceneError
+from kedfem.scene.checks.faults import fault_lines
+from kedfem.scene.read.files import renamed, toml_table
+from kedfem.scene.records.base import FileName
+from kedfem.scene.records.wording import shown
+
+KEY = "include"
+MOST_FILES = 100  # read for one scene; each of two files that include the next two would be 2**n
+FILES: TypeAdapter[list[str]] = TypeAdapter(list[FileName])
+
+
+def with_includes(
+    raw: Mapping[str, Any],
+    folder: Path,
+    file: Path | None = None,
+    allowed: Callable[[Path], bool] = lambda path: True,
+) -> dict[str, Any]:
+    """A raw scene with the tables of the files that it includes.
+
+    Tables are joined key by key; what the scene has itself stands, and of several files the later stands. A table of
+    another `kind` takes the place of the whole one. Names of files in an included one become relative to this folder.
+
+    Parameters
+    ----------
+    raw : keys and values of the scene
+    folder : what its file names are relative to
+    file : the scene's own
+    allowed : whether a file may be read
+
+    Raises
+    ------
+    SceneError
+        A file that is missing, not allowed, no regular file or not TOML; one that includes itself; too many.
+    """
+    return _Including(folder, allowed).of(raw, Path(), () if file is None else (file.resolve(),))
+
+
+class _Including:
+    """One scene's included files, counted."""
+
+    def __init__(self, folder: Path, allowed: Callable[[Path], bool]) -> None:
+        self.folder, self.allowed, self.read = folder, allowed, 0
+
+    def of(self, raw: Mapping[str, Any], beside: Path, within: tuple[Path, ...]) -> dict[str, Any]:
+        """A table of keys, in a file of a folder `beside` the scene's, with all that it includes."""
+        own = {key: value for key, value in raw.items() if key != KEY}
+        base: dict[str, Any] = {}
+        for name in named_files(raw.get(KEY)):
+            path = self.folder / beside / name
+            self._refuse(path, name, within)
+            found, _ = toml_table(path)
+            inner = (beside / name).parent
+            tables = self.of(found, inner, (*within, path.resolve()))
+            base = joined(base, renamed(tables, Path(name).parent))
+        return joined(base, own)
+
+    def _refuse(self, path: Path, name: str, within: tuple[Path, ...]) -> None:
+        self.read += 1
+        if not self.allowed(path):
+            raise SceneError(f"{KEY}: must be within the scene's folder (--within), got {name!r}")
+        if path.resolve() in within:
+            circle = " → ".join(each.name for each in (*within, path.resolve()))
+            raise SceneError(f"{KEY}: must not include itself, got {circle}")
+        if self.read > MOST_FILES:
+            raise SceneError(f"{KEY}: must read at most {MOST_FILES} files, got more")
+
+
+def named_files(given: object) -> list[str]:
+    """The names of the files that a scene includes, one or a list.
+
+    Raises
+    ------
+    SceneError
+        They are no names of files.
+    """
+    if given is None:
+        return []
+    listed = [given] if isinstance(given, str) else given
+    if not isinstance(listed, (list, tuple)):
+        raise SceneError(f"{KEY}: must be the name of a scene file or a list of them, got {shown(given)}")
+    try:
+        return FILES.validate_python(listed)
+    except ValidationError as error:
+        raise SceneError(fault_lines(error, list[FileName], listed, (KEY,))) from None
+
+
+def joined(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Two tables in one, key by key; of anything else, and of tables of two kinds, the second."""
+    if "kind" in own and own["kind"] != base.get("kind", own["kind"]):
+        return dict(own)
+    out = {**base, **own}
+    for key in base.keys() & own.keys():
+        if isinstance(base[key], Mapping) and isinstance(own[key], Mapping):
+            out[key] = joined(base[key], own[key])
+    return out
+
+
+def toml_text(table: Mapping[str, Any]) -> str:
+    """A table of numbers, texts, lists and tables as TOML."""
+    return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())
+
+
+def _value(x: Any) -> str:
+    if isinstance(x, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(value)}" for key, value in x.items()) + " }"
+    if isinstance(x, list):
+        return "[" + ", ".join(map(_value, x)) + "]"
+    if isinstance(x, float):
+        return repr(x)
+    return json.dumps(x, ensure_ascii=False) if isinstance(x, (str, int, bool)) else str(x)
+
+
+def _key(key: str) -> str:
+    return json.dumps(key, ensure_ascii=False)

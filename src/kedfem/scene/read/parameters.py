@@ -1,0 +1,125 @@
+"""`[parameters]` of a scene, and the numbers that are expressions of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from kedfem.scene.checks.faults import line
+from kedfem.scene.checks.hints import Where, below, members
+from kedfem.scene.records.expressions import evaluated, plain_number
+from kedfem.scene.records.units import NUMBER, OVERFLOW, UNIT, Evaluated, unit_registry
+from kedfem.scene.records.wording import shown
+
+SIGN = "="
+"""What expressions begin with."""
+MOST_CHAINED = 30  # parameters that are defined by each other
+
+
+class Parameters(Mapping[str, Any]):
+    """Quantities of parameters by name, worked out when they are asked for; each fault is reported once, where it is.
+
+    Parameters
+    ----------
+    raw : the scene's `parameters` as they were given
+    """
+
+    def __init__(self, raw: object) -> None:
+        self._raw = dict(raw) if isinstance(raw, Mapping) else {}
+        self._found: dict[str, Any] = {}
+        self._failed: dict[str, str] = {}
+        self._pending: list[str] = []
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._raw)
+
+    def __len__(self) -> int:
+        return len(self._raw)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._raw
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self._failed:
+            raise ValueError(f"parameters.{name} has a fault")
+        if name in self._pending:
+            circle = " → ".join([*self._pending[self._pending.index(name) :], name])
+            raise ValueError(f"it must not be defined by itself: {circle}")
+        if name not in self._found:
+            if len(self._pending) >= MOST_CHAINED:
+                raise ValueError(
+                    f"parameters must not be defined by each other more than {MOST_CHAINED} deep"
+                )
+            self._pending.append(name)
+            try:
+                self._found[name] = self._quantity(self._raw[name])
+            except ValueError as reason:
+                self._failed[name] = f"must be {WANTED}, got {shown(self._raw[name])}: {reason}"
+                raise ValueError(f"parameters.{name} has a fault") from None
+            finally:
+                self._pending.pop()
+        return self._found[name]
+
+    def faults(self) -> list[str]:
+        """The faults of all parameters."""
+        for name in self:
+            try:
+                self[name]
+            except ValueError:
+                continue
+        return [line(("parameters", str(name)), message) for name, message in self._failed.items()]
+
+    def _quantity(self, value: object) -> Any:
+        if isinstance(value, str):
+            number = NUMBER.fullmatch(value)
+            if not value.startswith(SIGN) and not (number and (not number[2] or UNIT.fullmatch(number[2]))):
+                raise ValueError("an expression begins with =")
+            return evaluated(value.removeprefix(SIGN), self)
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < OVERFLOW:
+            return unit_registry().Quantity(float(value), "")
+        raise ValueError("it is neither")
+
+
+WANTED = "a number, a text of a number and a unit, or an expression"
+
+
+def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with its expressions worked out, and faults.
+
+    Parameters
+    ----------
+    raw : the keys and values of a scene
+    hint : its type: texts that are no numbers are left alone
+
+    Returns
+    -------
+    A changed copy: plain numbers where an expression has no unit, else texts that carry their quantity; what has a fault
+    is left as it was.
+    """
+    known = Parameters(raw.get("parameters"))
+    faults = known.faults()
+
+    def of(value: Any, kind: Any, where: Where) -> Any:
+        if isinstance(value, str) and value.startswith(SIGN) and set(members(kind)) - {type(None)} != {str}:
+            try:
+                quantity = evaluated(value.removeprefix(SIGN), known)
+            except ValueError as reason:
+                faults.append(line(where, f"must be an expression, got {shown(value)}: {reason}"))
+                return value
+            number = plain_number(quantity)
+            return carrying(value, quantity) if number is None else number
+        if isinstance(value, Mapping):
+            return {key: of(x, below(kind, key, value), (*where, key)) for key, x in value.items()}
+        if isinstance(value, list):
+            return [of(x, below(kind, k, value), (*where, k)) for k, x in enumerate(value)]
+        return value
+
+    top = {key: of(x, below(hint, key, raw), (key,)) for key, x in raw.items() if key != "parameters"}
+    return ({"parameters": raw["parameters"]} if "parameters" in raw else {}) | top, faults
+
+
+def carrying(text: str, quantity: Any) -> Evaluated:
+    """The text of an expression that carries what it comes to."""
+    made = Evaluated(text)
+    made.quantity = quantity
+    return made

@@ -1,0 +1,241 @@
+"""`patterns` of a scene: links, joints, loads and others that are repeated, turned about an axis or shifted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, get_args, get_origin
+
+import numpy as np
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
+
+from kedfem.scene.checks.faults import fault_lines, line
+from kedfem.scene.checks.hints import Where, below, members, quantities
+from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
+from kedfem.scene.records.links import spelt_out
+from kedfem.scene.records.patterns import SECTIONS, Pattern
+from kedfem.scene.records.points import XYZ
+from kedfem.scene.records.shapes import STEEP, Bar, Polyline
+from kedfem.scene.records.units import Quantity
+
+NAMES = {
+    "link": "links",
+    "links": "links",
+    "joint": "joints",
+    "joints": "joints",
+}  # keys that hold names of what
+BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by links
+FLAT = ("plate_link", "extrusion", "part")  # shapes whose thickness is along z
+PLACED, LINES = ("cad", "mesh"), ("bar", "polyline")
+ANGLE, INERTIA = Quantity("rad"), Quantity("kg*m^2")
+Tables = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Copy:
+    """One copy of a pattern's tables: its number from 0, and names of the pattern's own."""
+
+    pattern: Pattern
+    number: int
+
+    @property
+    def R(self) -> np.ndarray:
+        """Its rotation, (3, 3), by Rodrigues' formula."""
+        x, y, z = self.pattern.about
+        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = self.number * self.pattern.turn
+        return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
+
+    def called(self, section: str, name: str) -> str:
+        """The name of an entry; unchanged if it is none of the pattern's."""
+        return f"{name}_{self.number + 1}" if name in getattr(self.pattern, section) else name
+
+    def of(self, value: Any, hint: Any, key: str) -> Any:
+        """A raw value of this copy."""
+        unit = _triple(hint)
+        if isinstance(value, str):
+            return self._word(value, unit, key)
+        if isinstance(value, list):
+            if unit is not None and len(value) in (2, 3):
+                return self._vector(value, unit)
+            return [self.of(x, below(hint, k, value), key) for k, x in enumerate(value)]
+        if not isinstance(value, Mapping):
+            return value
+        made = {
+            self.called("links", name) if key in BY_LINK else name: self.of(x, below(hint, name, value), name)
+            for name, x in value.items()
+        }
+        if unit == "m" and "angle" in value and "from" in value:
+            if self.pattern.turn and self.pattern.about != (0.0, 0.0, 1.0):
+                raise ValueError(
+                    "must be coordinates in a pattern turned about another axis than z, got an angle"
+                )
+            made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
+        if key in ("factor", "stiffness_factor") and self.pattern.phase and value.get("over") == "angle":
+            if "at" not in value:
+                raise ValueError("must have its angles in a list in a pattern with a phase, got a file")
+            made["at"] = [ANGLE.number(x) + self.number * self.pattern.phase for x in value["at"]]
+        return made
+
+    def _word(self, text: str, unit: str | None, key: str) -> Any:
+        if unit == "m":
+            section, dot, name = text.partition(".")
+            return (
+                f"joints.{self.called('joints', name)}"
+                if dot and section == "joints"
+                else self.called("points", text)
+            )
+        if unit == "1" and text in ("x", "y", "z") and self.pattern.turn:
+            return (self.R @ np.eye(3)["xyz".index(text)]).tolist()
+        return self.called(NAMES[key], text) if key in NAMES else text
+
+    def _vector(self, value: list[Any], unit: str) -> Any:
+        x = np.array([Quantity(unit).number(each) for each in (*value, 0.0)[:3]])
+        if unit != "m":
+            return (self.R @ x).tolist() if self.pattern.turn else x.tolist()
+        centre = np.array(self.pattern.centre)
+        return (centre + self.R @ (x - centre) + self.number * np.array(self.pattern.shift)).tolist()
+
+    def completed(self, section: str, raw: Any, made: Any) -> Any:
+        """An entry with what it leaves open and does not move by itself; what cannot be moved is a ValueError."""
+        if not isinstance(raw, Mapping) or not self.pattern.turn:
+            return made
+        tilted = not np.allclose(self.R[:, 2], [0, 0, 1])
+        if section == "joints":
+            if isinstance(raw.get("bushing"), Mapping) and any(
+                isinstance(x, list) for x in raw["bushing"].values()
+            ):
+                raise ValueError(
+                    "must have a bushing alike in all directions in a pattern that turns, got three numbers"
+                )
+            if raw.get("kind") == "revolute" and "axis" not in raw and tilted:
+                made = {**made, "axis": self.R[:, 2].tolist()}
+        if (
+            section in {"bodies", "links"}
+            and isinstance(raw.get("inertia"), list)
+            and len(raw["inertia"]) == 6
+        ):
+            J = inertia_tensor([INERTIA.number(x) for x in raw["inertia"]])
+            made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
+        shape = spelt_out(raw).get("shape") if section == "links" else None
+        kind = shape.get("kind") if isinstance(shape, Mapping) else None
+        if kind in PLACED:
+            raise ValueError(
+                f"must not be a part of a file in a pattern that turns, got one of kind {kind!r}"
+            )
+        if kind in FLAT and tilted:
+            raise ValueError(
+                f"must be a bar or a polyline in a pattern turned about another axis than z, got {kind!r}"
+            )
+        if kind in LINES and "up" not in (shape or {}) and tilted:
+            raise ValueError(
+                "must have a shape with `up` in a pattern turned about another axis than z, got none"
+            )
+        return made
+
+
+def _triple(hint: Any) -> str | None:
+    """The unit of a type that is three numbers: of points m, of axes 1; None of another type."""
+    for part in members(hint):
+        if (
+            get_origin(part) is tuple
+            and len(get_args(part)) == 3
+            and float in set(members(get_args(part)[0]))
+        ):
+            return next((x.unit for x in quantities(part)), None)
+    return None
+
+
+def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[str], dict[str, str]]:
+    """A raw scene with its patterns written out.
+
+    Parameters
+    ----------
+    hint : type of the scene
+
+    Returns
+    -------
+    a changed copy without patterns; faults; and where each table that was made stands in a pattern, by its own place
+    """
+    given = raw.get("patterns")
+    if not isinstance(given, Mapping):
+        return dict(raw), [], {}
+    out, faults, origins = (
+        {key: x for key, x in raw.items() if key != "patterns"},
+        list[str](),
+        dict[str, str](),
+    )
+    for name, each in given.items():
+        where: Where = ("patterns", str(name))
+        try:
+            pattern = Pattern.model_validate(each)
+        except ValidationError as error:
+            faults += fault_lines(error, Pattern, each, where)
+            continue
+        for section in SECTIONS:
+            for entry, value in getattr(pattern, section).items():
+                faults += _repeated(out, origins, pattern, (*where, section, entry), value, hint)
+    return out, faults, origins
+
+
+def _repeated(
+    out: Tables, origins: dict[str, str], pattern: Pattern, where: Where, value: Any, hint: Any
+) -> list[str]:
+    """All copies of one entry, into a scene's tables; faults."""
+    section, entry = str(where[-2]), str(where[-1])
+    above = ("output", "probes") if section == "probes" else (section,)
+    tables, kind = out, hint
+    for key in above:
+        inner = tables.get(key)
+        if inner is not None and not isinstance(inner, Mapping):
+            return []  # which is a fault of its own
+        tables[key] = dict(inner or {})
+        tables, kind = tables[key], below(kind, key, tables)
+    kind = below(kind, entry, tables)
+    for number in range(pattern.count):
+        copy, made = _Copy(pattern, number), f"{entry}_{number + 1}"
+        if made in tables:
+            return [line(where, f"must have a name that is free with its number, got {made!r} twice")]
+        try:
+            tables[made] = copy.completed(
+                section, value, copy.of(value, kind, "at" if section == "points" else "")
+            )
+        except (ValueError, PydanticCustomError) as reason:
+            text = reason.message() if isinstance(reason, PydanticCustomError) else str(reason)
+            return [line(where, text)]
+        origins[".".join((*above, made))] = line(where, "")[:-2]
+    return []
+
+
+def in_patterns(fault: str, origins: Mapping[str, str]) -> str:
+    """A fault's line, its place in the pattern that its table was made from, if it was."""
+    for made, origin in origins.items():
+        if fault.startswith((f"{made}.", f"{made}:", f"{made}[")):
+            return origin + fault[len(made) :]
+    return fault
+
+
+def steep_faults(links: Mapping[str, Any], given: object) -> list[str]:
+    """Lines whose section does not turn with the copies of a pattern: steep ones, on which x is up unless given."""
+    found = []
+    for name, each in given.items() if isinstance(given, Mapping) else ():
+        pattern = Pattern.model_validate(each)
+        for link in pattern.links if pattern.turn else ():
+            shape, raw = links[f"{link}_1"].shape, pattern.links[link].get("shape")
+            if (
+                isinstance(shape, Bar | Polyline)
+                and isinstance(raw, Mapping)
+                and "up" not in raw
+                and _steep(shape)
+            ):
+                wanted = "must have a shape with `up` where it is steep in a pattern that turns, got none"
+                found.append(line(("patterns", str(name), "links", link), wanted))
+    return found
+
+
+def _steep(shape: Bar | Polyline) -> bool:
+    points: tuple[XYZ, ...] = shape.between if isinstance(shape, Bar) else shape.points
+    return any(abs(q[2] - p[2]) >= STEEP * math.dist(p, q) for p, q in pairwise(points))

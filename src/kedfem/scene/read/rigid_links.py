@@ -1,0 +1,144 @@
+"""Rigid links without a shape, given by mass, centre and inertia: a rigid body on a line through what holds the link."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import combinations, count, pairwise
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import TypeAdapter, ValidationError
+
+from kedfem.scene.records.base import plain
+from kedfem.scene.records.inertia import inertia_faults, inertia_tensor, moments_of_inertia
+from kedfem.scene.records.loads import RigidBody
+from kedfem.scene.records.points import XYZ, Apart, JointPoint
+
+LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)
+SLENDER = 0.05  # of the line's extent: its width
+SOUND = 5e3  # m/s: how fast waves would be in the line if it had the mass of the link, as in steel: so stiff is it made
+NOTHING = 1e-9  # of the extent: points that near are one
+
+Tables = dict[str, Any]
+_JOINT_POINT: TypeAdapter[XYZ] = TypeAdapter(JointPoint)
+
+
+def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
+    """A raw scene whose rigid links with `inertia` have a shape, a material and a rigid body instead.
+
+    Called where the names of points are known. A link with a fault stays as it is, for its own record to say so.
+    """
+    links = raw.get("links")
+    given = {
+        name: link
+        for name, link in (links.items() if isinstance(links, Mapping) else ())
+        if isinstance(link, Mapping)
+        and link.get("fidelity") == "rigid"
+        and "inertia" in link
+        and not link.keys() & {"shape", "step", "material"}
+    }
+    out = dict(raw)
+    for name, link in given.items():
+        try:
+            body = RigidBody.model_validate({
+                "link": name, "at": link["centre"], **{key: link[key] for key in ("mass", "centre", "inertia")},
+            })  # fmt: skip
+        except (KeyError, ValidationError):
+            continue
+        if all(map(math.isfinite, body.centre)):  # else the point that it names has a fault
+            _carry(out, str(name), body)
+    return out
+
+
+def _carry(out: Tables, name: str, body: RigidBody) -> None:
+    """Give a link of a raw scene the line through its points, and the body on it."""
+    if not all(isinstance(out.get(section, {}), Mapping) for section in ("bodies", "materials", "links")):
+        return
+    points = [*_different([body.centre, *_held(out, name)])]
+    if len(points) == 1:
+        radius = math.sqrt(max(sum(body.inertia[:3]) / (2 * body.mass), 0.0)) or 1.0
+        points.append((points[0][0] + radius, *points[0][1:]))
+    width = SLENDER * max(math.dist(P, Q) for P, Q in combinations(points, 2))
+    volume = width**2 * sum(math.dist(P, Q) for P, Q in pairwise(points))
+    bodies, materials = dict(out.get("bodies", {})), dict(out.get("materials", {}))
+    material = _unused(f"line of {name}"[:40], materials)
+    materials[material] = {
+        "density": LIGHT * body.mass / volume,
+        "youngs_modulus": body.mass / volume * SOUND**2,
+        "poisson_ratio": 0.3,
+    }
+    bodies[_unused(name, bodies)] = plain(_beside_line(body, np.array(points), width))
+    link = {key: x for key, x in out["links"][name].items() if key not in {"mass", "centre", "inertia"}}
+    shape = {"kind": "polyline", "points": [list(P) for P in points], "width": width, "thickness": width}
+    out |= {
+        "bodies": bodies,
+        "materials": materials,
+        "links": {**out["links"], name: {**link, "material": material, "shape": shape}},
+    }
+
+
+def _beside_line(body: RigidBody, points: Float[np.ndarray, "p 3"], width: float) -> RigidBody:
+    """The body that has mass, centre and inertia of another one together with the line.
+
+    Where no body has what the line leaves of the inertia, as of a disc that it crosses, its share is left as well.
+    """
+    a, e = points[:-1], np.diff(points, axis=0)
+    length = np.linalg.norm(e, axis=1)
+    m = LIGHT * body.mass * length / length.sum()
+    centre, middles = np.array(body.centre), a + e / 2
+    along = np.einsum("si,sj->sij", e, e) / length[:, None, None] ** 2
+    own = ((length**2 + width**2) / 12)[:, None, None] * (np.eye(3) - along) + width**2 / 6 * along
+    line = np.einsum("s,sij->ij", m, own + [_steiner(x - centre) for x in middles])
+    rest = body.mass - m.sum()
+    shift = (m @ (centre - middles)) / rest
+    J = inertia_tensor(body.inertia) - line - rest * _steiner(shift)
+    inertia = moments_of_inertia(J)
+    if inertia_faults(inertia):
+        inertia = moments_of_inertia((1 - LIGHT) * inertia_tensor(body.inertia))
+    own_centre = (centre + shift).tolist()
+    return RigidBody(link=body.link, at=body.centre, mass=rest, centre=own_centre, inertia=inertia)
+
+
+def _steiner(d: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Moments of inertia of a unit mass at a distance."""
+    return np.asarray(d @ d * np.eye(3) - np.outer(d, d))
+
+
+def _held(raw: Mapping[str, Any], name: str) -> Iterator[XYZ]:
+    """Where joints and springs hold a link, as far as they are good."""
+    joints = [x.get("at") for x in _tables(raw.get("joints")) if name in _list(x.get("links"))]
+    ends = [x for spring in _tables(raw.get("springs")) for x in _list(spring.get("between"))]
+    springs = [x.get("at") for x in ends if isinstance(x, Mapping) and x.get("link") == name]
+    for at in (*joints, *springs):
+        try:
+            found = _JOINT_POINT.validate_python(at)
+        except ValidationError:
+            continue
+        point = found.points.get(name, found) if isinstance(found, Apart) else found
+        if all(map(math.isfinite, point)):
+            yield point
+
+
+def _list(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else []
+
+
+def _tables(section: Any) -> list[Mapping[str, Any]]:
+    each = section.values() if isinstance(section, Mapping) else ()
+    return [x for x in each if isinstance(x, Mapping)]
+
+
+def _different(points: list[XYZ]) -> list[XYZ]:
+    """Each point once; the first comes last, so that a line leads from joint to joint and ends at the centre."""
+    size = max((math.dist(P, Q) for P, Q in combinations(points, 2)), default=0.0)
+    out: list[XYZ] = []
+    for P in (*points[1:], points[0]):
+        if all(math.dist(P, Q) > NOTHING * size for Q in out):
+            out.append(P)
+    return out
+
+
+def _unused(name: str, taken: Mapping[str, Any]) -> str:
+    return next(each for k in count(1) if (each := name if k == 1 else f"{name} {k}") not in taken)

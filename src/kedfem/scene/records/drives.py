@@ -1,0 +1,256 @@
+"""Drives: which joints turn or slide, and how; gears between joints."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictBool, StrictInt, model_validator
+from pydantic_core import PydanticCustomError
+
+from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.scene.records.damping import Frequency
+from kedfem.scene.records.units import Angle, Duration, Length, Number, PositiveTime, Quantity, Time
+
+TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
+
+
+@dataclass(frozen=True, slots=True)
+class EitherSpeed(Quantity):
+    """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
+
+    def number(self, value: object) -> float:
+        """The SI number of a field that holds a number, or a string with a unit of either kind."""
+        try:
+            return TURNING.number(value)
+        except PydanticCustomError:
+            if isinstance(value, str):
+                with suppress(PydanticCustomError):
+                    return SLIDING.number(value)
+            raise
+
+
+DriveSpeed = Annotated[float, EitherSpeed("rad/s")]
+Teeth = Annotated[StrictInt, Field(ge=1)]
+
+
+class ConstantSpeed(Record):
+    """Turns, or slides, at a constant speed: φ = ω t."""
+
+    kind: Literal["constant_speed"] = "constant_speed"
+    speed: DriveSpeed
+    """rotational speed, positive from x to y about z; rpm allowed in a string; of a prismatic joint its speed"""
+
+
+class Ramp(Record):
+    """Speeds up from rest, then turns at a constant speed."""
+
+    kind: Literal["ramp"] = "ramp"
+    speed: DriveSpeed
+    """final speed: rotational, of a prismatic joint along it"""
+    time: PositiveTime
+    """duration of the speeding up"""
+    shape: Literal["smooth", "linear"] = "smooth"
+    """smooth: the speed rises as ½ (1 − cos πt/T), acceleration without jumps; linear: as t/T"""
+
+
+Smoothing = Annotated[Any, "of angles or travels"]
+
+
+class Table(Record):
+    """An angle or a travel given over time: a cubic spline (twice continuously differentiable, not-a-knot ends)."""
+
+    kind: Literal["table"] = "table"
+    time: tuple[Time, ...] = ()
+    """times, increasing, from 0 or before"""
+    angle: tuple[Angle, ...] = ()
+    """angle at these times, from the reference position"""
+    travel: tuple[Length, ...] = ()
+    """of a prismatic joint: travel at these times, instead of angles"""
+    file: FileName | None = None
+    """CSV file with two columns, time and angle (or travel), instead of the two lists; a heading may give the units:
+    `time [s], angle [deg]`"""
+    smooth: Smoothing = None
+    """how far a smoother curve may pass from the values, in the mean square; for values that are rounded or measured"""
+
+    @model_validator(mode="after")
+    def _one_row_per_time(self) -> Table:
+        key = "travel" if self.travel else "angle"
+        if self.file is None:
+            refuse(table_faults(self.time, key, self.values, at_least=2))
+        elif self.time or self.values:
+            refuse([(("file",), f"cannot be combined with time and {key}, got both")])
+        if self.travel and self.angle:
+            refuse([(("travel",), "cannot be combined with angle, got both")])
+        if self.smooth is None:
+            return self
+        try:
+            return self.fill(smooth=Quantity("m" if self.travel else "rad", above=0.0).number(self.smooth))
+        except PydanticCustomError as reason:
+            refuse([(("smooth",), reason.message())])
+        return self
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Angles or travels."""
+        return self.travel or self.angle
+
+
+class _Rise(Record):
+    """What laws share that move by an angle or a travel: how far."""
+
+    angle: Angle | None
+    travel: Length | None
+
+    @model_validator(mode="after")
+    def _one_rise(self) -> _Rise:
+        if self.angle is None and self.travel is None:
+            refuse([(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
+        if self.angle is not None and self.travel is not None:
+            refuse([(("travel",), "cannot be combined with angle, got both")])
+        return self
+
+    @property
+    def height(self) -> float:
+        """Angle or travel."""
+        return self.angle if self.angle is not None else self.travel or 0.0
+
+
+class Cycloidal(_Rise):
+    """Rise by an angle, dwell, return, dwell, and so on, by the cycloidal law: s = x − sin(2πx)/2π."""
+
+    kind: Literal["cycloidal"] = "cycloidal"
+    angle: Angle | None = None
+    """the rise"""
+    travel: Length | None = None
+    """the rise of a prismatic joint, instead of an angle"""
+    rise: PositiveTime
+    """duration of the rise"""
+    dwell: Duration = 0.0
+    """duration of the dwell at the top"""
+    return_time: PositiveTime | None = None
+    """duration of the return; without it the drive stays at the top"""
+    dwell_after: Duration = 0.0
+    """duration of the dwell after the return, before it all repeats"""
+
+
+class Polynomial(_Rise):
+    """Rise by an angle, dwell, return, dwell, and so on, by a polynomial law."""
+
+    kind: Literal["polynomial"] = "polynomial"
+    order: Literal[5, 7] = 5
+    """5: the 3-4-5 polynomial, zero acceleration at the ends; 7: 4-5-6-7, zero jerk there too"""
+    angle: Angle | None = None
+    """the rise"""
+    travel: Length | None = None
+    """the rise of a prismatic joint, instead of an angle"""
+    rise: PositiveTime
+    """duration of the rise"""
+    dwell: Duration = 0.0
+    """duration of the dwell at the top"""
+    return_time: PositiveTime | None = None
+    """duration of the return; without it the drive stays at the top"""
+    dwell_after: Duration = 0.0
+    """duration of the dwell after the return, before it all repeats"""
+
+
+class Harmonic(_Rise):
+    """Swings, from the reference position on: φ = φ0 (sin(2π f t + α) − sin α)."""
+
+    kind: Literal["harmonic"] = "harmonic"
+    angle: Angle | None = None
+    """the amplitude φ0"""
+    travel: Length | None = None
+    """the amplitude of a prismatic joint, instead of an angle"""
+    frequency: Frequency
+    """f"""
+    phase: Angle = 0.0
+    """α: 0 begins at full speed, `"-90 deg"` at rest"""
+
+
+MotionLaw = Annotated[
+    ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")
+]
+
+
+ShaftStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]
+ShaftDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
+
+
+class Drive(Record):
+    """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
+
+    joint: str
+    """name of the driven joint: revolute or prismatic"""
+    motion: MotionLaw
+    """how it turns or slides, from the reference position"""
+    shaft_stiffness: ShaftStiffness | None = None
+    """of a hinge: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
+    given"""
+    shaft_damping: ShaftDamper = 0.0
+    """of a hinge: torsional damping of that shaft"""
+
+    @model_validator(mode="after")
+    def _damped_shaft(self) -> Drive:
+        if self.shaft_damping and self.shaft_stiffness is None:
+            refuse([(("shaft_damping",), "must be combined with shaft_stiffness, got it alone")])
+        return self
+
+
+class Gear(Record):
+    """Gears, belts or a rack: two joints whose motions are in proportion.
+
+    A joint's motion is that of its first link that is not the ground against the other, about or along its axis.
+    """
+
+    joints: tuple[str, str]
+    """the two joints: A and B revolute; of a rack A revolute and B prismatic"""
+    ratio: Number | None = None
+    """turn of B per turn of A, positive in the same direction about their axes; not zero"""
+    teeth: tuple[Teeth, Teeth] | None = None
+    """numbers of teeth at A and B, instead of `ratio`: the ratio is −A/B, as wheels that mesh turn against each other"""
+    internal: StrictBool = False
+    """with teeth: whether one of the wheels is toothed inside, so that both turn the same way"""
+    radius: Length | None = None
+    """of a rack: travel of B per radian of A; negative if it runs against B's axis"""
+
+    @model_validator(mode="after")
+    def _one_of_three(self) -> Gear:
+        given = [key for key in ("ratio", "teeth", "radius") if getattr(self, key) is not None]
+        if not given:
+            refuse([(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
+        if len(given) > 1:
+            refuse([((given[1],), f"cannot be combined with {given[0]}, got both")])
+        if self.internal and self.teeth is None:
+            refuse([(("internal",), "must be given with teeth only, got it without")])
+        for key in given:
+            if getattr(self, key) == 0.0:
+                refuse([((key,), "must not be zero, got 0")])
+        return self
+
+    @property
+    def transmission(self) -> float:
+        """Motion of the second joint per motion of the first [- or m]."""
+        if self.teeth is not None:
+            return (1 if self.internal else -1) * self.teeth[0] / self.teeth[1]
+        return self.radius if self.radius is not None else self.ratio or 0.0
+
+
+def table_faults(
+    time: tuple[float, ...], key: str, values: tuple[float, ...], at_least: int = 1
+) -> list[Fault]:
+    """What is wrong with a table over time: places and messages."""
+    if len(time) < at_least:
+        return [(("time",), f"must hold at least {at_least} times [s], got {len(time)}")]
+    faults: list[Fault] = []
+    for i, (before, after) in enumerate(pairwise(time), start=1):
+        if after <= before:
+            faults.append(
+                (("time", i), f"must be later than the time before, {before:.6g} [s], got {after:.6g}")
+            )
+            break
+    if len(values) != len(time):
+        faults.append(((key,), f"must hold one value for each of the {len(time)} times, got {len(values)}"))
+    return faults

@@ -1,0 +1,316 @@
+"""Links and joints of the scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
+
+from kedfem.errors import SceneError
+from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.scene.records.bushings import Bushing
+from kedfem.scene.records.faces import ChosenFace, Faces
+from kedfem.scene.records.inertia import Inertia, inertia_faults
+from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, Point, apart
+from kedfem.scene.records.shapes import Bar, Cad, Polyline, Shape
+from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault
+from kedfem.scene.records.wording import one_of, shown, unknown_name
+
+GROUND = "ground"
+ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
+Element = Literal[
+    "hex27", "hex20", "hex8", "tet10", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"
+]
+Count = Annotated[StrictInt, Field(ge=1)]
+JointKind = Literal[
+    "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
+]
+DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
+ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
+SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
+COUPLINGS = ("distributing", "rigid")
+Coupling = Literal["distributing", "rigid"]
+Frames = Literal["rigid-body", "co-rotational"]
+
+
+def counts(value: object) -> object:
+    """One number of elements, or two or three."""
+    if value is None:
+        return None
+    several = value if isinstance(value, (list, tuple)) else [value]
+    whole = all(isinstance(number, int) and not isinstance(number, bool) and number > 0 for number in several)
+    if not whole or len(several) not in {1, 2, 3}:
+        raise fault(f"must be one, two or three whole numbers of at least 1, got {value!r}")
+    return several[0] if len(several) == 1 else tuple(several)
+
+
+class Meshing(Record):
+    """How finely a link is divided into elements."""
+
+    elements: Annotated[int | tuple[int, int] | tuple[int, int, int] | None, BeforeValidator(counts)] = None
+    """bar: numbers along and across, of a solid also through the thickness; beam: number per segment
+    (1 if not given); joints and bodies between its corners begin segments of their own"""
+    size: PositiveLength | None = None
+    """other shapes: edge length of the elements, instead of `elements_across`"""
+    elements_across: Count | None = None
+    """other shapes: number across the smallest width; 2 if neither this nor `size` is given"""
+    layers: Count = 1
+    """other shapes, solid: number through the thickness; of a part from CAD the least through each of its layers"""
+    unknowns: Annotated[StrictInt, Field(ge=100)] | None = None
+    """other shapes: about so many unknowns, instead of `size` or `elements_across`"""
+    defeature_size: PositiveLength | None = None
+    """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
+    then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""
+    fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = (
+        None
+    )
+    """a part from CAD, extrusion or part: most that an element turns along a fillet, or a bore without a joint; if not
+    given 22.5° of extrusions and parts, 45° of CAD that is swept, 30° of tetrahedra; where `analysis.accuracy` finds the
+    mesh open 15° to 45°"""
+    kind: Literal["hexahedra"] | None = None
+    """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
+
+
+def spelt_out(link: Any) -> Any:
+    """A raw link that gives a CAD file in short, with the shape that this means."""
+    if not isinstance(link, Mapping) or link.get("step") is None or link.get("shape") is not None:
+        return link
+    return {**link, "shape": {"kind": "cad", "file": link["step"]}}
+
+
+class LinkScene(Record):
+    """A link: its material, shape, fidelity and mesh."""
+
+    fidelity: Literal["solid", "plane", "beam", "rigid", "reduced", "auto"] = "solid"
+    """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
+    `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
+    reduced: StrictBool = False
+    """whether an elastic link moves in the span of a few modes only: as many as `analysis.reduction_tolerance` asks for;
+    with co-rotational frames each segment does, and beams stay unreduced"""
+    modes: Count | None = None
+    """number of these modes, instead of `analysis.reduction_tolerance`; with co-rotational frames of each segment"""
+    material: str | None = None
+    """a name: built in or in `materials`; not for a rigid slider"""
+    shape: Shape | None = None
+    """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""
+    step: FileName | None = None
+    """a CAD file (STEP, IGES or BREP): short for `shape = { kind = "cad", file = … }`"""
+    mass: Mass = 0.0
+    """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
+    that drives alone move (no other joint holds it), which these bear"""
+    centre: Point | None = None
+    """of a rigid link given by mass, centre and inertia instead of a shape: its centre in the reference position"""
+    inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia] | None = None
+    """of the same: tensor about its centre in the reference position: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm
+    and so on"""
+    mesh: Meshing = Meshing()
+    """how it is meshed"""
+    element: Element | None = None
+    """hex20 (or hex27, hex8, tet10) for a solid, hex27 (or these) for one from CAD, quad9 for a plane link, beam3 (or
+    beam2, 4, 5, 7, 9: nodes per element) for a beam"""
+    min_quality: Annotated[float, Quantity("1", least=0.0, most=1.0)] | None = None
+    """least scaled Jacobian of the elements of a solid or plane link; if not given 0.1, of tetrahedra 0: det J > 0 all
+    over"""
+    shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
+    """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
+    beam: Literal["planar", "spatial"] | None = None
+    """what moves of a beam: (u, v, ψ) in a plane z = constant, or all in space; if not given, planar where it can be"""
+    frames: Frames | None = None
+    """frames of this link, if other than those of the analysis"""
+    segments: Count | None = None
+    """number of segments, each with a frame of its own, of a solid or plane link with co-rotational frames: 6 if not
+    given, fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a
+    beam are its elements"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _step_is_a_shape(cls, raw: Any) -> Any:
+        return spelt_out(raw)
+
+    @model_validator(mode="after")
+    def _defaults(self) -> Self:
+        if self.step is not None and not (isinstance(self.shape, Cad) and self.shape.file == self.step):
+            refuse([(("step",), "cannot be combined with shape, got both")])
+        refuse(self._body_faults())
+        if self.fidelity == "reduced":
+            self.fill(fidelity=self.family, reduced=True)
+        element = self.element or self._usual_element()
+        return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
+
+    def _body_faults(self) -> list[Fault]:
+        """What is wrong with a link given by mass, centre and inertia."""
+        if self.centre is None and self.inertia is None:
+            return []
+        if self.fidelity != "rigid":
+            keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
+            return [
+                ((key,), f"must be given for a rigid link only, got fidelity {self.fidelity!r}")
+                for key in keys
+            ]
+        present = [key for key in ("shape", "material") if getattr(self, key) is not None]
+        if present:
+            together = " and ".join(present)
+            return [((present[0],), f"cannot be combined with centre and inertia, got {together}")]
+        lacking = [
+            ((key,), f"is required for a rigid link given by mass, centre and inertia [{unit}], got {got}")
+            for key, unit, got in (
+                ("mass", "kg", "0"),
+                ("centre", "m", "nothing"),
+                ("inertia", "kg*m^2", "nothing"),
+            )
+            if not getattr(self, key)
+        ]
+        return [*lacking, *(inertia_faults(self.inertia) if self.inertia is not None else ())]
+
+    def _usual_element(self) -> str | None:
+        """Of a part from CAD, which may be curved all over, the one whose geometry is as rich as can be."""
+        if isinstance(self.shape, Cad) and self.family == "solid":
+            return "hex27"
+        return ELEMENTS[self.family] if self.shape is not None else None
+
+    @property
+    def family(self) -> Literal["solid", "plane", "beam"]:
+        """What the link is meshed as: of one that does not say, beams for a polyline, else hexahedra."""
+        if self.fidelity in {"rigid", "reduced", "auto"}:
+            return "beam" if isinstance(self.shape, Polyline) else "solid"
+        return self.fidelity  # type: ignore[return-value]
+
+    @property
+    def category(self) -> Literal["solid", "plane", "beam", "rigid"]:
+        """What the link is: rigid, or what it is meshed as."""
+        return "rigid" if self.fidelity == "rigid" else self.family
+
+    @property
+    def rigid_line(self) -> bool:
+        """Whether it is a rigid polyline, which is made of beams."""
+        return self.fidelity == "rigid" and isinstance(self.shape, Polyline)
+
+    def _mesh_defaults(self) -> dict[str, Any]:
+        if self.shape is None:
+            return {}
+        if self.family == "beam":
+            return {"elements": self.mesh.elements or 1}
+        if isinstance(self.shape, Bar):
+            along = math.dist(*self.shape.between) / (1.5 * self.shape.width)
+            along = min(max(math.ceil(along), 4), 40) if math.isfinite(along) else 4
+            usual = (along, 2) if self.family == "plane" else (along, 2, 1)
+            if self.fidelity == "rigid":
+                usual = (1, 1, 1)
+            return {"elements": self.mesh.elements or usual}
+        fewest = 1 if self.fidelity == "rigid" else 2
+        given = self.mesh.size is not None or self.mesh.unknowns is not None
+        across = self.mesh.elements_across or (None if given else fewest)
+        return {"elements_across": across}
+
+
+def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
+    """Something for each of several links, by their names."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise fault(f"must be a table by names of links, got {shown(value)}")
+    return {name: what(each) for name, each in value.items()}
+
+
+def couplings(value: object) -> object:
+    """How a joint holds its coupling surfaces: one word, or one for each link."""
+    if isinstance(value, Mapping):
+        return of_links(value, couplings)
+    if value not in COUPLINGS:
+        raise fault(one_of(list(COUPLINGS), value))
+    return value
+
+
+def by_link(value: object) -> object:
+    """A table by names of links."""
+    return of_links(value, lambda each: each)
+
+
+class Joint(Record):
+    """A joint between two links, or a link and the ground."""
+
+    kind: JointKind
+    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without turning;
+    cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
+    axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
+    the second"""
+    links: tuple[str, str]
+    """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
+    at: JointPoint
+    """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
+    `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
+    axis: Axis | None = None
+    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
+    of what slides, the normal of a planar joint (required for those); for a ball or a weld the axis of the bore that
+    holds it"""
+    axes: tuple[Axis, Axis] | None = None
+    """of a universal joint: the axis in the first link and that in the second, at right angles"""
+    lead: Annotated[float, Quantity("m")] | None = None
+    """of a screw: travel in one revolution, positive if right-handed"""
+    coupling: Annotated[Coupling | dict[str, Coupling], BeforeValidator(couplings)] = "distributing"
+    """how it holds bores and faces of solids and plane links: by their mean displacement and rotation, or so that they
+    keep their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
+    faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
+    """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
+    groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
+    given, what lies about `at`"""
+
+    bushing: Bushing | None = None
+    """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
+
+    def stiff(self, link: str) -> bool:
+        """Whether the coupling surface on a link keeps its shape."""
+        return (self.coupling.get(link) if isinstance(self.coupling, dict) else self.coupling) == "rigid"
+
+    def face_names(self, link: str) -> tuple[str, ...]:
+        """What the faces of a link that hold it are called: their names, or what was said of them."""
+        return tuple(each if isinstance(each, str) else each.label for each in self.faces.get(link, ()))
+
+    def chosen_faces(self, link: str) -> tuple[ChosenFace, ...]:
+        """The faces of a link that are chosen by what they are."""
+        return tuple(each for each in self.faces.get(link, ()) if not isinstance(each, str))
+
+    @property
+    def points(self) -> dict[str, XYZ]:
+        """Its points by link [m], where it has one for each."""
+        return self.at.points if isinstance(self.at, Apart) else {}
+
+    @property
+    def open(self) -> bool:
+        """Whether its links are drawn apart."""
+        return len(set(self.points.values())) > 1
+
+    def on(self, link: str) -> XYZ:
+        """Its point on a link [m]."""
+        return self.points.get(link, self.at)
+
+    @model_validator(mode="after")
+    def _point_of_each_link(self) -> Self:
+        if not isinstance(self.at, Apart):
+            return self
+        given, names = self.at.points, list(self.links)
+        wrong = [
+            (("at", name), unknown_name("a link of the joint", name, names))
+            for name in given
+            if name not in names
+        ]
+        lacking = [(("at", name), "is required [m], got nothing") for name in names if name not in given]
+        refuse([*wrong, *lacking])
+        return self.fill(at=apart({name: given[name] for name in names}))
+
+    @model_validator(mode="after")
+    def _hinge_along_z(self) -> Self:
+        return self.fill(axis=(0.0, 0.0, 1.0)) if self.kind == "revolute" and self.axis is None else self
+
+
+def require_elastic(links: Mapping[str, LinkScene], name: str) -> None:
+    """An elastic link of a scene, named by --link.
+
+    Raises
+    ------
+    SceneError
+    """
+    if name not in links:
+        raise SceneError(f"--link: {one_of(list(links), name)}")
+    if links[name].fidelity == "rigid":
+        raise SceneError("--link: must be an elastic link, got a rigid one")

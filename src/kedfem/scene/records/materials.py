@@ -1,0 +1,64 @@
+"""Materials: isotropic, linear elastic; a few are built in."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Self
+
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.units import PositivePressure, Quantity, fault
+
+
+class Material(Record):
+    """An isotropic, linear elastic material: of ``poisson_ratio`` and ``shear_modulus`` give one."""
+
+    density: Annotated[float, Quantity("kg/m^3", above=0.0)]
+    """mass per volume"""
+    youngs_modulus: PositivePressure
+    """Young's modulus E"""
+    poisson_ratio: Annotated[float, Quantity("1", above=-1.0, below=0.5)] = math.nan
+    """Poisson's ratio ν; from E and G if those are given"""
+    shear_modulus: PositivePressure = math.nan
+    """shear modulus G; E / (2 (1 + ν)) if ν is given"""
+
+    @model_validator(mode="after")
+    def _both_moduli(self) -> Self:
+        given = self.model_fields_set & {"poisson_ratio", "shear_modulus"}
+        if len(given) != 1:
+            raise fault(f"must have poisson_ratio or shear_modulus, got {'both' if given else 'neither'}")
+        if "poisson_ratio" in given:
+            return self.fill(shear_modulus=self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio)))
+        ratio = self.youngs_modulus / (2.0 * self.shear_modulus) - 1.0
+        if ratio >= 0.5:
+            least = self.youngs_modulus / 3.0
+            wanted = f"must be above a third of Young's modulus, {least:.6g} [Pa]"
+            refuse([(("shear_modulus",), f"{wanted}, got {self.shear_modulus:.6g}")])
+        return self.fill(poisson_ratio=ratio)
+
+    @model_serializer(mode="wrap")
+    def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        dumped: dict[str, Any] = handler(self)
+        derived = "shear_modulus" if "poisson_ratio" in self.model_fields_set else "poisson_ratio"
+        dumped.pop(derived, None)
+        return dumped
+
+    def lame(self) -> tuple[float, float]:
+        """Lamé's constants λ and μ [Pa]."""
+        nu, E = self.poisson_ratio, self.youngs_modulus
+        return E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.shear_modulus
+
+
+# Typical values at room temperature, as in engineering handbooks: for a design that counts on them, give
+# those of the supplier in [materials.NAME].
+BUILT_IN: dict[str, dict[str, float]] = {
+    "steel": {"density": 7850.0, "youngs_modulus": 210e9, "poisson_ratio": 0.3},
+    "stainless_steel": {"density": 7900.0, "youngs_modulus": 200e9, "poisson_ratio": 0.3},
+    "aluminium": {"density": 2700.0, "youngs_modulus": 70e9, "poisson_ratio": 0.33},
+    "titanium": {"density": 4430.0, "youngs_modulus": 114e9, "poisson_ratio": 0.34},
+    "cast_iron": {"density": 7200.0, "youngs_modulus": 110e9, "poisson_ratio": 0.26},
+    "brass": {"density": 8500.0, "youngs_modulus": 100e9, "poisson_ratio": 0.35},
+    "pom": {"density": 1410.0, "youngs_modulus": 2.8e9, "poisson_ratio": 0.37},
+    "nylon": {"density": 1140.0, "youngs_modulus": 2.0e9, "poisson_ratio": 0.39},
+}

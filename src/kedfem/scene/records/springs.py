@@ -1,0 +1,142 @@
+"""Springs with dampers: between two points, along a slide or about a hinge."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.loads import ONE, FactorOver, Force, Torque
+from kedfem.scene.records.points import Point
+from kedfem.scene.records.units import Angle, Length, Quantity
+
+Stiffness = Annotated[float, Quantity("N/m", least=0.0)]
+Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
+TorsionStiffness = Annotated[float, Quantity("N*m/rad", least=0.0)]
+TorsionDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
+FreeLength = Annotated[float, Quantity("m", least=0.0)]
+
+
+class SpringEnd(Record):
+    """Where a spring is fixed."""
+
+    link: str
+    """the link, or `"ground"`"""
+    at: Point
+    """where, in the reference position"""
+
+
+class _Elastic(Record):
+    """What all springs share."""
+
+    stiffness_factor: FactorOver = ONE
+    """what k is multiplied by, nowhere negative: a number, or a table over time or the drive's angle as the factor of a
+    load has it, such as the stiffness of a tooth mesh; repeated with a `period`"""
+
+    @model_validator(mode="after")
+    def _never_pushed_apart(self) -> Self:
+        least = min(self.stiffness_factor.value, default=1.0)
+        if least < 0.0:
+            wanted = "must hold values of at least 0 (a spring of negative stiffness would push apart)"
+            refuse([(("stiffness_factor", "value"), f"{wanted}, got {least:.6g}")])
+        if self.stiffness_factor != ONE and not getattr(self, "stiffness", 1.0):
+            refuse([(("stiffness_factor",), "must be combined with a stiffness, got none")])
+        return self
+
+    @model_validator(mode="after")
+    def _does_something(self) -> Self:
+        if not (getattr(self, "stiffness", 1.0) or getattr(self, "damping", 1.0)):
+            refuse([(("stiffness",), "must be positive, or damping, got neither")])
+        return self
+
+    @model_validator(mode="after")
+    def _preloaded(self) -> Self:
+        if getattr(self, "preload", None) is None:
+            return self
+        for key in ("free_length", "free_travel", "free_angle"):
+            if getattr(self, key, None) is not None:
+                refuse([(("preload",), f"cannot be combined with {key}, got both")])
+        if not getattr(self, "stiffness", 1.0):
+            refuse([(("preload",), "must be combined with a stiffness, got none")])
+        return self
+
+
+class LineSpring(_Elastic):
+    """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l'.
+
+    Along a slide l is the travel of the joint's first link that is not the ground against the other, from the drawn
+    position, and what it pulls back is that link.
+    """
+
+    kind: Literal["spring"] = "spring"
+    between: tuple[SpringEnd, SpringEnd] | None = None
+    """its two ends, each `{ link = "...", at = point }`"""
+    joint: str | None = None
+    """a prismatic or cylindrical joint that it lies along, instead of two ends"""
+    stiffness: Stiffness = 0.0
+    """k"""
+    damping: Damper = 0.0
+    """c"""
+    free_length: FreeLength | None = None
+    """l0 between two points, at which it does not pull; as long in the reference position if not given"""
+    free_travel: Length | None = None
+    """l0 along a slide, at which it does not pull; 0, the reference position, if not given"""
+    preload: Force | None = None
+    """with what it pulls in the reference position, instead of l0; negative: it pushes"""
+
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> Self:
+        if self.between is None:
+            if self.joint is None:
+                refuse([(("between",), "is required, or a joint, got neither")])
+            if self.free_length is not None:
+                refuse([(("free_length",), "must be free_travel [m] along a joint, got a length")])
+            return self
+        if self.joint is not None:
+            refuse([(("between",), "cannot be combined with joint, got both")])
+        if self.free_travel is not None:
+            refuse([(("free_travel",), "must be free_length [m] between two points, got a travel")])
+        a, b = self.between
+        if a.at == b.at and (self.free_length != 0.0 or self.preload):
+            refuse(
+                [(("between",), "must be two different points unless free_length = 0, got the same twice")]
+            )
+        return self
+
+    @property
+    def free(self) -> float:
+        """l0: the length or travel at which it does not pull [m]."""
+        drawn = 0.0 if self.between is None else math.dist(*(end.at for end in self.between))
+        given = self.free_travel if self.between is None else self.free_length
+        if self.preload is not None:
+            return drawn - self.preload / self.stiffness
+        return drawn if given is None else given
+
+
+class TorsionSpring(_Elastic):
+    """A spring and a damper about a hinge: they turn back with k (φ − φ0) + c φ'."""
+
+    kind: Literal["torsion"] = "torsion"
+    joint: str
+    """the hinge, cylindrical joint or screw"""
+    stiffness: TorsionStiffness = 0.0
+    """k"""
+    damping: TorsionDamper = 0.0
+    """c"""
+    free_angle: Angle | None = None
+    """φ0, at which it does not turn, from the reference position; 0 if not given: the rotation of the joint's first link
+    that is not the ground against the other, about the joint's axis"""
+    preload: Torque | None = None
+    """with what it turns back in the reference position, −k φ0, instead of φ0"""
+
+    @property
+    def free(self) -> float:
+        """φ0 [rad]."""
+        if self.preload is not None:
+            return -self.preload / self.stiffness
+        return self.free_angle or 0.0
+
+
+Spring = Annotated[LineSpring | TorsionSpring, Field(discriminator="kind")]

@@ -1,0 +1,265 @@
+"""Numbers with a unit: SI floats in the scene, strings such as ``"25.4 mm"`` or ``"600 rpm"`` at its rim."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from tokenize import TokenError
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from kedfem.scene.records.wording import shown
+
+if TYPE_CHECKING:
+    import pint
+
+NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^0-9\s+-].*?|)\s*", re.ASCII
+)
+LONGEST = 60  # letters of a unit
+RPM = 30 / math.pi  # revolutions per minute of 1 rad/s
+NAMED = (
+    r"\(*(?!inf\b|nan\b)(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*) ?-?[1-9]|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?\)*"
+)
+UNIT = re.compile(rf"(?:{NAMED}|1(?= ?/))(?:(?: ?[*/·] ?| ){NAMED})*")
+"""Names with powers of one digit, multiplied and divided: nothing that could be reckoned with."""
+
+KINDS = {
+    "1": "a number",
+    "m": "a length",
+    "m^2": "an area",
+    "m^4": "a second moment of area",
+    "rad": "an angle",
+    "s": "a time",
+    "Hz": "a frequency",
+    "rad/s": "a rotational speed",
+    "1/s": "a rate",
+    "m/s": "a speed",
+    "m/s^2": "an acceleration",
+    "kg": "a mass",
+    "kg*m^2": "a moment of inertia",
+    "kg/m^3": "a density",
+    "Pa": "a pressure",
+    "N": "a force",
+    "N/m^3": "a force per volume",
+    "N*m": "a torque",
+    "N/m": "a stiffness",
+    "N*s/m": "a damping constant",
+    "N*m/rad": "a torsional stiffness",
+    "N*m*s/rad": "a torsional damping constant",
+}
+UNREADABLE = (
+    ValueError,
+    TypeError,
+    SyntaxError,
+    AttributeError,
+    ArithmeticError,
+    TokenError,
+)  # pint's, for no unit
+USUAL = (
+    "mm", "cm", "dm", "m", "km", "in", "ft", "deg", "rad", "s", "ms", "min", "h", "Hz", "kHz", "rpm", "m/s", "mm/s",
+    "km/h", "m/s^2", "g", "kg", "t", "kg/m^3", "g/cm^3", "N", "kN", "Pa", "kPa", "MPa", "GPa", "bar", "N*m", "N/m",
+    "N/mm",
+)  # fmt: skip
+"""Units as they are usually written, for hints."""
+HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine's: its powers would overflow
+OVERFLOW = 10**308  # whole numbers in TOML have no end
+CYCLES = {"hertz"}
+TURNING = {
+    "radian",
+    "degree",
+    "arcminute",
+    "arcsecond",
+    "turn",
+    "revolutions_per_minute",
+    "revolutions_per_second",
+}
+
+
+def fault(message: str) -> PydanticCustomError:
+    """A fault of one field of the scene, with kedfem's own wording: what was wanted, what was got."""
+    return PydanticCustomError("kedfem", "{message}", {"message": message})
+
+
+@cache
+def unit_registry() -> pint.UnitRegistry[float]:
+    """Pint's registry of units, imported when the first string with a unit is met."""
+    import pint
+
+    return pint.UnitRegistry()
+
+
+class Evaluated(str):
+    """The text of an expression whose value has a unit, and that value, a pint quantity."""
+
+    quantity: Any
+
+    def __repr__(self) -> str:
+        return f"{str(self)!r}, {self.quantity:.6g~P}"
+
+
+def si_number(text: str, unit: str) -> float:
+    """The number that a string with a unit stands for.
+
+    Parameters
+    ----------
+    text : a number and a unit, ``"914.4 mm"``, or an expression that was worked out.
+    unit : the SI unit of the answer, a key of ``KINDS``.
+
+    Returns
+    -------
+    float [unit]
+
+    Raises
+    ------
+    ValueError
+        Not a number with a unit, an unknown unit or a unit of another dimension. Hertz are not accepted
+        for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess.
+    """
+    if isinstance(text, Evaluated):
+        quantity = text.quantity
+        given = f"{quantity.units:~P}"
+    elif (match := NUMBER.fullmatch(text)) is not None:
+        given = match[2]
+        quantity = unit_registry().Quantity(float(match[1]), unit_of(given, unit))
+    else:
+        raise ValueError("not a number with a unit; an expression begins with '='")
+    wanted, got = unit_registry().parse_units(unit), quantity.units
+    if crossed(quantity._units, unit):
+        raise ValueError(
+            f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
+        )
+    if got.dimensionality != wanted.dimensionality:
+        raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")
+    return float(quantity.m_as(wanted))
+
+
+def unit_of(given: str, wanted: str = "") -> Any:
+    """The unit that a text stands for.
+
+    Parameters
+    ----------
+    given : names with powers of one digit, multiplied and divided
+    wanted : a unit of the kind that is wanted, for hints
+
+    Raises
+    ------
+    ValueError
+        It is not a unit, or an unknown one.
+    """
+    import pint
+
+    if given and (len(given) > LONGEST or not UNIT.fullmatch(given)):
+        raise ValueError(f"{shown(given)} is not a unit")
+    try:
+        return unit_registry().parse_units(given)
+    except pint.errors.UndefinedUnitError:
+        raise ValueError(f"unknown unit {given!r}{meant(given, wanted) if wanted else ''}") from None
+    except UNREADABLE:
+        raise ValueError(f"{given!r} is not a unit") from None
+
+
+def revolutions(unit: Mapping[str, float]) -> float:
+    """The power of an angle in a unit, given as powers of names: 1 of rpm or rad/s, 0 of Hz."""
+    return float(sum(power for name, power in unit.items() if name in TURNING))
+
+
+def crossed(given: Mapping[str, float], unit: str) -> bool:
+    """Whether a unit counts cycles where rad/s is wanted, or turns where Hz is: the factor 2π would be a guess."""
+    if unit == "Hz":
+        return revolutions(given) != 0.0
+    return unit == "rad/s" and not CYCLES.isdisjoint(given) and revolutions(given) == 0.0
+
+
+def meant(given: str, unit: str) -> str:
+    """A hint at a unit of the kind that is wanted, if one is written like what was given but for upper and lower case."""
+    wanted = unit_registry().parse_units(unit).dimensionality
+    for name in USUAL:
+        same = name.casefold() == given.casefold() and name != given
+        if same and unit_registry().parse_units(name).dimensionality == wanted:
+            return f", did you mean {name!r}?"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What a number in the scene is: its SI unit and bounds, as in ``Annotated[float, Quantity("m")]``."""
+
+    unit: str
+    above: float = -math.inf
+    least: float = -math.inf
+    below: float = math.inf
+    most: float = math.inf
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """The check of a field, for pydantic."""
+        return core_schema.no_info_plain_validator_function(self.number)
+
+    def number(self, value: object) -> float:
+        """The SI number of a field that holds a number, or a string with a unit."""
+        value = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(value, str):
+            try:
+                number = si_number(value, self.unit)
+            except ValueError as reason:
+                raise fault(f"must be {self.kind}, got {value!r}: {reason}") from None
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            number = float(value) if not abs(value) > OVERFLOW else math.inf if value > 0 else -math.inf
+        else:
+            raise fault(f"must be {self.kind}, got {shown(value)}")
+        self.check(number, value)
+        return number
+
+    def check(self, number: float, value: object) -> None:
+        """Raise a fault if a number is not finite or out of bounds; ``value`` is how the user wrote it."""
+        got = f"got {value!r}" if isinstance(value, str) else f"got {number:.12g}"
+        if not math.isfinite(number):
+            raise fault(f"must be finite{self.bracket}, {got}")
+        if abs(number) > HUGE or (self.above == 0.0 and 0.0 < number < 1.0 / HUGE):
+            bound = f"at most {HUGE:g} in size" if abs(number) > HUGE else f"at least {1.0 / HUGE:g}"
+            raise fault(f"must be {bound}{self.bracket}, {got}")
+        if not (self.above < number < self.below and self.least <= number <= self.most):
+            raise fault(f"must be {self.bounds}{self.bracket}, {got}")
+
+    @property
+    def bracket(self) -> str:
+        """The unit as it stands in messages: ' [m]', or nothing for a plain number."""
+        return "" if self.unit == "1" else f" [{self.unit}]"
+
+    @property
+    def kind(self) -> str:
+        """The quantity and its unit in words: 'a length [m]'."""
+        return KINDS[self.unit] + self.bracket
+
+    @property
+    def bounds(self) -> str:
+        """The bounds in words: 'positive', 'between 0 and 1'."""
+        if (self.above, self.below, self.most) == (0.0, math.inf, math.inf):
+            return "positive"
+        if (self.least, self.below, self.most) == (0.0, math.inf, math.inf):
+            return "zero or positive"
+        parts = [
+            (self.above, "above"),
+            (self.least, "at least"),
+            (self.below, "below"),
+            (self.most, "at most"),
+        ]
+        return " and ".join(f"{word} {bound:g}" for bound, word in parts if math.isfinite(bound))
+
+
+Number = Annotated[float, Quantity("1")]
+Length = Annotated[float, Quantity("m")]
+PositiveLength = Annotated[float, Quantity("m", above=0.0)]
+Angle = Annotated[float, Quantity("rad")]
+Time = Annotated[float, Quantity("s")]
+PositiveTime = Annotated[float, Quantity("s", above=0.0)]
+Duration = Annotated[float, Quantity("s", least=0.0)]
+Speed = Annotated[float, Quantity("rad/s")]
+Mass = Annotated[float, Quantity("kg", least=0.0)]
+Pressure = Annotated[float, Quantity("Pa")]
+PositivePressure = Annotated[float, Quantity("Pa", above=0.0)]

@@ -1,0 +1,74 @@
+"""Words and values in messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+KEYS = {  # of scenes by their former names: messages about unknown words name the present ones
+    "functions": "modes",
+    "reduction": "reduction_tolerance",
+    "port": "coupling",
+    "turning_stiffness": "rotational_stiffness",
+    "turning_damping": "rotational_damping",
+    "spin": "angular_velocity",
+    "turns": "revolutions",
+    "last_turns": "last_revolutions",
+    "steps_per_turn": "steps_per_revolution",
+    "frames_per_turn": "frames_per_revolution",
+    "levels": "extrapolation_levels",
+    "exaggeration": "deformation_scale",
+    "ignore": "defeature_size",
+}
+VALUES = {
+    "nominal": "rigid-body",
+    "following": "co-rotational",
+    "literal": "monolithic",
+    "averaged": "distributing",
+    "stiff": "rigid",
+}
+NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by what they are modelled as
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known word that ``word`` was renamed to, or that looks most like it; None if there is none."""
+    lower = {name.lower(): name for name in known}
+    for renamed in (KEYS, VALUES):
+        if renamed.get(word) in lower:
+            return renamed[word]
+    close = get_close_matches(word.lower(), lower, n=1, cutoff=0.65)
+    return lower[close[0]] if close else None
+
+
+def unknown_name(what: str, word: str, known: Iterable[str]) -> str:
+    """The message about a word that is not among the known ones."""
+    names = list(known)
+    close = nearest(word, names)
+    hint = f"did you mean {close!r}?" if close else f"known: {', '.join(names) or 'none'}"
+    return f"must name {what}, got {word!r}, {hint}"
+
+
+def shown(value: Any) -> str:
+    """A value as it stands in a message: shortened if it is long."""
+    if value is None:
+        return "nothing"
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def either(words: list[Any]) -> str:
+    """'one of a, b, c'; a single word as it is."""
+    return ("one of " if len(words) > 1 else "") + ", ".join(str(word) for word in words)
+
+
+def one_of(words: list[Any], got: Any) -> str:
+    """The message about a word that is not one to choose from."""
+    close = nearest(got, [str(word) for word in words]) if isinstance(got, str) else None
+    return f"must be {either(words)}, got {shown(got)}" + (f", did you mean {close!r}?" if close else "")
+
+
+def unknown_key(key: str, known: list[str]) -> str:
+    """The message about a key that a record does not have."""
+    close = nearest(key, known)
+    return f"unknown key, did you mean {close!r}?" if close else f"unknown key, known: {', '.join(known)}"
