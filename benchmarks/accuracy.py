@@ -53,7 +53,7 @@ def reference(scene: Scene, plan: Plan) -> Scene:
     """A scene that is much finer than its plan."""
     links = {
         name: refined(of_family(link, families(link)[-1], reduced=True), FINER * plan.finer)
-        for name, link in scene.links.items() if link.fidelity == "auto"
+        for name, link in scene.links.items() if link.model == "auto"
     }  # fmt: skip
     fine = with_steps(with_links(scene, links), SHORTER * time_grid(plan.scene).steps)
     return with_analysis(fine, accuracy="quick", reduction_tolerance=TOLERANCE)
@@ -71,8 +71,8 @@ def _planned_run(scene: Scene) -> tuple[Plan, Histories, tuple[float, float, flo
 
 def _row(name: str, found: Kept) -> Sequence[str]:
     links = [link for link in found.plan.scene.links.values() if link.shape is not None]
-    kinds = ", ".join(f"{sum(x.fidelity == kind for x in links)} {kind}" for kind in
-                      sorted({link.fidelity for link in links}))  # fmt: skip
+    kinds = ", ".join(f"{sum(x.category == kind for x in links)} {kind}" for kind in
+                      sorted({link.category for link in links}))  # fmt: skip
     return (
         name, f"{100 * found.plan.asked:g} %", f"{100 * found.plan.error:.2g} %", f"{100 * worst(found.errors):.2g} %",
         f"{100 * found.within:.0f} %", f"{kinds}; {time_grid(found.plan.scene).steps}",

@@ -12,7 +12,7 @@ from benchmarks.pages import script, table, write_page
 from kedfem.dynamics.system.corotational import CorotationalSteps
 
 STEPS = 3000  # usual number
-FINEST: dict[str, Any] = {"fidelity": "beam", "element": "beam5", "mesh": {"elements": 16}}
+FINEST: dict[str, Any] = {"model": "beam", "element": "beam5", "mesh": {"elements": 16}}
 REFERENCE = {"damped": (12000, 24000), "undamped": (48000, 96000)}  # steps, extrapolated
 QUICK = (3000, 6000)
 BEAMS = (("beam3", 4), ("beam3", 8), ("beam3", 16), ("beam5", 1), ("beam5", 2), ("beam5", 3), ("beam5", 4))
@@ -82,7 +82,7 @@ def rms(curve: Curve, other: Curve) -> float:
 
 
 def _beam(element: str, count: int) -> dict[str, Any]:
-    return {"fidelity": "beam", "element": element, "mesh": {"elements": count}}
+    return {"model": "beam", "element": element, "mesh": {"elements": count}}
 
 
 def _equation_row(
@@ -141,7 +141,7 @@ def _solids(study: _Study, exact: Curve) -> list[str]:
     finest = {name: study.ran(FINEST, STEPS, "damped", name, 1).curve for name in ("linear", "co-rotational")}
     rows = []
     for elements, segments in SLICES:
-        link = {"fidelity": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
+        link = {"model": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
         linear = study.ran(link, STEPS, "damped", "linear", 1)
         found = study.ran({**link, "segments": segments}, STEPS, "damped", "co-rotational", 1)
         rows.append((
@@ -160,7 +160,12 @@ def _reduced(study: _Study, exact: Curve) -> list[str]:
     rows = []
     finest = study.ran(FINEST, STEPS, "damped", "co-rotational", 1).curve
     for segments, tolerance in REDUCED:
-        link = {"fidelity": "solid", "mesh": {"elements": [24, 2, 1]}, "reduced": True, "segments": segments}
+        link = {
+            "model": "solid",
+            "mesh": {"elements": [24, 2, 1]},
+            "reduction": "modal",
+            "segments": segments,
+        }
         ran = run(
             four_bar(link, STEPS, "damped", frames="co-rotational", reduction_tolerance=tolerance),
             study.repeats,
@@ -179,7 +184,7 @@ def _costs() -> list[str]:
     """A step of solids, following against linear on the same mesh."""
     rows: list[Sequence[str]] = []
     for elements, segments in COSTS:
-        link = {"fidelity": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
+        link = {"model": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
         linear, _ = cost(four_bar(link, STEPS))
         for count in segments:
             step, solver = cost(four_bar({**link, "segments": count}, STEPS, frames="co-rotational"))

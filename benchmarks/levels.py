@@ -22,7 +22,7 @@ from kedfem.scene import scene_from
 TURN = 0.1  # s
 SHOWN = {"stress": "probes/stress/stress", "torque": "drive/torque"}
 MARCHES = ((500, 1), (1000, 1), (2000, 1), (4000, 1), (250, 2), (500, 2), (1000, 2), (250, 3), (500, 3))
-BEAMS, PLATES = {"fidelity": "beam", "mesh": {"elements": 1}}, {"reduced": True, "modes": 8}
+BEAMS, PLATES = {"model": "beam", "mesh": {"elements": 1}}, {"reduction": 8}
 HEADER = ("levels, steps a turn", "stress", "estimated", "torque", "estimated", "seconds", "order 2 needs")
 
 

@@ -28,7 +28,7 @@ def beam(a: Any, b: Any, **more: Any) -> Raw:
     """A steel bar of 20 mm by 20 mm, one beam element."""
     ends = [[float(x) for x in end] for end in (a, b)]
     shape = {"kind": "bar", "between": ends, "width": 0.02, "thickness": 0.02}
-    return {"material": "steel", "fidelity": "beam", "shape": shape, "mesh": {"elements": 1}, **more}
+    return {"material": "steel", "model": "beam", "shape": shape, "mesh": {"elements": 1}, **more}
 
 
 def hinge(one: str, other: str, at: Any) -> Raw:

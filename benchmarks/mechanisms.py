@@ -1,4 +1,4 @@
-"""Five mechanisms that leave fidelities, meshes and step to `analysis.accuracy`: short analyses that run in seconds."""
+"""Five mechanisms that leave models, meshes and step to `analysis.accuracy`: short analyses that run in seconds."""
 
 from collections.abc import Callable
 from typing import Any
@@ -45,7 +45,7 @@ def slider_crank(accuracy: float) -> Scene:
         },
         "links": {
             **{name: {"material": "steel", "shape": {**bar, "between": list(ends)}} for name, ends in links.items()},
-            "piston": {"fidelity": "rigid", "mass": 2.0},
+            "piston": {"model": "rigid", "mass": 2.0},
         },
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "crank"], "at": "A"},

@@ -34,7 +34,7 @@ class _Measured:
 
 
 def bench_plane(folder: Path, quick: bool) -> None:
-    """Both fidelities at several sizes; a table goes to the folder."""
+    """Both models at several sizes; a table goes to the folder."""
     rows: list[Sequence[str]] = []
     cases = CASES[:1] if quick else CASES
     for across, thickness in cases:

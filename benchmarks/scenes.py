@@ -35,18 +35,18 @@ def ten_turns(folder: str) -> Scene:
     """The plates of `plate_four_bar`, 25.4 mm thick, reduced to 1 %: ten turns of 1,000 steps, time series only."""
     raw = plate_four_bar("solid", 2, 0.0254).model_dump(mode="json", exclude_unset=True)
     for link in raw["links"].values():
-        link |= {"reduced": True, "element": "hex20"}
+        link |= {"reduction": "modal", "element": "hex20"}
     raw["analysis"] |= {"revolutions": 10, "steps_per_revolution": 1000, "reduction_tolerance": 0.01}
     raw["output"] |= {"folder": folder, "animation": False, "plots": False, "picture": False}
     return scene_from(raw)
 
 
-def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_revolution: int = 360) -> Scene:
+def plate_four_bar(model: str, across: int, thickness: float, steps_per_revolution: int = 360) -> Scene:
     """The same with bores in eyes of 45 mm, quasi-static at 150 rpm; stress at the rocker, displacement of the coupler.
 
     Parameters
     ----------
-    fidelity : solid (one layer of hexahedra) or plane, on the same quadrilaterals
+    model : solid (one layer of hexahedra) or plane, on the same quadrilaterals
     across : elements across the waist
     """
     plate = {
@@ -56,8 +56,8 @@ def plate_four_bar(fidelity: str, across: int, thickness: float, steps_per_revol
         "eye_diameter": 0.045,
         "bore_diameter": 0.02,
     }
-    element = {"solid": "hex27", "plane": "quad9"}[fidelity]
-    raw = four_bar_of(plate, {"fidelity": fidelity, "element": element, "mesh": {"elements_across": across}})
+    element = {"solid": "hex27", "plane": "quad9"}[model]
+    raw = four_bar_of(plate, {"model": model, "element": element, "mesh": {"elements_across": across}})
     raw["drive"]["motion"]["speed"] = "150 rpm"
     raw["damping"] = {"ratio": 0.02, "frequencies": [20, 200]}
     raw["analysis"] = {
@@ -111,7 +111,7 @@ DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
 
 def mechanisms() -> dict[str, dict[str, Any]]:
     """Scenes of one turn in 720 steps, as the keys of a file: planar and spatial, beams, bars, plates, an extrusion."""
-    beam = four_bar_of({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {"fidelity": "beam"})
+    beam = four_bar_of({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {"model": "beam"})
     plate = four_bar_of({"kind": "plate_link", **EYE}, {})
     plate["drive"]["motion"]["speed"] = "150 rpm"
     for four_bar in (beam, plate):
@@ -124,7 +124,7 @@ def mechanisms() -> dict[str, dict[str, Any]]:
 def with_reduced_links(raw: dict[str, Any]) -> dict[str, Any]:
     """The same with all elastic links reduced."""
     links = {
-        name: link if link.get("fidelity") == "rigid" else {**link, "reduced": True}
+        name: link if link.get("model") == "rigid" else {**link, "reduction": "modal"}
         for name, link in raw["links"].items()
     }
     return {**raw, "links": links}
@@ -151,7 +151,7 @@ def _slider_crank() -> dict[str, Any]:
         "links": {
             "crank": {"material": "steel", "shape": {**rod, "between": ["A", "B"]}},
             "rod": {"material": "steel", "shape": {**rod, "between": ["B", "C"]}},
-            "piston": {"fidelity": "rigid", "mass": 0.4},
+            "piston": {"model": "rigid", "mass": 0.4},
         },
         "joints": {
             "A": _turning("revolute", ("ground", "crank"), "A"),
@@ -176,7 +176,7 @@ def _rssr() -> dict[str, Any]:
     links: dict[str, Any] = {
         name: {"material": "steel", "shape": {**bar, "between": list(pair)}} for name, pair in ends.items()
     }
-    links["cross"]["fidelity"] = "rigid"
+    links["cross"]["model"] = "rigid"
     return {
         "points": {name: place.tolist() for name, place in places.items()},
         "links": links,

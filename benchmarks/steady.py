@@ -52,7 +52,7 @@ def scene_of(name: str, damping: float, reduced: bool = False) -> Scene:
     if damping:
         raw["damping"]["ratio"] = damping
     for link in raw["links"].values() if reduced else ():
-        link["reduced"] = True
+        link["reduction"] = "modal"
     return over_one_period(scene_from(raw, EXAMPLES / name))
 
 

@@ -94,7 +94,7 @@ def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
     raw = hinged("rigid-body", "solid", steps=360, analysis={"initial": "rest", "revolutions": 1})
     for link, count in zip(raw["links"].values(), elements, strict=True):
         link["mesh"] = {"elements": count}
-        link["fidelity"] = "reduced" if count[0] == 4 else "solid"
+        link["reduction"] = "modal" if count[0] == 4 else "none"
     return raw
 
 

@@ -13,10 +13,10 @@ START = np.array([0.1, -0.05, 0.2])
 AXES = {"x": [1, 0, 0], "y": [0, 1, 0], "z": [0, 0, 1], "oblique": [0.6, -0.5, 0.62]}
 KINDS: dict[str, dict[str, Any]] = {
     "solid": {"mesh": {"elements": [6, 1, 1]}},
-    "reduced": {"fidelity": "reduced", "mesh": {"elements": [6, 1, 1]}},
-    "spatial_beam": {"fidelity": "beam", "mesh": {"elements": 6}},
-    "plane": {"fidelity": "plane", "mesh": {"elements": [6, 1]}},
-    "beam": {"fidelity": "beam", "mesh": {"elements": 6}},
+    "reduced": {"reduction": "modal", "mesh": {"elements": [6, 1, 1]}},
+    "spatial_beam": {"model": "beam", "mesh": {"elements": 6}},
+    "plane": {"model": "plane", "mesh": {"elements": [6, 1]}},
+    "beam": {"model": "beam", "mesh": {"elements": 6}},
 }
 FLAT = ("plane", "beam")
 CASES = [(kind, axis) for kind in KINDS for axis in AXES if kind not in FLAT or axis in ("x", "y")]
@@ -33,7 +33,7 @@ def bar_scene(kind: str, axis: str, folder: Path, **more: Any) -> Scene:
     section = {"kind": "bar", "width": WIDTH, "thickness": HEIGHT}
     arm = {"material": "steel", "shape": {**section, "between": ends[:2]}, **KINDS[kind]}
     tip = {"material": "steel", "shape": {**section, "between": ends[1:]}}
-    tip |= KINDS[kind] if kind in FLAT else {"fidelity": "rigid"}
+    tip |= KINDS[kind] if kind in FLAT else {"model": "rigid"}
     axes = {} if kind in FLAT else {"axis": list(across)}
     raw = {
         "links": {"arm": arm, "tip": tip},

@@ -84,7 +84,7 @@ def arm(steps: int, links: Raw, sudden: bool, frames: str) -> Raw:
     """An arm that swings, or that is struck at its tip while it does."""
     shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.02, "thickness": 0.02}
     raw: Raw = {
-        "links": {"arm": {"material": "steel", "shape": shape, "fidelity": "beam", **links}},
+        "links": {"arm": {"material": "steel", "shape": shape, "model": "beam", **links}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 1, "rise": 0.2}},
         "damping": {"ratio": 0.02, "frequencies": [50, 500]},
@@ -126,11 +126,11 @@ def cases() -> Iterator[Case]:
             raw,
             four_bar(speed, 11520, FINE, frames="co-rotational", **rest),
         )
-    for fidelity, tail in (("plane", []), ("solid", [1])):
-        fine = four_bar(60, 1440, {"fidelity": fidelity, "mesh": {"elements": [16, 2, *tail]}}, 0.5)
+    for model, tail in (("plane", []), ("solid", [1])):
+        fine = four_bar(60, 1440, {"model": model, "mesh": {"elements": [16, 2, *tail]}}, 0.5)
         for along in (4, 8):
-            links = {"fidelity": fidelity, "mesh": {"elements": [along, 1, *tail]}}
-            yield Case(f"60 rpm, {fidelity} {along} × 1 a link", four_bar(60, 720, links, 0.5), fine)
+            links = {"model": model, "mesh": {"elements": [along, 1, *tail]}}
+            yield Case(f"60 rpm, {model} {along} × 1 a link", four_bar(60, 720, links, 0.5), fine)
     for sudden in (False, True):
         word = "struck" if sudden else "swung"
         fine = arm(8000, FINE, sudden, "co-rotational")
@@ -158,7 +158,7 @@ def in_full() -> Iterator[Case]:
 
 
 def solids(along: int, across: int) -> Raw:
-    return {"fidelity": "solid", "mesh": {"elements": [along, across, 1]}}
+    return {"model": "solid", "mesh": {"elements": [along, across, 1]}}
 
 
 def judged(case: Case, known: dict[str, Any] | None = None) -> Judged:

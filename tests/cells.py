@@ -128,8 +128,8 @@ def scene_of(cell: Cell) -> Raw:
             link["mesh"] = {
                 "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
             }
-        if link.get("reduced"):
-            link["modes"] = 6
+        if link.get("reduction", "none") != "none":
+            link["reduction"] = 6
     raw["analysis"] |= {"initial": "rest", "end_time": STEPS * 5e-4}
     raw["analysis"] |= {"frames": "co-rotational" if cell.frames == "co-rotational" else "rigid-body"}
     if cell.frames == "stiffening":

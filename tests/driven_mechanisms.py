@@ -33,7 +33,7 @@ def stiffer(raw: Raw, factor: float) -> Raw:
     """A scene whose elastic links and bushings are stiffer by a factor; not its springs, which act as they do."""
     raw = copy.deepcopy(raw)
     for link in raw["links"].values():
-        link["material"] = "steel" if link["fidelity"] == "rigid" else "elastic"
+        link["material"] = "steel" if link["model"] == "rigid" else "elastic"
     raw["materials"] = {
         "elastic": {"youngs_modulus": 2.1e11 * factor, "poisson_ratio": 0.3, "density": 7850.0}
     }

@@ -34,7 +34,7 @@ def linkage_scene(
     first = {link: np.asarray(j[3], float) for j in reversed(joints.values()) for link in j[1:3]}
     return scene_from(
         {
-            "links": {name: {"fidelity": "rigid"} if name in sliders else bar(first[name]) for name in names},
+            "links": {name: {"model": "rigid"} if name in sliders else bar(first[name]) for name in names},
             "joints": {name: {**joint(*fields[:5]), **dict(*fields[5:])} for name, fields in joints.items()},
             "analysis": {"end_time": 1.0, "step": 0.01, **analysis},
             **(sections or {}),

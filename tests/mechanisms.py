@@ -94,7 +94,7 @@ def checked(seed: int, most: int = 12) -> dict[str, float]:
     raw = mechanism(seed, most)
     of, u, v = stepped(raw)
     found = {"monolithic": apart(u, by_oracle(of, STEPS, keeps=True)[0])}
-    if not any(link["fidelity"] == "rigid" for link in raw["links"].values()):
+    if not any(link["model"] == "rigid" for link in raw["links"].values()):
         found["run"] = apart(run_of(of), u)
     if not any("ground" in each["links"] for each in raw["joints"].values()):
         found["momentum"] = momentum(of, v)

@@ -17,12 +17,12 @@ from kedfem.scene import scene_from, time_grid
 Solver = type[LiteralSteps]
 
 
-def bar(fidelity: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:
+def bar(model: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:
     """A steel bar, 30 mm by 20 mm."""
-    elements: Any = {"beam": along, "plane": [along, 2], "solid": [along, 2, 1], "rigid": [1, 1, 1]}[fidelity]
+    elements: Any = {"beam": along, "plane": [along, 2], "solid": [along, 2, 1], "rigid": [1, 1, 1]}[model]
     shape = {"kind": "bar", "between": [list(a), list(b)], "width": 0.03, "thickness": 0.02}
     return {
-        "fidelity": fidelity,
+        "model": model,
         "material": "steel",
         "shape": shape,
         "mesh": {"elements": elements},
@@ -34,10 +34,10 @@ def turning(speed: str = "120 rpm") -> dict[str, Any]:
     return {"joint": "A", "motion": {"kind": "constant_speed", "speed": speed}}
 
 
-def inverted(fidelity: str = "beam", kind: str = "prismatic", **analysis: Any) -> dict[str, Any]:
+def inverted(model: str = "beam", kind: str = "prismatic", **analysis: Any) -> dict[str, Any]:
     """A crank turns an arm about B: by a block that slides on the arm, or by its pin in a slot of the arm."""
-    end = 0.15 if fidelity == "beam" else 0.16
-    links = {"crank": bar(fidelity, (0, 0), (0.1, 0)), "arm": bar(fidelity, (-0.3, 0), (0.5, 0), 16)}
+    end = 0.15 if model == "beam" else 0.16
+    links = {"crank": bar(model, (0, 0), (0.1, 0)), "arm": bar(model, (-0.3, 0), (0.5, 0), 16)}
     joints: dict[str, Any] = {
         "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
         "B": {"kind": "revolute", "links": ["ground", "arm"], "at": [-0.3, 0]},
@@ -45,9 +45,9 @@ def inverted(fidelity: str = "beam", kind: str = "prismatic", **analysis: Any) -
     if kind == "slot":
         joints["S"] = {"kind": "slot", "links": ["crank", "arm"], "at": [0.1, 0], "axis": "x"}
     else:
-        links["block"] = bar(fidelity, (0.1, 0), (end, 0), 2)
+        links["block"] = bar(model, (0.1, 0), (end, 0), 2)
         joints["C"] = {"kind": "revolute", "links": ["crank", "block"], "at": [0.1, 0]}
-        at = [0.15, 0] if fidelity == "beam" else [0.13, 0.015]
+        at = [0.15, 0] if model == "beam" else [0.13, 0.015]
         joints["S"] = {"kind": "prismatic", "links": ["block", "arm"], "at": at, "axis": "x"}
     steps = {"revolutions": 0.25, "steps_per_revolution": 720, "initial": "quasi-static", **analysis}
     given = {key: value for key, value in steps.items() if value is not None}
@@ -82,7 +82,7 @@ def beam_in_space(
     section = {"kind": "round", "diameter": 0.02}
     shape = {"kind": "polyline", "points": [list(a), list(b)], "section": section, "up": list(up)}
     return {
-        "fidelity": "beam",
+        "model": "beam",
         "beam": "spatial",
         "material": "steel",
         "shape": shape,

@@ -52,7 +52,7 @@ def partner(kind: str, a: Any, b: Any, up: Any) -> Raw:
         case "beam":
             return beam_in_space(a, b, 2, up)
         case "bare":
-            return {"fidelity": "rigid", "mass": 0.5}
+            return {"model": "rigid", "mass": 0.5}
         case "planar beam":
             return bar("beam", a[:2], b[:2], 2)
         case "plane":
@@ -65,10 +65,10 @@ def partner(kind: str, a: Any, b: Any, up: Any) -> Raw:
                 "thickness": 0.02,
                 "up": list(up),
             }
-            more = {"reduced": True, "modes": 12} if kind == "reduced" else {}
-            fidelity = "rigid" if kind == "rigid" else "solid"
+            more = {"reduction": 12} if kind == "reduced" else {}
+            model = "rigid" if kind == "rigid" else "solid"
             return {
-                "fidelity": fidelity,
+                "model": model,
                 "material": "steel",
                 "shape": shape,
                 "mesh": {"elements": [2, 1, 1]},

@@ -27,7 +27,7 @@ PAGE = Path("docs/performance/planned_steps.md")
 ASKED = 0.01
 TURNS = 2
 BEAMS = {"element": "beam5", "mesh": {"elements": 3}}
-SOLIDS = {"fidelity": "solid", "mesh": {"elements": [8, 1, 1]}, "reduced": True}
+SOLIDS = {"model": "solid", "mesh": {"elements": [8, 1, 1]}, "reduction": "modal"}
 
 
 @dataclass(frozen=True)

@@ -65,8 +65,8 @@ class Drawing:
             made["mesh"] = {
                 "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
             }
-        if made.get("reduced"):
-            made["modes"] = 6
+        if made.get("reduction", "none") != "none":
+            made["reduction"] = 6
         self.links[name], self.kinds[name] = made, kind
         self.places[name] = [a, b]
         return name

@@ -143,13 +143,13 @@ def robot() -> Raw:
 
 def rigid_in_space(a: Any, b: Any) -> Raw:
     """A rod of round section that does not bend."""
-    return {key: x for key, x in beam_in_space(a, b, 2).items() if key != "beam"} | {"fidelity": "rigid"}
+    return {key: x for key, x in beam_in_space(a, b, 2).items() if key != "beam"} | {"model": "rigid"}
 
 
 def pushed(driven: bool, rod: str = "beam") -> Raw:
     """A ram of mass alone on a guide of the ground, and a rocker: the one moves the other over a rod."""
     links = {
-        "ram": {"fidelity": "rigid", "mass": 0.5},
+        "ram": {"model": "rigid", "mass": 0.5},
         "rod": beam_in_space(P, Q, 2) if rod == "beam" else rigid_in_space(P, Q),
         "rocker": beam_in_space(Q, G, 2),
     }
@@ -207,7 +207,7 @@ def plate(a: Sequence[float], b: Sequence[float], thickness: float = 0.02) -> Ra
         "holes": [{"at": list(a), "diameter": 0.015}, {"at": list(b), "diameter": 0.015}],
         "thickness": thickness,
     }
-    return {"fidelity": "solid", "material": "steel", "shape": shape, "mesh": {"size": 0.02}}
+    return {"model": "solid", "material": "steel", "shape": shape, "mesh": {"size": 0.02}}
 
 
 def bored(kind: str) -> Raw:
@@ -239,5 +239,5 @@ def as_mesh_files(raw: Raw, drawn: Sequence[Link], folder: Path, R: np.ndarray, 
         file = folder / f"{link.name}.vtu"
         meshio.Mesh(link.X @ R.T + shift, [("hexahedron20", link.cells)]).write(file)
         shape = {"kind": "mesh", "file": str(file)}
-        links[link.name] = {"fidelity": "solid", "material": "steel", "shape": shape}
+        links[link.name] = {"model": "solid", "material": "steel", "shape": shape}
     return {**raw, "links": links}

@@ -122,10 +122,10 @@ def _refuse(scene: Scene, name: str) -> None:
         known = ", ".join(repr(each) for each in scene.links)
         raise SceneError(f"--link: must be a link of the scene ({known}), got '{name}'")
     link, where = scene.links[name], f"links.{name}"
-    if link.fidelity == "rigid" or link.family != "solid":
-        got = "a rigid one" if link.fidelity == "rigid" else f"a {link.family}"
+    if link.model == "rigid" or link.family != "solid":
+        got = "a rigid one" if link.model == "rigid" else f"a {link.family}"
         raise SceneError(
-            f'{where}: must be an elastic solid for load cases, got {got}: take `fidelity = "solid"`'
+            f'{where}: must be an elastic solid for load cases, got {got}: take `model = "solid"`'
         )
     if corotational(scene):
         raise SceneError(

@@ -14,7 +14,7 @@ title = "Compiled beforehand"
 A = [0, 0]
 B = [0.6, 0]
 [links.arm]
-fidelity = "beam"
+model = "beam"
 material = "aluminium"
 shape = { kind = "bar", between = ["A", "B"], width = 0.01, thickness = 0.02 }
 mesh = { elements = 2 }

@@ -160,7 +160,7 @@ def stiffness_ratio() -> list[Outcome]:
     fast = run(raw)
     literal = run({**raw, "analysis": {**raw["analysis"], "solver": "monolithic"}})
     shape = raw["links"]["coupler"]["shape"]
-    raw["links"]["coupler"] = {"fidelity": "rigid", "material": "stiff", "shape": shape}
+    raw["links"]["coupler"] = {"model": "rigid", "material": "stiff", "shape": shape}
     rigid = run(raw)
     return [
         Right("torque, fast against monolithic steps", apart(fast, literal, "drive/torque"), 1e-5),

@@ -27,7 +27,7 @@ def bar(a: list[float], b: list[float], size: tuple[float, float], elements: int
     shape = {"kind": "bar", "between": [a, b], "width": size[0], "thickness": size[1]}
     return {
         "material": "m",
-        "fidelity": "beam",
+        "model": "beam",
         "element": "beam5",
         "shape": shape,
         "mesh": {"elements": elements},
@@ -78,7 +78,7 @@ def test_a_free_slider_crank_passes_its_dead_points() -> None:
         "links": {
             "crank": bar([0, 0], [0, 0.1], size, 4),
             "rod": bar([0, 0.1], [end, 0], size, 4),
-            "slider": {"fidelity": "rigid", "mass": 0.05},
+            "slider": {"model": "rigid", "mass": 0.05},
         },
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
@@ -129,7 +129,7 @@ def flight_energy(rho_inf: float, steps: int, h: float = 2e-4) -> np.ndarray:
     shape = {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.004, "thickness": 0.01}
     scene = scene_from({
         "materials": {"m": ALLOY},
-        "links": {"rod": {"material": "m", "fidelity": "beam", "shape": shape, "mesh": {"elements": 2}}},
+        "links": {"rod": {"material": "m", "model": "beam", "shape": shape, "mesh": {"elements": 2}}},
         "loads": {"F": {"kind": "force", "link": "rod", "at": [0, 0], "vector": [0, 5],
                         "factor": {"time": [0, 0.01, 0.02], "value": [0, 1, 0]}}},
         "analysis": {"end_time": steps * h, "step": h, "rho_inf": rho_inf,

@@ -32,12 +32,12 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def arm(
-    fidelity: str, elements: list[int], *, height: float = 0.01, nu: float = 0.3, **analysis: Any
+    model: str, elements: list[int], *, height: float = 0.01, nu: float = 0.3, **analysis: Any
 ) -> dict[str, Any]:
     """A cantilever with a drive that stands still but for a hair, under its weight, and a probe at its tip."""
-    mesh = {"elements": elements[0] if fidelity == "beam" else elements[: 2 if fidelity == "plane" else 3]}
+    mesh = {"elements": elements[0] if model == "beam" else elements[: 2 if model == "plane" else 3]}
     return scenes.arm(
-        bar(L, height, height, fidelity=fidelity, mesh=mesh),
+        bar(L, height, height, model=model, mesh=mesh),
         constant_speed(1e-6),
         gravity=[0, -9.81, 0],
         materials={"steel": material(RHO, E, nu)},
@@ -46,8 +46,11 @@ def arm(
     )
 
 
-def reduced(raw: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    return {**raw, "links": {name: {**link, "reduced": True, **keys} for name, link in raw["links"].items()}}
+def reduced(raw: dict[str, Any], modes: int | str = "modal") -> dict[str, Any]:
+    return {
+        **raw,
+        "links": {name: {**link, "reduction": modes} for name, link in raw["links"].items()},
+    }
 
 
 def run(raw: dict[str, Any]) -> Histories:
@@ -63,12 +66,10 @@ def sag(height: float) -> float:
     return -RHO * 9.81 * L**4 * 12 / (8 * E * height**2)
 
 
-@pytest.mark.parametrize(
-    ("fidelity", "elements"), [("beam", [10]), ("solid", [40, 1, 1]), ("plane", [40, 1])]
-)
-def test_a_link_500_times_as_long_as_high(fidelity: str, elements: list[int]) -> None:
+@pytest.mark.parametrize(("model", "elements"), [("beam", [10]), ("solid", [40, 1, 1]), ("plane", [40, 1])])
+def test_a_link_500_times_as_long_as_high(model: str, elements: list[int]) -> None:
     """Stiffness along it is 3e6 times that across: bending must not drown in rounding, nor lock."""
-    raw = arm(fidelity, elements, height=L / 500)
+    raw = arm(model, elements, height=L / 500)
     full, small = run(raw), run(reduced(raw))
     assert_allclose(tip(full), sag(L / 500), rtol=2e-3)
     assert_allclose(tip(small), tip(full), rtol=1e-3)  # as asked for
@@ -119,8 +120,8 @@ def test_far_more_functions_than_a_link_needs() -> None:
 
 def test_a_load_put_on_at_once_swings_to_twice_its_static_deflection() -> None:
     """Undamped, one mode: a mass of 20 kg at the tip of an arm of 0.4 kg; F L³/(3 E I) and the arm's own share."""
-    for fidelity, elements in (("beam", [6]), ("solid", [12, 1, 1])):
-        raw = arm(fidelity, elements)
+    for model, elements in (("beam", [6]), ("solid", [12, 1, 1])):
+        raw = arm(model, elements)
         raw["gravity"] = [0, 0, 0]
         raw["bodies"] = {"tip": {"kind": "point_mass", "link": "arm", "at": [L, 0], "mass": 20.0}}
         raw["loads"] = {

@@ -229,14 +229,14 @@ def test_cuts_of_meshed_links_make_them_hardly_softer(kind: str, wanted: dict[in
 ALLOY = {"density": 2800, "youngs_modulus": 7e10, "shear_modulus": 2.7e10}
 
 
-def elbow(fidelity: str, load: float, corotational: bool = True, **analysis: Any) -> dict[str, Any]:
+def elbow(model: str, load: float, corotational: bool = True, **analysis: Any) -> dict[str, Any]:
     """A bent arm on a drive that all but stands still, a force on its tip put on within a few ms."""
     shape = {"kind": "polyline", "points": [[0, 0], [0.3, 0], [0.3, 0.2]], "width": 0.01, "thickness": 0.01}
-    link = {"material": "m", "shape": shape, "fidelity": "beam", "beam": fidelity, "mesh": {"elements": 2}}
-    if fidelity in {"plane", "solid"}:
+    link = {"material": "m", "shape": shape, "model": "beam", "beam": model, "mesh": {"elements": 2}}
+    if model in {"plane", "solid"}:
         out = [[0, -0.005], [0.305, -0.005], [0.305, 0.2], [0.295, 0.2], [0.295, 0.005], [0, 0.005]]
         del link["beam"]
-        link |= {"fidelity": fidelity, "shape": {"kind": "extrusion", "outline": out, "thickness": 0.01}}
+        link |= {"model": model, "shape": {"kind": "extrusion", "outline": out, "thickness": 0.01}}
         link["mesh"] = {"size": 0.01}
     factor = {"time": [0, 5e-3], "value": [0, 1]}
     force = {"kind": "force", "link": "arm", "at": [0.3, 0.2], "vector": [0.6 * load, load], "factor": factor}
@@ -328,11 +328,11 @@ def pendulum(kind: str, R: np.ndarray) -> dict[str, Any]:
         "at": points[0],
         "axis": list(R @ [0.3, 0.4, 1.0]),
     }
-    arm = {"material": "m", "fidelity": "beam", "beam": "spatial", "mesh": {"elements": 2},
+    arm = {"material": "m", "model": "beam", "beam": "spatial", "mesh": {"elements": 2},
            "shape": {"kind": "polyline", "points": points, "width": 0.01, "thickness": 0.01}}  # fmt: skip
     if kind == "rigid":
         del arm["beam"], arm["mesh"]
-        arm["fidelity"] = "rigid"
+        arm["model"] = "rigid"
     return {
         "gravity": list(R @ [2.0, -9.0, 3.0]),
         "materials": {"m": ALLOY},
@@ -364,9 +364,9 @@ def test_free_flight_keeps_momentum_and_the_integrators_order_of_spin_and_energy
 def flight(kind: str, h: float) -> dict[str, Any]:
     """A bar thrown spinning, in space if it can."""
     flat = kind in {"planar", "plane"}
-    link = {"material": "m", "fidelity": "beam" if kind in {"planar", "spatial"} else kind,
+    link = {"material": "m", "model": "beam" if kind in {"planar", "spatial"} else kind,
             "shape": {"kind": "bar", "between": [[0, 0], [0.5, 0]], "width": 0.01, "thickness": 0.01}}  # fmt: skip
-    if link["fidelity"] == "beam":
+    if link["model"] == "beam":
         link |= {"beam": kind, "mesh": {"elements": 3}}
     elif kind != "rigid":
         link |= {"mesh": {"elements": [4, 1] if flat else [4, 1, 1]}, "segments": 2}

@@ -88,7 +88,7 @@ def test_an_accuracy_divides_fillets_of_parts_with_or_without_a_drive(
     accuracy: Any, angle: float | None, tmp_path: Path
 ) -> None:
     written(tmp_path, "part", bored_bar, ("step",))
-    part = {"material": "steel", "fidelity": "solid", "shape": {"kind": "cad", "file": "part.step"}}
+    part = {"material": "steel", "model": "solid", "shape": {"kind": "cad", "file": "part.step"}}
     raw = {
         "links": {"bar": part},
         "joints": {"W": {"kind": "weld", "links": ["ground", "bar"], "at": [0, 0, 0.002]}},

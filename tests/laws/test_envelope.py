@@ -22,12 +22,12 @@ from tests.frames import frames
 from tests.scenes import arm, bar, constant_speed, four_bar
 
 KINDS: dict[str, dict[str, Any]] = {
-    "beam": {"fidelity": "beam", "mesh": {"elements": 4}},
-    "beam5": {"fidelity": "beam", "element": "beam5", "mesh": {"elements": 2}},
-    "spatial": {"fidelity": "beam", "beam": "spatial", "mesh": {"elements": 3}},
-    "plane": {"fidelity": "plane", "mesh": {"elements": [6, 1]}},
+    "beam": {"model": "beam", "mesh": {"elements": 4}},
+    "beam5": {"model": "beam", "element": "beam5", "mesh": {"elements": 2}},
+    "spatial": {"model": "beam", "beam": "spatial", "mesh": {"elements": 3}},
+    "plane": {"model": "plane", "mesh": {"elements": [6, 1]}},
     "solid": {"mesh": {"elements": [6, 1, 1]}},
-    "reduced": {"mesh": {"elements": [6, 1, 1]}, "reduced": True, "modes": 12},
+    "reduced": {"mesh": {"elements": [6, 1, 1]}, "reduction": 12},
 }
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.02}
 
@@ -44,7 +44,7 @@ def scene(kind: str, frames: str = "rigid-body", **output: Any) -> dict[str, Any
         raw["links"]["crank"] = {
             "material": "steel",
             "shape": shape,
-            "fidelity": "rigid",
+            "model": "rigid",
             "mesh": {"elements": [1, 1, 1]},
         }
     return raw
@@ -164,11 +164,11 @@ SHARP: list[Any] = [[-0.02, -0.02], [0.08, -0.02], [0.08, 0.12], [0.06, 0.12], [
 ROUND: list[Any] = [*SHARP[:4], [0.06, 0.035], {"via": [0.0556066, 0.0243934], "to": [0.045, 0.02]}, SHARP[5]]
 
 
-@pytest.mark.parametrize("fidelity", ["solid", "plane"])
-def test_a_re_entrant_corner_is_found_and_a_round_one_is_not(fidelity: str) -> None:
+@pytest.mark.parametrize("model", ["solid", "plane"])
+def test_a_re_entrant_corner_is_found_and_a_round_one_is_not(model: str) -> None:
     for outline, corners in ((SHARP, 1), (ROUND, 0)):
         raw = angled(outline, {"size": 0.01})
-        raw["links"]["arm"]["fidelity"] = fidelity
+        raw["links"]["arm"]["model"] = model
         link = prepared(scene_from(raw))[0].model.links[0]
         nodes = link.X[re_entrant(link)]
         assert bool(len(nodes)) == bool(corners)

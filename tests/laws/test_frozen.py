@@ -135,7 +135,7 @@ def test_a_crank_that_a_free_drive_lets_go_swings_with_its_own_inertia(crank: st
     """A rigid crank is carried by its drive, without unknowns; let go it has some."""
     raw = scene_of(Cell("revolute", "rigid-body", True, "planar beams"))
     if crank == "rigid":
-        raw["links"]["crank"] |= {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
+        raw["links"]["crank"] |= {"model": "rigid", "mesh": {"elements": [1, 1, 1]}}
     system, motion, found, _ = frozen(raw, driven=False)
     assert found.still == 1
     assert difference(system, motion, found) < 1e-8

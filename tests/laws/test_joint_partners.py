@@ -171,10 +171,10 @@ def test_a_planar_beam_and_a_rigid_bar_are_welded_either_way_round() -> None:
 def test_a_plane_link_and_one_in_space_go_together_by_hinges_only(kind: str, other: str) -> None:
     raw = chain(kind, ("plane", "planar beam"), plane=True)
     (link,) = (
-        raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["fidelity"] == "beam"
+        raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["model"] == "beam"
     )
     if other == "solid":
-        link |= {"fidelity": "solid", "mesh": {"elements": [4, 1, 1]}}
+        link |= {"model": "solid", "mesh": {"elements": [4, 1, 1]}}
         link.pop("beam", None)
     else:
         link["beam"] = "spatial"
@@ -193,7 +193,7 @@ def arm(kinds: tuple[str, str], frames: str) -> dict[str, object]:
     meshes = {"plane": {"elements": [16, 2]}, "beam": {"elements": 4}}
     return {
         "links": {
-            name: {"fidelity": kind, "material": "steel", "shape": {"kind": "bar", "between": ends[name], **ARM},
+            name: {"model": kind, "material": "steel", "shape": {"kind": "bar", "between": ends[name], **ARM},
                    "mesh": meshes[kind]}
             for name, kind in zip(ends, kinds, strict=True)
         },

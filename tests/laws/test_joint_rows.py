@@ -101,23 +101,23 @@ def test_no_answer_depends_on_which_axis_of_the_world_a_joint_lies_along(kind: s
     assert_the_same(kind, ran(raw), ran(turned(raw, R)), R, rounding(kind))
 
 
-@pytest.mark.parametrize("fidelity", ["beam", "plane", "solid"])
+@pytest.mark.parametrize("model", ["beam", "plane", "solid"])
 def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_a_plane(
-    fidelity: str,
+    model: str,
 ) -> None:
     """Along x, y and askew: a ram pushes a planar beam, a plane link, a solid; of which a bar lies as it likes."""
     force = []
     for angle in (0.0, np.pi / 2, 0.7):
         c, s = np.cos(angle), np.sin(angle)
         ends = [[0.2 * c, 0.2 * s], [0.2 * c - 0.2 * s, 0.2 * s + 0.2 * c]]
-        links = {"ram": {"fidelity": "rigid", "mass": 0.5}, "rod": bar(fidelity, [0.0, 0.0], ends[0], 2)}
+        links = {"ram": {"model": "rigid", "mass": 0.5}, "rod": bar(model, [0.0, 0.0], ends[0], 2)}
         joints: dict[str, Any] = {
             "A": {"kind": "prismatic", "links": ["ram", "ground"], "at": [0.0, 0.0], "axis": [c, s, 0.0]},
             "P": {"kind": "revolute", "links": ["ram", "rod"], "at": [0.0, 0.0]},
             "Q": {"kind": "revolute", "links": ["rod", "arm"], "at": ends[0]},
             "G": {"kind": "revolute", "links": ["arm", "ground"], "at": ends[1]},
         }
-        links["arm"] = bar(fidelity, ends[0], ends[1], 2)
+        links["arm"] = bar(model, ends[0], ends[1], 2)
         drive = {"joint": "A", "motion": {"kind": "cycloidal", "travel": 0.03, "rise": 0.03}}
         analysis = {"end_time": 0.003, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static"}
         one = ran({"links": links, "joints": joints, "drive": drive, "analysis": analysis})

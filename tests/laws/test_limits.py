@@ -188,7 +188,7 @@ QUICK = ("beam", "rigid", "large")
 KINDS: dict[str, Raw] = {
     "beam": bar("beam", (0, 0), (0.04, 0), 1), "plane": bar("plane", (0, 0), (0.04, 0), 3),
     "solid": bar("solid", (0, 0), (0.04, 0), 2), "rigid": bar("rigid", (0, 0), (0.04, 0)),
-    "reduced": bar("solid", (0, 0), (0.04, 0), 4, reduced=True, modes=6),
+    "reduced": bar("solid", (0, 0), (0.04, 0), 4, reduction=6),
     "large": {**bar("solid", (0, 0), (0.04, 0)), "mesh": {"elements": [4, 3, 2]}},
 }  # fmt: skip
 
@@ -221,7 +221,7 @@ def test_a_bounce_is_of_second_order_in_the_step(zeta: float) -> None:
 def fallen(count: int, **stops: Raw) -> Ran:
     """An arm that falls onto stops about its hinge, and bounces once or twice."""
     arm = {"kind": "bar", "between": [[0, 0], [0.3, 0]], "width": 0.02, "thickness": 0.01}
-    links = {"arm": {"fidelity": "beam", "material": "steel", "shape": arm, "mesh": {"elements": 4}}}
+    links = {"arm": {"model": "beam", "material": "steel", "shape": arm, "mesh": {"elements": 4}}}
     return ran({
         "gravity": [0, -9.81, 0], "links": links, "limits": stops, "damping": {"beta": 2e-5},
         "joints": {"J": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
@@ -257,7 +257,7 @@ def slider_crank(frames: str) -> Ran:
         return {"kind": "bar", "between": [[a, 0], [b, 0]], "width": 0.02, "thickness": 0.01}
 
     def beam(a: float, b: float) -> Raw:
-        return {"fidelity": "beam", "material": "steel", "shape": shape(a, b), "mesh": {"elements": 3}}
+        return {"model": "beam", "material": "steel", "shape": shape(a, b), "mesh": {"elements": 3}}
 
     hinges = {"A": ("ground", "crank", 0.0), "B": ("crank", "rod", 0.1), "C": ("rod", "shoe", 0.4)}
     joints: Raw = {
@@ -265,7 +265,7 @@ def slider_crank(frames: str) -> Ran:
     }
     joints["S"] = {"kind": "prismatic", "links": ["ground", "shoe"], "at": [0.4, 0], "axis": "x"}
     return ran({
-        "links": {"crank": beam(0, 0.1), "rod": beam(0.1, 0.4), "shoe": {"fidelity": "rigid", "mass": 0.5}},
+        "links": {"crank": beam(0, 0.1), "rod": beam(0.1, 0.4), "shoe": {"model": "rigid", "mass": 0.5}},
         "joints": joints, "damping": {"beta": 1e-4},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": np.pi}},
         "limits": {"stop": {"kind": "travel", "joint": "S", "lower": -0.1, "stiffness": 2e4, "damping": 200.0}},

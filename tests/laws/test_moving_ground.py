@@ -42,8 +42,8 @@ def sprung(axis: Vector, motion: Raw, **analysis: Any) -> Raw:
     return {
         "materials": {"m": {"density": M / 1e-3, "youngs_modulus": 2e11, "poisson_ratio": 0.3}},
         "links": {
-            "road": {"fidelity": "rigid", "mass": GROUND_MASS},
-            "block": {"fidelity": "rigid", "material": "m", "shape": shape},
+            "road": {"model": "rigid", "mass": GROUND_MASS},
+            "block": {"model": "rigid", "material": "m", "shape": shape},
         },
         "joints": {
             "lift": {"kind": "prismatic", "links": ["ground", "road"], "at": [0, 0, 0], "axis": axis},
@@ -135,7 +135,7 @@ def shaken(raw: Raw, axis: Vector, height: float) -> Raw:
     table = {"joint": "shake", "motion": {**RISE, "travel": height}}
     drives = {"own": raw["drive"], "shake": table} if "drive" in raw else {"shake": table}
     rest = {key: value for key, value in raw.items() if key != "drive"}
-    links = {**raw["links"], "table": {"fidelity": "rigid"}}
+    links = {**raw["links"], "table": {"model": "rigid"}}
     return {**rest, "links": links, "joints": {**joints, "shake": shake}, "drives": drives}
 
 
@@ -156,7 +156,7 @@ def cantilever() -> Raw:
     line = {"kind": "polyline", "points": [[0, 0, 0], [0.1, 0, 0], [0.3, 0.05, 0.1]]}
     section = {"kind": "rectangle", "width": 0.006, "thickness": 0.004}
     beam = {
-        "fidelity": "beam",
+        "model": "beam",
         "material": "steel",
         "shape": {**line, "section": section},
         "mesh": {"elements": 4},
@@ -172,7 +172,7 @@ def cantilever() -> Raw:
 
 def four_bar() -> Raw:
     A, B, C_, D = [0, 0], [0.03, 0.05], [0.2, 0.12], [0.22, 0]
-    bar = {"fidelity": "beam", "material": "steel", "mesh": {"elements": 3}}
+    bar = {"model": "beam", "material": "steel", "mesh": {"elements": 3}}
     ends = {"crank": (A, B), "coupler": (B, C_), "rocker": (C_, D)}
     names = [["crank", "ground"], ["crank", "coupler"], ["coupler", "rocker"], ["rocker", "ground"]]
     return {
@@ -221,8 +221,8 @@ def test_grounds_on_grounds_bear_centrifugal_and_coriolis_forces(tmp_path: Path)
     bar = {"kind": "bar", "between": [[0, 0, 0], [0.1, 0, 0]], "width": 0.02, "thickness": 0.02}
     raw = {
         "links": {
-            "turntable": {"fidelity": "rigid"}, "sledge": {"fidelity": "rigid", "mass": m},
-            "stub": {"fidelity": "beam", "material": "steel", "shape": bar},
+            "turntable": {"model": "rigid"}, "sledge": {"model": "rigid", "mass": m},
+            "stub": {"model": "beam", "material": "steel", "shape": bar},
         },
         "joints": {
             "turn": {"kind": "revolute", "links": ["ground", "turntable"], "at": [0.5, 0, 0], "axis": axis},

@@ -336,7 +336,7 @@ def test_both_ports_are_the_same_from_afar() -> None:
         shape = {"kind": "plate_link", "between": [[0, 0], [length, 0]], "width": 0.03, "thickness": 0.01,
                  "bore_diameter": 0.015}  # fmt: skip
         raw["links"] = {
-            "arm": {"material": "alloy", "fidelity": "plane", "shape": shape, "mesh": {"elements_across": 2}}
+            "arm": {"material": "alloy", "model": "plane", "shape": shape, "mesh": {"elements_across": 2}}
         }
         raw["joints"] = {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}}
         raw["bodies"] = {}

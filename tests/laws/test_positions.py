@@ -79,7 +79,7 @@ def test_a_cantilever_bends_as_the_elastica() -> None:
     thin = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.002, "thickness": 0.02}
     most, EI = 0.2, E * 0.02 * 0.002**3 / 12
     got = values({
-        "links": {"rod": {"fidelity": "beam", "material": "steel", "shape": thin, "mesh": {"elements": 8}}},
+        "links": {"rod": {"model": "beam", "material": "steel", "shape": thin, "mesh": {"elements": 8}}},
         "joints": {"W": {"kind": "weld", "links": ["rod", "ground"], "at": [0, 0]}},
         "loads": {"P": {"kind": "force", "link": "rod", "at": [1, 0], "vector": [0, most * EI], "frame": "world",
                         "factor": {"over": "time", "at": [0, 1], "value": [0, 1]}}},
@@ -175,20 +175,20 @@ def test_rigid_links_are_as_rigid_in_positions_far_apart(kind: str) -> None:
 
 
 KINDS = [
-    (fidelity, kind, frames)
-    for fidelity in ("beam", "plane", "solid")
+    (model, kind, frames)
+    for model in ("beam", "plane", "solid")
     for kind in ("prismatic", "slot")
     for frames in ("rigid-body", "co-rotational")
-    if kind == "prismatic" or (fidelity == "beam" and frames == "rigid-body")
+    if kind == "prismatic" or (model == "beam" and frames == "rigid-body")
 ]
 
 
-@pytest.mark.parametrize(("fidelity", "kind", "frames"), KINDS)
+@pytest.mark.parametrize(("model", "kind", "frames"), KINDS)
 def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(
-    fidelity: str, kind: str, frames: str
+    model: str, kind: str, frames: str
 ) -> None:
     """And static positions do not depend on the drive's speed."""
-    raw = inverted(fidelity, kind, initial=None, revolutions=1, steps_per_revolution=4, frames=frames)
+    raw = inverted(model, kind, initial=None, revolutions=1, steps_per_revolution=4, frames=frames)
     raw |= {"gravity": [0, -G]}
     probe = {"link": "arm", "at": [0.5, 0], "quantity": "displacement"}
     raw["output"] = {"probes": {"end": probe}}
@@ -290,7 +290,7 @@ def test_what_nothing_loads_is_told(axis: str, tmp_path: Path) -> None:
 def test_what_nothing_holds_is_told_in_words() -> None:
     hanging = {
         "gravity": [0, -G],
-        "links": {"rod": {"fidelity": "beam", "material": "steel", "mesh": {"elements": 2},
+        "links": {"rod": {"model": "beam", "material": "steel", "mesh": {"elements": 2},
                           "shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}}},
         "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0]}},
         "analysis": {"kind": "static"},

@@ -36,13 +36,13 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def arm(kind: str, **analysis: Any) -> dict[str, Any]:
     """A cantilever that swings under its weight; spatial: a bent beam under weight across its plane."""
-    link = bar(0.5, 0.02, 0.03, fidelity="solid", mesh={"elements": [10, 2, 1]})
+    link = bar(0.5, 0.02, 0.03, model="solid", mesh={"elements": [10, 2, 1]})
     if kind == "tetrahedra":
         link |= {"element": "tet10"}
     if kind == "plane":
-        link |= {"fidelity": "plane", "mesh": {"elements": [10, 2]}}
+        link |= {"model": "plane", "mesh": {"elements": [10, 2]}}
     if kind in {"beam", "spatial"}:
-        link |= {"fidelity": "beam", "mesh": {"elements": 10}}
+        link |= {"model": "beam", "mesh": {"elements": 10}}
     if kind == "spatial":
         points = [[0, 0], [0.3, 0.1], [0.5, 0]]
         link["shape"] = {"kind": "polyline", "points": points, "width": 0.02, "thickness": 0.03}
@@ -203,7 +203,7 @@ def rigid_coupler_work(angle: float) -> float:
     raw["points"]["D"] = [0.9144 * np.cos(angle), 0.9144 * np.sin(angle)]
     raw["points"]["B"]["angle"] = np.radians(60) + angle
     shape = {"kind": "polyline", "points": ["B", "C"], "width": 0.0254, "thickness": 0.0254}
-    raw["links"]["coupler"] = {"material": "alloy", "fidelity": "rigid", "shape": shape}
+    raw["links"]["coupler"] = {"material": "alloy", "model": "rigid", "shape": shape}
     full = meshed(scene_from(raw))
     assert full.model.links[1].kind == "beam"
     return static_work(full.model, full)

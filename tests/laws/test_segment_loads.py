@@ -12,12 +12,12 @@ from tests import scenes
 from tests.scenes import bar, constant_speed
 
 
-def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
+def arm(kind: str, **analysis: Any) -> dict[str, Any]:
     segments: dict[str, Any] = {"segments": 4} if analysis.get("frames") else {}
-    if fidelity == "tet10":
-        fidelity, segments["element"] = "solid", "tet10"
+    if kind == "tet10":
+        kind, segments["element"] = "solid", "tet10"
     return scenes.arm(
-        bar(0.4, 0.02, 0.01, fidelity=fidelity, **segments),
+        bar(0.4, 0.02, 0.01, model=kind, **segments),
         constant_speed(1.0),
         gravity=[1.0, -9.81],
         loads={
@@ -29,12 +29,12 @@ def arm(fidelity: str, **analysis: Any) -> dict[str, Any]:
     )
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid", "tet10"])
-def test_segments_carry_all_loads_of_the_whole_link(fidelity: str) -> None:
+@pytest.mark.parametrize("kind", ["plane", "solid", "tet10"])
+def test_segments_carry_all_loads_of_the_whole_link(kind: str) -> None:
     """Resultants and moments of gravity, of a pressure over the whole upper face, of body and tip force."""
     found = []
     for frames in ({}, {"frames": "co-rotational"}):
-        model = meshed(scene_from(arm(fidelity, **frames))).model
+        model = meshed(scene_from(arm(kind, **frames))).model
         total = np.zeros((3, 3))
         for link, loads in zip(model.links, model.loads, strict=True):
             F = sum(load.forces for load in loads)

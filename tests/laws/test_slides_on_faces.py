@@ -17,8 +17,8 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("axis", AXES)
-@pytest.mark.parametrize("fidelity", KINDS)
-def test_a_ram_bends_as_a_cantilever(axis: str, fidelity: str) -> None:
+@pytest.mark.parametrize("model", KINDS)
+def test_a_ram_bends_as_a_cantilever(axis: str, model: str) -> None:
     """F L³/3EI + F L/κGA across it, F/k along it; its guide bears F L. Rigid ones keep their direction."""
     n, d = AXES[axis], across(AXES[axis])
     shape = {
@@ -27,17 +27,17 @@ def test_a_ram_bends_as_a_cantilever(axis: str, fidelity: str) -> None:
     }  # fmt: skip
     end = {"link": "ram", "at": (L * d).tolist()}
     got = values({
-        "links": {"ram": {"fidelity": fidelity, "material": "steel", "shape": shape, **KINDS[fidelity]}},
+        "links": {"ram": {"model": model, "material": "steel", "shape": shape, **KINDS[model]}},
         "joints": {"S": {"kind": "prismatic", "links": ["ram", "ground"], "at": [0, 0, 0], "axis": d.tolist()}},
         "springs": {"k": {"kind": "spring", "joint": "S", "stiffness": SPRING}},
         "loads": {"F": {"kind": "force", **end, "vector": (FORCE * (n + d)).tolist()}},
         "analysis": {"kind": "static"}, "output": {"probes": {"end": {**end, "quantity": "travel"}}},
     })  # fmt: skip
     inertia, shear = SIDE**4 / 12, E / 2.6 * SIDE**2 * 5 / 6
-    bent = 0.0 if fidelity == "rigid" else FORCE * L**3 / (3 * E * inertia) + FORCE * L / shear
+    bent = 0.0 if model == "rigid" else FORCE * L**3 / (3 * E * inertia) + FORCE * L / shear
     scale = FORCE * L**3 / (3 * E * inertia)
     assert_allclose(got["probes/end/travel"] @ n, bent, atol=1e-2 * scale)  # the face is held on the average
-    pushed = FORCE / SPRING + (0.0 if fidelity == "rigid" else FORCE * L / (E * SIDE**2))
+    pushed = FORCE / SPRING + (0.0 if model == "rigid" else FORCE * L / (E * SIDE**2))
     assert_allclose(got["probes/end/travel"] @ d, pushed, atol=1e-2 * pushed + scale**2 / L)
     moment = -np.cross(L * d, FORCE * n)
     assert_allclose(got["joints/S/moment"], [moment] * 2, atol=1e-2 * FORCE * L)

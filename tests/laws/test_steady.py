@@ -89,9 +89,9 @@ def beams(**more: Any) -> Raw:
     return {**raw, "damping": DAMPED, **more}
 
 
-def planar(fidelity: str, **more: Any) -> Raw:
+def planar(model: str, **more: Any) -> Raw:
     """A four-bar of steel."""
-    link = {**bar(fidelity=fidelity), **more.pop("link", {})}
+    link = {**bar(model=model), **more.pop("link", {})}
     return {
         **four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")), "damping": {"beta": 1e-6},
         "analysis": {"steps_per_revolution": 120, "rho_inf": 0.95}, **more,
@@ -115,7 +115,7 @@ SWING = {"kind": "cycloidal", "angle": 0.3, "rise": 0.03, "return_time": 0.03, "
 
 def geared() -> Raw:
     """Two arms under gravity that a pair of wheels couples 20 : 30: back after three turns of the first."""
-    arm = {"fidelity": "beam", "material": "steel"}
+    arm = {"model": "beam", "material": "steel"}
     shape = {"kind": "bar", "width": 0.01, "thickness": 0.01}
     at = {"one": 0.0, "two": 1.0}
     return {
@@ -155,7 +155,7 @@ CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
     "a spring, co-rotational": (planar("beam", springs={"s": SPRING}), {"frames": "co-rotational"}, 40),
     "a block on an arm": ({**inverted(revolutions=None), "damping": DAMPED}, {"steps_per_revolution": 120}, 9),
     "plane links, reduced": (
-        planar("plane", link={"reduced": True, "mesh": {"elements": [8, 1]}}), {"reduction_tolerance": 1e-2}, 50,
+        planar("plane", link={"reduction": "modal", "mesh": {"elements": [8, 1]}}), {"reduction_tolerance": 1e-2}, 50,
     ),
     "plane links": (planar("plane", link={"mesh": {"elements": [8, 1]}}), {}, 50),
     "gears": (geared(), {}, 4),
@@ -184,8 +184,8 @@ def test_reduced_links_save_marches_and_lead_to_the_same_state(name: str) -> Non
     raw = planar("plane") if name == "plane links" else swinging("spherical", ("solid", "solid"))
     raw["damping"] = {"beta": 2e-6}
     for link in raw["links"].values():  # large enough to gain from it
-        if link["fidelity"] != "beam":
-            link["mesh"] = {"elements": [24, 2] if link["fidelity"] == "plane" else [12, 1, 1]}
+        if link["model"] != "beam":
+            link["mesh"] = {"elements": [24, 2] if link["model"] == "plane" else [12, 1, 1]}
     ready = meshed(over_one_period(scene_from(as_steady(raw))))
     small = coarse_map(ready.scene, ready.linkage, ready.path, ready.model)
     assert small is not None
@@ -216,7 +216,7 @@ def spun(axis: Any, ratio: float, section: tuple[float, float], **more: Any) -> 
     }
     joint = {"kind": "revolute", "links": ["ground", "shaft"], "at": [0, 0, 0], "axis": way.tolist()}
     return {
-        "links": {"shaft": {"fidelity": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 2}}},
+        "links": {"shaft": {"model": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 2}}},
         "joints": {"A": joint}, "drive": {"joint": "A", "motion": constant_speed(ratio)},
         "analysis": {"steps_per_revolution": 360, "extrapolation_levels": 2}, **more,
     }  # fmt: skip
@@ -437,7 +437,7 @@ def test_a_spring_that_is_wound_up_is_refused() -> None:
 def shaken(speed: float) -> Raw:
     """A bar that turns under gravity, without damping."""
     return {
-        "links": {"arm": bar(fidelity="beam", mesh={"elements": 1})}, "gravity": [0, -9.81],
+        "links": {"arm": bar(model="beam", mesh={"elements": 1})}, "gravity": [0, -9.81],
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": constant_speed(speed)},
         "analysis": {"steps_per_revolution": 48, "rho_inf": 0.999},

@@ -43,9 +43,9 @@ def arm(kind: str, mu: float, turn: Any = "z", **more: Any) -> Raw:
     shape = {"kind": "bar", "between": [[0, 0], [LENGTH, 0]], "width": HEIGHT, "thickness": HEIGHT}
     if not planar:
         shape |= {"between": [[0, 0, 0], tip], "up": axis}
-    link: Raw = {"material": "rubber", "shape": shape, "mesh": {"elements": [16, 1, 1]}, "fidelity": kind}
+    link: Raw = {"material": "rubber", "shape": shape, "mesh": {"elements": [16, 1, 1]}, "model": kind}
     if kind.endswith("beam"):
-        link |= {"fidelity": "beam", "mesh": {"elements": 16}, "beam": kind.split(maxsplit=1)[0]}
+        link |= {"model": "beam", "mesh": {"elements": 16}, "beam": kind.split(maxsplit=1)[0]}
     if kind == "plane":
         link["mesh"] = {"elements": [24, 1]}
     joint = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0] if planar else [0, 0, 0]}
@@ -104,10 +104,10 @@ def test_what_a_free_drive_lets_go_of_keeps_its_motion_without_strain(kind: str)
 
 
 LINKS: dict[str, Raw] = {
-    "planar beam": {"fidelity": "beam", "mesh": {"elements": 4}},
-    "plane": {"fidelity": "plane", "mesh": {"elements": [8, 1]}},
-    "spatial beam": {"fidelity": "beam", "beam": "spatial", "mesh": {"elements": 4}},
-    "solid": {"fidelity": "solid", "mesh": {"elements": [6, 1, 1]}},
+    "planar beam": {"model": "beam", "mesh": {"elements": 4}},
+    "plane": {"model": "plane", "mesh": {"elements": [8, 1]}},
+    "spatial beam": {"model": "beam", "beam": "spatial", "mesh": {"elements": 4}},
+    "solid": {"model": "solid", "mesh": {"elements": [6, 1, 1]}},
 }
 
 
@@ -170,7 +170,7 @@ def with_rigid(name: str) -> Raw:
     """A four-bar of beams with one rigid link."""
     raw = linkage("planar beam")
     link = {key: value for key, value in raw["links"][name].items() if key != "mesh"}
-    return {**raw, "links": {**raw["links"], name: {**link, "fidelity": "rigid"}}}
+    return {**raw, "links": {**raw["links"], name: {**link, "model": "rigid"}}}
 
 
 @pytest.mark.parametrize("name", ["crank", "coupler", "rocker"])

@@ -33,11 +33,16 @@ def arm(kind: str, R: np.ndarray, elements: int = 2) -> Raw:
     shape = {"kind": "bar", "between": [[0.0, 0.0, 0.0], end], "width": 0.02, "thickness": 0.02}
     if not flat:
         shape["up"] = R[:, 2].tolist()
-    link: Raw = {"fidelity": kind, "material": "steel", "shape": shape, "mesh": {"elements": mesh}}
+    link: Raw = {
+        "model": "solid" if kind == "reduced" else kind,
+        "material": "steel",
+        "shape": shape,
+        "mesh": {"elements": mesh},
+    }
     if flat:
         shape["between"] = [[0.0, 0.0], end[:2]]
     if kind == "reduced":
-        link |= {"modes": 6}
+        link |= {"reduction": 6}
     if kind != "beam":
         link["segments"] = 2
     return link
@@ -177,7 +182,7 @@ def on_a_rigid_end(plane: bool, R: np.ndarray) -> Raw:
     """A beam on the ground's hinge, undriven, and a rigid bar hinged to it, which a force of its own axes pushes."""
     if plane:
         first = arm("beam", np.eye(3))
-        second = {"fidelity": "rigid", "material": "steel"}
+        second = {"model": "rigid", "material": "steel"}
         second["shape"] = {"kind": "bar", "between": [[0.5, 0], [0.7, 0.1]], "width": 0.02, "thickness": 0.02}
         at, end, push, axis = [0.5, 0.0], [0.7, 0.1], [3.0, 8.0], {}
     else:

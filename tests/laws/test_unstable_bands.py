@@ -166,7 +166,7 @@ def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None
 def plane_four_bar(reduced: bool) -> Raw:
     """Thin planes, 6 mm in their plane."""
     link = {"mesh": {"elements": [8, 1]}, "shape": {"kind": "bar", "width": 0.006, "thickness": 0.02}}
-    more = {"reduced": True} if reduced else {}
+    more = {"reduction": "modal"} if reduced else {}
     raw = planar("plane", link={**link, **more}, damping={"beta": 1e-5})
     return {**raw, "analysis": {"steps_per_revolution": 360, "rho_inf": 0.95}}
 
@@ -174,14 +174,14 @@ def plane_four_bar(reduced: bool) -> Raw:
 def plane_slider_crank(reduced: bool) -> Raw:
     """A rod of 3 mm in its plane, which a block of 0.3 kg presses and pulls."""
     shape = {"kind": "bar", "between": [[0.05, 0], [0.25, 0]], "width": 0.003, "thickness": 0.015}
-    rod = {"fidelity": "plane", "material": "steel", "shape": shape, "mesh": {"elements": [8, 1]}}
+    rod = {"model": "plane", "material": "steel", "shape": shape, "mesh": {"elements": [8, 1]}}
     crank = {"kind": "bar", "between": [[0, 0], [0.05, 0]], "width": 0.02, "thickness": 0.02}
     pin = {"kind": "revolute"}
     return {
         "links": {
-            "crank": {"fidelity": "beam", "material": "steel", "shape": crank, "mesh": {"elements": 1}},
-            "rod": {**rod, **({"reduced": True} if reduced else {})},
-            "slider": {"fidelity": "rigid", "mass": 0.3},
+            "crank": {"model": "beam", "material": "steel", "shape": crank, "mesh": {"elements": 1}},
+            "rod": {**rod, **({"reduction": "modal"} if reduced else {})},
+            "slider": {"model": "rigid", "mass": 0.3},
         },
         "joints": {
             "A": {**pin, "links": ["ground", "crank"], "at": [0, 0]},

@@ -50,7 +50,7 @@ def hill(form: str, axis: str, zeta: float, **analysis: Any) -> Raw:
 
     def rigid(a: float, b: float, side: float) -> Raw:
         shape = {"kind": "bar", "between": [[a, 0, 0], [b, 0, 0]], "width": side, "thickness": side}
-        return {"fidelity": "rigid", "material": "m", "shape": shape}
+        return {"model": "rigid", "material": "m", "shape": shape}
 
     return {
         "materials": {"m": STEEL},
@@ -214,7 +214,7 @@ def test_a_factor_is_read_from_a_file(tmp_path: Path) -> None:
         'joints.A = { kind = "revolute", links = ["ground", "a"], at = [0, 0] }\n'
         'drive = { joint = "A", motion = { kind = "constant_speed", speed = 1 } }\n'
         "analysis = { revolutions = 0.1, steps_per_revolution = 360 }\n"
-        '[links.a]\nfidelity = "beam"\nmaterial = "steel"\n'
+        '[links.a]\nmodel = "beam"\nmaterial = "steel"\n'
         'shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.01, thickness = 0.01 }\n'
         '[springs.s]\nkind = "spring"\nbetween = [{ link = "a", at = [1, 0] }, { link = "ground", at = [1, 1] }]\n'
         'stiffness = 1\nstiffness_factor = { over = "angle", file = "k.csv", period = "90 deg" }\n'

@@ -88,7 +88,7 @@ def cache_entries(tally: Tally, count: int, seed: int, folder: Path) -> None:
     """Entries of reduced links: a damaged one is made anew, without a word."""
     raw = four_bar("bar", revolutions=0.1)
     for link in raw["links"].values():
-        link["fidelity"] = "reduced"
+        link["reduction"] = "modal"
     scene = scene_from(raw)
 
     def made() -> list[np.ndarray]:

@@ -31,7 +31,7 @@ from tests.reliability.phases import PHASES, TOLD, at_work, begun, spans
 SCENE = """
 [links.crank]
 material = "steel"
-fidelity = "FIDELITY"
+reduction = "REDUCTION"
 shape = { kind = "plate_link", between = [[0, 0], [0.1, 0]], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
 mesh = { size = 0.006 }
 [joints.A]
@@ -109,10 +109,10 @@ def finished(running: "subprocess.Popen[str]") -> tuple[int, str]:
     return running.returncode, out + err
 
 
-def ready(folder: Path, steps: int = 6000, levels: int = 1, fidelity: str = "solid") -> Ground:
+def ready(folder: Path, steps: int = 6000, levels: int = 1, reduction: str = "none") -> Ground:
     """The scene, and its undisturbed run, twice on a cold cache: the first one compiles."""
     folder.mkdir(parents=True, exist_ok=True)
-    text = SCENE.replace("STEPS", str(steps)).replace("LEVELS", str(levels)).replace("FIDELITY", fidelity)
+    text = SCENE.replace("STEPS", str(steps)).replace("LEVELS", str(levels)).replace("REDUCTION", reduction)
     (folder / "scene.toml").write_text(text, encoding="utf-8")
     for _ in range(2):
         (folder / "phases").unlink(missing_ok=True)
@@ -287,7 +287,7 @@ def main() -> None:
     given = parser.parse_args()
     with TemporaryDirectory() as folder:
         ground = ready(Path(folder) / "solid" / "whole", levels=given.levels)
-        reduced = ready(Path(folder) / "reduced" / "whole", levels=given.levels, fidelity="reduced")
+        reduced = ready(Path(folder) / "reduced" / "whole", levels=given.levels, reduction="modal")
         reduced.counts, reduced.findings = ground.counts, ground.findings
         for k in range(given.moments):
             phase = ("any", *PHASES)[k // 2 % (1 + len(PHASES))]

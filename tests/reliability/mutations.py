@@ -16,7 +16,7 @@ TEXTS = [
     "x" * 5000,
     "nan", "1 / 0", "../../x", "/dev/zero", "/", "a\0b", "\x1b[31m", "\u202e", "é" * 200, "sin(t)", "t**t**t",
     "__import__('os')",
-    "(" * 2000, "beam", "rigid", "solid", "plane", "reduced", "auto", "co-rotational", "rest", "stress", "revolute",
+    "(" * 2000, "beam", "rigid", "solid", "plane", "modal", "auto", "co-rotational", "rest", "stress", "revolute",
     "weld", "0 0",
     "10 rpm", "-5 N", "1 kg m", "1 m2", "{}", "%s", "None",
 ]  # fmt: skip

@@ -32,7 +32,7 @@ B = [0.6, 0]
 [links.arm]
 material = "aluminium"
 shape = { kind = "polyline", points = ["A", "B"], width = 0.01, thickness = 0.025 }
-fidelity = "beam"
+model = "beam"
 [joints.A]
 kind = "revolute"
 links = ["ground", "arm"]
@@ -162,7 +162,7 @@ def test_too_little_time_for_anything_is_said(run_kedfem: Command, whip: Path) -
 
 @pytest.mark.long
 def test_a_fidelity_that_cannot_be_built_is_one_row_that_says_why(whip: Path) -> None:
-    text = BEAM.replace("polyline", "bar").replace("points =", "between =").replace("\nfidelity", "\n#")
+    text = BEAM.replace("polyline", "bar").replace("points =", "between =").replace("\nmodel", "\n#")
     # a surface load has no place on a beam
     load = '\n[loads.x]\nkind = "surface"\nlink = "arm"\nat = "B"\nvector = ["1 kPa", 0]\n'
     whip.write_text(text + load, encoding="utf-8")

@@ -21,7 +21,7 @@ E, RHO = 2.1e11, 7850.0
 LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "ground", "at": [0.1, 0.4]}]}
 
 
-def four_bar(frames: str, fidelity: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
+def four_bar(frames: str, model: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
     """A slow four-bar of steel, a quarter of a turn."""
     analysis = {
         "revolutions": 0.25,
@@ -29,11 +29,11 @@ def four_bar(frames: str, fidelity: str = "beam", steps: int = 180, **rest: Any)
         "frames": frames,
         "initial": "quasi-static",
     }
-    mesh = {"elements": 2} if fidelity == "beam" else {}
+    mesh = {"elements": 2} if model == "beam" else {}
     shape = {"kind": "bar", "width": 0.02, "thickness": 0.01}
     return scenes.four_bar(
         (0.1, 0.3, 0.25, 0.3),
-        {"material": "m", "fidelity": fidelity, "mesh": mesh, "shape": shape},
+        {"material": "m", "model": model, "mesh": mesh, "shape": shape},
         scenes.constant_speed("60 rpm"),
         materials={"m": scenes.material(RHO, E)},
         analysis={**analysis, **rest.pop("analysis", {})},
@@ -142,10 +142,10 @@ def test_the_same_law_drives_a_motor() -> None:
         assert apart(followed, nominal) < 1e-3 * largest(nominal)
 
 
-@pytest.mark.parametrize("fidelity", ["plane", pytest.param("solid", marks=pytest.mark.long)])
-def test_meshed_links_bear_springs_too(fidelity: str) -> None:
+@pytest.mark.parametrize("model", ["plane", pytest.param("solid", marks=pytest.mark.long)])
+def test_meshed_links_bear_springs_too(model: str) -> None:
     followed, nominal = (
-        places(four_bar(frames, fidelity, springs=line(50.0), steps=72))
+        places(four_bar(frames, model, springs=line(50.0), steps=72))
         for frames in ("co-rotational", "rigid-body")
     )
     assert apart(followed, nominal) < 1e-3 * largest(nominal)
@@ -219,11 +219,11 @@ def slider_crank(steps: int = 180, **spring: float) -> dict[str, Any]:
     """A spring along the slide of a slider-crank."""
     along = {"kind": "spring", "joint": "S", "stiffness": 1000.0, "preload": 20.0, **spring}
     raw = four_bar("rigid-body", springs={"p": along}, steps=steps)
-    bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "fidelity": "beam"}
+    bar, rod = {"kind": "bar", "width": 0.02, "thickness": 0.01}, {"material": "m", "model": "beam"}
     raw["links"] = {
         "crank": {**rod, "shape": {**bar, "between": [[0, 0], [0.1, 0]]}},
         "rod": {**rod, "shape": {**bar, "between": [[0.1, 0], [0.4, 0]]}},
-        "shoe": {"fidelity": "rigid", "mass": 0.2},
+        "shoe": {"model": "rigid", "mass": 0.2},
     }
     raw["joints"] = {
         "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},

@@ -256,12 +256,12 @@ PLATE = {
 KINDS: dict[str, dict[str, Any]] = {
     "solid": {"shape": PLATE, "mesh": {"size": 0.02}},
     "face": {"shape": BAR, "mesh": {"elements": [8, 2, 1]}},
-    "plane": {"fidelity": "plane", "shape": PLATE, "mesh": {"size": 0.02}},
-    "edge": {"fidelity": "plane", "shape": BAR},
-    "beam": {"fidelity": "beam", "shape": BAR, "mesh": {"elements": 3}},
-    "spatial": {"fidelity": "beam", "beam": "spatial", "shape": BAR, "mesh": {"elements": 3}},
-    "rigid": {"fidelity": "rigid", "shape": PLATE},
-    "rigid beam": {"fidelity": "rigid", "shape": {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.04,
+    "plane": {"model": "plane", "shape": PLATE, "mesh": {"size": 0.02}},
+    "edge": {"model": "plane", "shape": BAR},
+    "beam": {"model": "beam", "shape": BAR, "mesh": {"elements": 3}},
+    "spatial": {"model": "beam", "beam": "spatial", "shape": BAR, "mesh": {"elements": 3}},
+    "rigid": {"model": "rigid", "shape": PLATE},
+    "rigid beam": {"model": "rigid", "shape": {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.04,
                                                   "thickness": 0.02}},
 }  # fmt: skip
 
@@ -352,7 +352,7 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
         "shoe": spring("shoe", [1.5, 0.1], [3.5, 0.1], free_length=0),
     }
     raw = arm("beam", springs=springs)
-    raw["links"]["shoe"] = {"fidelity": "rigid", "mass": 1}
+    raw["links"]["shoe"] = {"model": "rigid", "mass": 1}
     raw["joints"]["B"] = {"kind": "revolute", "links": ["arm", "shoe"], "at": [1, 0]}
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [1, 0], "axis": "x"}
     raw["motors"]["push"] = {"joint": "S", "force": 4}

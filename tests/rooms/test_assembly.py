@@ -39,7 +39,7 @@ MISFIT = np.array([1e-4, -2e-4, 1.5e-4])
 def line(*points: Any, **keys: Any) -> dict[str, Any]:
     """A beam through points."""
     shape = {"kind": "polyline", "points": [list(p) for p in points], "width": 0.02, "thickness": 0.01}
-    return {"fidelity": "beam", "material": "steel", "shape": {**shape, **keys}}
+    return {"model": "beam", "material": "steel", "shape": {**shape, **keys}}
 
 
 def raw_scene(joints: JointTable, links: dict[str, Any], **sections: Any) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def test_slides_may_be_drawn_apart_along_their_axis() -> None:
     links: dict[str, Any] = {
         "crank": line(A, B),
         "rod": line(B, C),
-        "slider": {"fidelity": "rigid", "mass": 1.0},
+        "slider": {"model": "rigid", "mass": 1.0},
     }
     raw = raw_scene(joints, links)
     raw["joints"]["guide"]["at"] = {"slider": list(C), "ground": [0.1, 0.0]}
@@ -507,9 +507,9 @@ C = [0.3, 0.2]
 E = [0.3001, 0.2]
 D = [0.3, 0]
 [links]
-crank = { material = "steel", fidelity = "beam", shape = { kind = "bar", between = ["A", "B"], SIZE } }
-coupler = { material = "steel", fidelity = "beam", shape = { kind = "bar", between = ["B", "C"], SIZE } }
-rocker = { material = "steel", fidelity = "beam", shape = { kind = "bar", between = ["E", "D"], SIZE } }
+crank = { material = "steel", model = "beam", shape = { kind = "bar", between = ["A", "B"], SIZE } }
+coupler = { material = "steel", model = "beam", shape = { kind = "bar", between = ["B", "C"], SIZE } }
+rocker = { material = "steel", model = "beam", shape = { kind = "bar", between = ["E", "D"], SIZE } }
 [joints]
 A = { kind = "revolute", links = ["ground", "crank"], at = "A" }
 B = { kind = "revolute", links = ["crank", "coupler"], at = "B" }

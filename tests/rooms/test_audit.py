@@ -24,7 +24,7 @@ from tests.scenes import bar, material
 EXAMPLES = Path(__file__).parents[2] / "examples"
 L, SIDE, E, RHO = 0.5, 0.02, 2.1e11, 7850.0  # an arm [m] of steel
 MASS = RHO * SIDE**2 * L
-BEAM = {"fidelity": "beam", "mesh": {"elements": 4}}
+BEAM = {"model": "beam", "mesh": {"elements": 4}}
 
 
 def blocks(ready: Prepared) -> list[Block]:
@@ -64,15 +64,15 @@ KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "from rest": ("four_bar_beams", {"mesh": {"elements": 2}}, {"initial": "rest"}),
     "spatial beams": ("four_bar_beams", {"beam": "spatial"}, {}),
     "beams that are followed": ("four_bar_beams", {"mesh": {"elements": 2}}, {"frames": "co-rotational"}),
-    "planes": ("four_bar_beams", {"fidelity": "plane"}, {}),
+    "planes": ("four_bar_beams", {"model": "plane"}, {}),
     "planes that are followed": (
         "four_bar_beams",
-        {"fidelity": "plane", "segments": 2},
+        {"model": "plane", "segments": 2},
         {"frames": "co-rotational"},
     ),
-    "reduced planes": ("four_bar_beams", {"fidelity": "plane", "reduced": True}, {}),
+    "reduced planes": ("four_bar_beams", {"model": "plane", "reduction": "modal"}, {}),
     "solids": ("four_bar_solids", {"mesh": {"size": 0.05}}, {}),
-    "reduced solids": ("four_bar_solids", {"reduced": True}, {}),
+    "reduced solids": ("four_bar_solids", {"reduction": "modal"}, {}),
 }
 
 
@@ -98,7 +98,7 @@ def test_a_link_that_the_drive_carries_is_counted_too() -> None:
         raw = example("four_bar_beams", 720)
         raw["drive"]["motion"]["speed"] = "60 rpm"
         raw["gravity"] = [0, -9.81, 0]
-        raw["links"]["crank"]["fidelity"] = crank
+        raw["links"]["crank"]["model"] = crank
         balance, found[crank] = audited(raw)
         assert max(balance.energy, balance.linear, balance.angular) < 1e-4
     ready, _ = prepared(scene_from(raw))
@@ -119,7 +119,7 @@ def test_a_link_that_the_drive_carries_is_counted_too() -> None:
 def test_sliders_and_gravity_balance() -> None:
     scene = read_scene(EXAMPLES / "slider_crank_solids" / "scene.toml")
     links = {
-        name: link if link.shape is None else link.model_copy(update={"reduced": True})
+        name: link if link.shape is None else link.model_copy(update={"reduction": "modal"})
         for name, link in scene.links.items()
     }
     ready, _ = prepared(scene.model_copy(update={"links": links}))
@@ -139,7 +139,7 @@ def test_a_drive_that_speeds_up_an_arm_does_the_work_of_its_kinetic_energy() -> 
     assert_allclose(energies["work"][-1], [0.0, 0.5 * J * speed**2], rtol=1e-3, atol=1e-9)
 
 
-@pytest.mark.parametrize("link", [BEAM, {"mesh": {"elements": [4, 1, 1]}, "reduced": True}])
+@pytest.mark.parametrize("link", [BEAM, {"mesh": {"elements": [4, 1, 1]}, "reduction": "modal"}])
 def test_gravity_gives_the_drive_back_what_an_arm_falls(link: dict[str, Any]) -> None:
     """m g L/2 from upright to level."""
     raw = arm(

@@ -32,7 +32,7 @@ def test_a_link_without_mass() -> None:
 
 def test_a_rigid_slider_has_no_frames_of_its_own() -> None:
     raw = arm()
-    raw["links"]["shoe"] = {"fidelity": "rigid", "mass": 0.3, "frames": "co-rotational"}
+    raw["links"]["shoe"] = {"model": "rigid", "mass": 0.3, "frames": "co-rotational"}
     raw["joints"]["B"] = {"kind": "revolute", "links": ["arm", "shoe"], "at": [0.5, 0]}
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.5, 0], "axis": "x"}
     assert (

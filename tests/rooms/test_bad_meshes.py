@@ -237,7 +237,7 @@ class TestPart:
 
 class TestShape:
     def test_none(self):
-        message = refused(None, fidelity="rigid")
+        message = refused(None, model="rigid")
         assert (
             message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
         )

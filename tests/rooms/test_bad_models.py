@@ -19,10 +19,10 @@ from tests.scenes import bar, constant_speed
 from .test_dynamics import four_bar
 
 
-def arm(fidelity: str = "solid") -> dict[str, Any]:
+def arm(model: str = "solid") -> dict[str, Any]:
     """One bar, 0.5 m along x, hinged at its left end face."""
-    elements = [4, 1, 1] if fidelity == "solid" else 2
-    link = bar(fidelity=fidelity, mesh={"elements": elements})
+    elements = [4, 1, 1] if model == "solid" else 2
+    link = bar(model=model, mesh={"elements": elements})
     return scenes.arm(link, constant_speed(10), analysis={"revolutions": 0.1})
 
 
@@ -33,19 +33,17 @@ def fault(raw: dict[str, Any]) -> str:
     return str(found.value)
 
 
-@pytest.mark.parametrize("fidelity", ["solid", "beam"])
-def test_joint_that_does_not_touch_its_link(fidelity: str) -> None:
-    raw = arm(fidelity)
+@pytest.mark.parametrize("model", ["solid", "beam"])
+def test_joint_that_does_not_touch_its_link(model: str) -> None:
+    raw = arm(model)
     raw["joints"]["A"]["at"] = [-0.1, 0]
-    what = "a bore or a flat face of" if fidelity == "solid" else "a node of"
-    nearest = (
-        "(0, 0, -0.01), 0.1 m" if fidelity == "solid" else "(0, 0, 0), 0.1 m"
-    )  # hex20: none within the end
+    what = "a bore or a flat face of" if model == "solid" else "a node of"
+    nearest = "(0, 0, -0.01), 0.1 m" if model == "solid" else "(0, 0, 0), 0.1 m"  # hex20: none within the end
     first, *offered = fault(raw).split("; it has ")
     assert first == (
         f"joints.A: must sit on {what} link 'arm' at (-0.1, 0, 0), got none there (nearest node {nearest} away)"
     )
-    if fidelity == "solid":  # no bore, so its faces, nearest first
+    if model == "solid":  # no bore, so its faces, nearest first
         assert offered[0].startswith("plane face facing (-1, 0, 0) at (0, 0, 0) 0.1 m away, plane face")
         assert offered[0].count("plane face") == 6
     else:
@@ -72,9 +70,9 @@ def test_hinge_across_a_flat_face() -> None:
 
 
 @pytest.mark.parametrize("quantity", ["stress", "displacement"])
-@pytest.mark.parametrize("fidelity", ["solid", "beam"])
-def test_probe_outside_its_link(fidelity: str, quantity: str) -> None:
-    raw = arm(fidelity)
+@pytest.mark.parametrize("model", ["solid", "beam"])
+def test_probe_outside_its_link(model: str, quantity: str) -> None:
+    raw = arm(model)
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.05], "quantity": quantity}}}
     assert fault(raw) == "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
 

@@ -91,11 +91,11 @@ quantity = "stress"
 
 BEAMS = """
 [links.arm]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.02, thickness = 0.01 }
 [links.shoe]
-fidelity = "rigid"
+model = "rigid"
 mass = 0.5
 [joints.A]
 kind = "revolute"
@@ -125,11 +125,11 @@ material = "steel"
 segments = 2
 shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.02, thickness = 0.01 }
 [links.rod]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = [[1, 0], [2, 0]], width = 0.02, thickness = 0.01 }
 [links.shoe]
-fidelity = "rigid"
+model = "rigid"
 mass = 0.5
 [joints.A]
 kind = "revolute"
@@ -276,8 +276,8 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
-        "links.rocker.colour: unknown key, known: fidelity, reduced, modes, material, shape, step, mass, centre, "
-        "inertia, mesh, element, min_quality, shear_coefficient, beam, frames, segments",
+        "links.rocker.colour: unknown key, known: model, reduction, material, shape, file, mass, centre, inertia, "
+        "mesh, element, min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
         "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
         "of 0.164575",

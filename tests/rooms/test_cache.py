@@ -37,8 +37,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def scene(**changes: Any) -> Scene:
     raw = four_bar("bar", revolutions=0.1, initial="quasi-static", rho_inf=0.9, **changes)
     for link in raw["links"].values():
-        link["fidelity"] = "reduced"
-    raw["links"]["crank"]["fidelity"] = "rigid"
+        link["reduction"] = "modal"
+    raw["links"]["crank"] |= {"model": "rigid", "reduction": "none"}
     raw["links"]["crank"].pop("mesh")
     return scene_from(raw)
 

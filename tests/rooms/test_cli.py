@@ -32,7 +32,7 @@ gravity = [0, -9.81]
 A = [0, 0]
 B = [0.6, 0]
 [links.arm]
-fidelity = "beam"
+model = "beam"
 material = "aluminium"
 shape = { kind = "bar", between = ["A", "B"], width = 0.01, thickness = 0.025 }
 mesh = { elements = 2 }

@@ -31,7 +31,7 @@ MADE = {  # the same points by constructions
 def everywhere(points: dict[str, Any]) -> dict[str, Any]:
     """A scene with a point at every key that takes one."""
     a, b, c, m = (points[name] for name in "ABCM")
-    beam = {"fidelity": "beam", "material": "steel"}
+    beam = {"model": "beam", "material": "steel"}
     return {
         "points": {"O": A, "A": A, "B": B, "C": C},
         "links": {
@@ -120,7 +120,7 @@ def record(P: Any, Q: Any, up: Any, **keys: Any) -> Link:
     return bare_link(scene, "bar")
 
 
-KINDS = [{"element": "hex20", "mesh": {"elements": [3, 1, 1]}}, {"fidelity": "beam", "beam": "spatial"}]
+KINDS = [{"element": "hex20", "mesh": {"elements": [3, 1, 1]}}, {"model": "beam", "beam": "spatial"}]
 TURNS = {
     "x": Rotation.identity(), "y": Rotation.from_euler("z", 90, degrees=True),
     "z": Rotation.from_euler("y", -90, degrees=True), "oblique": Rotation.from_rotvec([0.3, -1.1, 0.7]),
@@ -152,7 +152,7 @@ def arm(body: dict[str, Any] | None, **keys: Any) -> dict[str, Any]:
     """An arm of 0.4 m on a hinge at the origin, level, that hardly turns, under gravity."""
     return {
         "gravity": [0, -10.0], "points": {"O": [0, 0], "P": [0.4, 0]},
-        "links": {"arm": {"fidelity": "beam", "material": "steel", **keys,
+        "links": {"arm": {"model": "beam", "material": "steel", **keys,
                           "shape": {"kind": "bar", "between": ["O", "P"], **SIZE}}},
         "joints": {"O": {"kind": "revolute", "links": ["ground", "arm"], "at": "O"}},
         "drive": {"joint": "O", "motion": {"kind": "constant_speed", "speed": 1e-6}},
@@ -195,12 +195,12 @@ def test_a_body_on_a_beam_is_where_a_corner_would_be() -> None:
         assert_allclose(one.todense(), other.todense(), atol=1e-15)
 
 
-@pytest.mark.parametrize("fidelity", ["solid", "rigid"])
+@pytest.mark.parametrize("model", ["solid", "rigid"])
 @pytest.mark.parametrize("body", [POINT, HEAVY], ids=["point mass", "rigid body"])
-def test_a_body_anywhere_on_a_solid_has_its_mass_and_inertia(fidelity: str, body: dict[str, Any]) -> None:
-    if (fidelity, body) == ("solid", HEAVY):
+def test_a_body_anywhere_on_a_solid_has_its_mass_and_inertia(model: str, body: dict[str, Any]) -> None:
+    if (model, body) == ("solid", HEAVY):
         return  # must sit on a bore
-    keys = {"fidelity": fidelity, "mesh": {"elements": [2, 1, 1]}}
+    keys = {"model": model, "mesh": {"elements": [2, 1, 1]}}
     raw = arm({**body, "at": [0.13, 0.003, 0.002]}, **keys)
     raw["joints"]["O"]["kind"] = "spherical"
     del raw["drive"]

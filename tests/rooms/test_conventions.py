@@ -19,7 +19,7 @@ def found(joint: Raw, speed: float | None, **more: Any) -> dict[str, np.ndarray]
     """A rod along x from a joint with the ground at the origin; gravity along -y."""
     raw: Raw = {
         "gravity": [0, -9.81],
-        "links": {"rod": {"fidelity": "beam", "material": "steel", "shape": ROD, "mesh": {"elements": 2}}},
+        "links": {"rod": {"model": "beam", "material": "steel", "shape": ROD, "mesh": {"elements": 2}}},
         "joints": {"A": {"at": [0, 0], **joint}},
         "analysis": {"kind": "static"},
         "output": {"probes": {

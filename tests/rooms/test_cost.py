@@ -27,7 +27,7 @@ def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str)
     """By steps of their own solver, whatever sizes would say."""
     raw = sprung(frames=frames, steps_per_revolution=120)
     for link in raw["links"].values():
-        link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
+        link.update(model="beam", mesh={"elements": 2}, element="beam3")
     ready = meshed(scene_from(raw))
     said = forecast(ready)
     assert 24 <= said.tried <= 120
@@ -47,7 +47,7 @@ def test_a_forecast_holds_all_that_a_run_makes_of_its_steps(monkeypatch: pytest.
     """It tries the loop of the run itself, and the frames of the animation are counted, not those of the trial."""
     raw = sprung(steps_per_revolution=120)
     for link in raw["links"].values():
-        link.update(fidelity="beam", mesh={"elements": 2}, element="beam3")
+        link.update(model="beam", mesh={"elements": 2}, element="beam3")
     raw["output"] = {"animation": {"frames_per_revolution": 30}}
     ready, tried = meshed(scene_from(raw)), []
 

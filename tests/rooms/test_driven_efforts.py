@@ -99,9 +99,9 @@ def test_what_the_drive_of_a_rigid_link_gives_is_the_work_of_its_supports(acting
     assert_allclose(work, got["energy/work"][:, 1], atol=1e-9 * np.abs(work).max())
 
 
-def arm(fidelity: str, elements: Any, **more: Any) -> dict[str, Any]:
+def arm(model: str, elements: Any, **more: Any) -> dict[str, Any]:
     """A steel arm, 4 mm in the plane by 20 mm, that turns by 2 rad in 0.25 s and bends by 4.5 % of its length."""
-    if fidelity == "spatial":
+    if model == "spatial":
         section = {"kind": "rectangle", "width": 0.004, "thickness": 0.02}
         shape: dict[str, Any] = {
             "kind": "polyline",
@@ -110,14 +110,14 @@ def arm(fidelity: str, elements: Any, **more: Any) -> dict[str, Any]:
             "up": [0, 1, 0],
         }
         link = {
-            "fidelity": "beam",
+            "model": "beam",
             "beam": "spatial",
             "material": "steel",
             "shape": shape,
             "mesh": {"elements": elements},
         }
     else:
-        link = bar(fidelity, [0, 0], [0.5, 0], **more) | {"mesh": {"elements": elements}}
+        link = bar(model, [0, 0], [0.5, 0], **more) | {"mesh": {"elements": elements}}
         link["shape"] |= {"width": 0.004, "thickness": 0.02}
     motion = {"kind": "cycloidal", "angle": 2.0, "rise": 0.25}
     return {
@@ -130,7 +130,7 @@ def arm(fidelity: str, elements: Any, **more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("fidelity", "elements", "more"),
+    ("model", "elements", "more"),
     [
         ("spatial", 2, {}),
         ("solid", [4, 1, 1], {"segments": 2}),
@@ -140,10 +140,10 @@ def arm(fidelity: str, elements: Any, **more: Any) -> dict[str, Any]:
     ids=["beams in space", "solid", "plane", "planar beams"],
 )
 def test_the_torque_of_co_rotational_frames_does_the_work_of_the_drive(
-    fidelity: str, elements: Any, more: dict[str, Any]
+    model: str, elements: Any, more: dict[str, Any]
 ) -> None:
     """∫ T dφ is the change of energy plus what damping took; a hub stands as its drive has it, however the link bends."""
-    ready, blocks = ran(arm(fidelity, elements, **more))
+    ready, blocks = ran(arm(model, elements, **more))
     got = channels(ready, blocks)
     phi = np.concatenate([block.motion.phi for block in blocks])
     T = got["drive/torque"][:, 0]
@@ -161,7 +161,7 @@ def test_the_pin_of_a_slider_bears_springs_and_motors_on_the_slider(on: dict[str
     raw["links"] = {
         "crank": bar("rigid", [0, 0], [0.0, 0.1], 2),
         "rod": bar("beam", [0.0, 0.1], [0.3, 0.0], 2),
-        "ram": {"fidelity": "rigid", "mass": 1.0},
+        "ram": {"model": "rigid", "mass": 1.0},
     }
     raw["joints"] = {
         "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},

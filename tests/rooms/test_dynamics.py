@@ -40,12 +40,12 @@ PLATE = {
 def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
     """[KED]'s four-bar (Nath and Ghosh 1980) of beams, solid bars, plate links or plane plate links, some damping."""
     shape = PLATE if kind in {"plate", "plane"} else {"kind": "bar", **BAR}
-    fidelity = {"fidelity": kind} if kind in {"beam", "plane"} else {}
+    given = {"model": kind} if kind in {"beam", "plane"} else {}
     across = {"elements_across": 1}
     mesh = {"beam": {"elements": 2}, "bar": {"elements": [6, 1, 1]}, "plate": across, "plane": across}[kind]
     return scenes.four_bar(
         (0.3048, 0.9144, 0.762, 0.9144),
-        {"material": "alloy", "shape": shape, "mesh": mesh, **fidelity},
+        {"material": "alloy", "shape": shape, "mesh": mesh, **given},
         constant_speed("600 rpm"),
         materials={"alloy": {"density": 2796, "youngs_modulus": 7.031e10, "shear_modulus": 2.712e10}},
         bodies={"flywheel": {"kind": "flywheel", "link": "rocker", "at": "D", "inertia": 8.065e-2}},
@@ -169,7 +169,7 @@ def test_damping_takes_nothing_from_a_bent_link_that_turns() -> None:
 
 def spinning_beam() -> dict[str, Any]:
     analysis = {"revolutions": 1, "steps_per_revolution": 720, "initial": "quasi-static"}
-    return arm(bar(fidelity="beam", mesh={"elements": 4}), constant_speed(100), analysis=analysis)
+    return arm(bar(model="beam", mesh={"elements": 4}), constant_speed(100), analysis=analysis)
 
 
 def test_quasi_static_start_does_not_vibrate() -> None:
@@ -185,14 +185,14 @@ def test_quasi_static_start_does_not_vibrate() -> None:
 
 def slider_crank(piston: str) -> dict[str, Any]:
     """Beams with a rigid slider of 2 kg, or with that mass on the rod and the rod's end itself guided."""
-    beam = {"fidelity": "beam", "material": "steel", "mesh": {"elements": 3}}
+    beam = {"model": "beam", "material": "steel", "mesh": {"elements": 3}}
     bar = {"kind": "bar", "width": 0.02, "thickness": 0.02}
     raw: dict[str, Any] = {
         "points": {"A": [0, 0], "B": [0, 0.08], "C": {"from": "B", "distance": 0.3, "along": ["A", [1, 0]]}},
         "links": {
             "crank": {**beam, "shape": {**bar, "between": ["A", "B"]}},
             "rod": {**beam, "shape": {**bar, "between": ["B", "C"]}},
-            "piston": {"fidelity": "rigid", "mass": 2.0},
+            "piston": {"model": "rigid", "mass": 2.0},
         },
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "crank"], "at": "A"},

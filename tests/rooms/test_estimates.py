@@ -35,10 +35,10 @@ def estimated(raw: dict[str, Any]) -> tuple[Budget, Prepared]:
     return budget(ready, seen, None), ready
 
 
-def plate(outline: list[list[float]], fidelity: str, size: float) -> Any:
+def plate(outline: list[list[float]], model: str, size: float) -> Any:
     raw: dict[str, Any] = example("four_bar_solids", 60)
     raw["links"]["crank"]["shape"] = {"kind": "extrusion", "outline": outline, "thickness": 0.02}
-    raw["links"]["crank"] |= {"fidelity": fidelity, "mesh": {"size": size}}
+    raw["links"]["crank"] |= {"model": model, "mesh": {"size": size}}
     return bare_link(scene_from(raw), "crank")
 
 
@@ -46,16 +46,16 @@ BLOCK = [[0.0, -0.05], [0.2, -0.05], [0.2, 0.05], [0.0, 0.05]]
 ANGLE = [[0.0, -0.02], [0.3, -0.02], [0.3, 0.02], [0.1, 0.02], [0.1, 0.1], [0.0, 0.1]]
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid"])
-def test_the_indicator_is_the_error_of_the_mesh_in_the_energy_norm(fidelity: str) -> None:
+@pytest.mark.parametrize("model", ["plane", "solid"])
+def test_the_indicator_is_the_error_of_the_mesh_in_the_energy_norm(model: str) -> None:
     """A bent field whose stress is known, interpolated: effectivity of Zienkiewicz and Zhu near 1, order 2."""
     found = []
     for size in (0.05, 0.025):
-        link = plate(BLOCK, fidelity, size)
+        link = plate(BLOCK, model, size)
         x, y = link.X[:, 0], link.X[:, 1]
         g = np.zeros((link.n, link.d))
         g[:, 0], g[:, 1] = -9 * y * np.cos(9 * x), np.sin(9 * x)
-        fine = plate(BLOCK, fidelity, 0.0125)
+        fine = plate(BLOCK, model, 0.0125)
         energies = []
         for each in (link, fine):
             x, y = each.X[:, 0], each.X[:, 1]
@@ -69,13 +69,13 @@ def test_the_indicator_is_the_error_of_the_mesh_in_the_energy_norm(fidelity: str
     assert 0.3 < finer / true < 3.0
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid"])
-def test_an_edge_that_points_inwards_is_found_and_nothing_else(fidelity: str) -> None:
-    link = plate(ANGLE, fidelity, 0.02)
+@pytest.mark.parametrize("model", ["plane", "solid"])
+def test_an_edge_that_points_inwards_is_found_and_nothing_else(model: str) -> None:
+    link = plate(ANGLE, model, 0.02)
     nodes = re_entrant(link)
     assert nodes.any()
     assert np.linalg.norm(link.X[nodes, :2] - [0.1, 0.02], axis=1).max() < 1e-9
-    assert not re_entrant(plate(BLOCK, fidelity, 0.05)).any()
+    assert not re_entrant(plate(BLOCK, model, 0.05)).any()
 
 
 def test_at_such_an_edge_nothing_is_claimed() -> None:
@@ -122,7 +122,7 @@ def test_the_steps_error_is_that_of_the_step(steps: int) -> None:
 
 def test_stiffer_by_its_mesh_is_softened_by_its_indicator() -> None:
     """Quadrilaterals of a four-bar, four along a link: the softened run shows what elements a quarter as long change."""
-    links = {"fidelity": "plane", "mesh": {"elements": [4, 1]}}
+    links = {"model": "plane", "mesh": {"elements": [4, 1]}}
     raw = example("four_bar_beams", 360, links, revolutions=0.5)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     found, ready = estimated(raw)
@@ -136,7 +136,7 @@ def test_stiffer_by_its_mesh_is_softened_by_its_indicator() -> None:
 
 def test_what_is_too_large_for_a_run_beside_it_has_plain_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimates, "LARGE", 10)
-    found, _ = estimated(example("four_bar_beams", 60, {"fidelity": "plane"}))
+    found, _ = estimated(example("four_bar_beams", 60, {"model": "plane"}))
     assert {share.source for share in found.shares} == {"mesh", "step", "frames"}
     assert found.together["stress"] > found.together["displacement"] > 0.0
 

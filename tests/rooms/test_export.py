@@ -137,7 +137,7 @@ def test_what_cannot_be_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         exported_link(bent, "arm")
     monkeypatch.setattr("kedfem.export.link.MOST", 100)
     with pytest.raises(
-        SceneError, match=r"links.arm: must have 100 unknowns at most, .* take `fidelity = \"reduced\"`"
+        SceneError, match=r"links.arm: must have 100 unknowns at most, .* take `reduction = \"modal\"`"
     ):
         exported_link(scene, "arm")
     with pytest.raises(OutputError, match=r"must end in .npz or .mat, got '.txt'"):

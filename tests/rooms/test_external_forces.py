@@ -35,12 +35,12 @@ KINDS: dict[str, dict[str, Any]] = {
     "bar": {"shape": BAR, "mesh": {"elements": [8, 1, 1]}},
     "tetrahedra": {"shape": PLATE, "mesh": {"size": 0.01}, "element": "tet10"},
     "bar of tetrahedra": {"shape": BAR, "mesh": {"elements": [8, 1, 1]}, "element": "tet10"},
-    "reduced": {"shape": PLATE, "mesh": {"size": 0.01}, "reduced": True, "modes": 20},
-    "plane": {"fidelity": "plane", "shape": PLATE, "mesh": {"size": 0.01}},
-    "edge": {"fidelity": "plane", "shape": BAR},
-    "beam": {"fidelity": "beam", "shape": BAR, "mesh": {"elements": 4}},
-    "spatial": {"fidelity": "beam", "beam": "spatial", "shape": BAR, "mesh": {"elements": 4}},
-    "rigid": {"fidelity": "rigid", "shape": PLATE},
+    "reduced": {"shape": PLATE, "mesh": {"size": 0.01}, "reduction": 20},
+    "plane": {"model": "plane", "shape": PLATE, "mesh": {"size": 0.01}},
+    "edge": {"model": "plane", "shape": BAR},
+    "beam": {"model": "beam", "shape": BAR, "mesh": {"elements": 4}},
+    "spatial": {"model": "beam", "beam": "spatial", "shape": BAR, "mesh": {"elements": 4}},
+    "rigid": {"model": "rigid", "shape": PLATE},
 }
 PLANAR = {"plane", "edge", "beam"}
 MATERIAL = scenes.material(7850.0, E, NU)
@@ -147,7 +147,7 @@ def test_a_drive_takes_the_torque_on_the_link_that_it_carries() -> None:
         {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, 4.0], "frame": "link"}},
     )
     raw["links"]["tip"] = {
-        "material": "m", "fidelity": "beam",
+        "material": "m", "model": "beam",
         "shape": {"kind": "bar", "between": [[L, 0], [2 * L, 0]], "width": W, "thickness": T},
     }  # fmt: skip
     raw["joints"]["B"] = {"kind": "weld", "links": ["arm", "tip"], "at": [L, 0], "axis": "z"}
@@ -163,7 +163,7 @@ def test_a_drive_takes_the_torque_on_the_link_that_it_carries() -> None:
 # -- pressure -----------------------------------------------------------------------------------------------
 
 
-def ring(fidelity: str, a: float, b: float, at: list[float], pressure: float) -> Link:
+def ring(what: str, a: float, b: float, at: list[float], pressure: float) -> Link:
     """A ring about the origin and the forces of a pressure on one of its faces."""
     raw = arm("bar", {"p": {"kind": "pressure", "link": "ring", "at": at, "pressure": pressure}})
     outline = [[b, 0], {"via": [0, b], "to": [-b, 0]}, {"via": [0, -b], "to": [b, 0]}]
@@ -173,7 +173,7 @@ def ring(fidelity: str, a: float, b: float, at: list[float], pressure: float) ->
         "holes": [{"at": [0, 0], "diameter": 2 * a}],
         "thickness": T,
     }
-    kind = {"element": "tet10"} if fidelity == "tet10" else {"fidelity": fidelity}
+    kind = {"element": "tet10"} if what == "tet10" else {"model": what}
     raw["links"] = {"ring": {"material": "m", **kind, "shape": shape, "mesh": {"size": 0.012}}}
     raw["joints"]["A"]["links"] = ["ground", "ring"]
     scene = scene_from(raw)
@@ -181,12 +181,12 @@ def ring(fidelity: str, a: float, b: float, at: list[float], pressure: float) ->
     return model.links[0], model.loads[0][0].forces
 
 
-@pytest.mark.parametrize("fidelity", ["plane", "solid", "tet10"])
+@pytest.mark.parametrize("what", ["plane", "solid", "tet10"])
 @pytest.mark.parametrize("inner", [True, False], ids=["in the bore", "outside"])
-def test_a_ring_under_pressure_is_that_of_lame(fidelity: str, inner: bool) -> None:
+def test_a_ring_under_pressure_is_that_of_lame(what: str, inner: bool) -> None:
     """Plane stress: u = p a / E / (b² − a²) · ((1 − ν) a² + (1 + ν) b²) in the bore under a pressure there."""
     a, b, p = 0.02, 0.04, 1.0e7
-    link, forces = ring(fidelity, a, b, [a, 0] if inner else [0, b], p)
+    link, forces = ring(what, a, b, [a, 0] if inner else [0, b], p)
     assert_allclose(forces.sum(axis=0), 0, atol=1e-9 * p * a * T)
     K = link.K0.toarray()
     rows = [np.eye(link.d)[k] * np.ones((link.n, 1)) for k in range(link.d)]
@@ -208,7 +208,7 @@ def test_a_ring_under_pressure_is_that_of_lame(fidelity: str, inner: bool) -> No
     # a ring that nothing holds may have moved as a whole
     waves = np.column_stack([np.ones(len(radial)), link.X[at_bore, :2]])
     # tetrahedra of the same nodes err by 1.3e-3
-    cap = 2e-3 if fidelity == "tet10" else 1e-3
+    cap = 2e-3 if what == "tet10" else 1e-3
     assert_allclose(np.linalg.lstsq(waves, radial)[0][0], wanted, rtol=cap)
 
 

@@ -42,7 +42,7 @@ def shaft(along: Any, kind: str = "static", **fatigue: Any) -> dict[str, Any]:
     }
     link = {
         "material": "steel",
-        "fidelity": "beam",
+        "model": "beam",
         "shape": shape,
         "mesh": {"elements": 4},
         "beam": "spatial",
@@ -252,7 +252,7 @@ def test_links_without_stress_or_data_are_refused_or_told(tmp_path: Path) -> Non
         SceneError, match="fatigue: must have data of an elastic link or of its material, got data of no"
     ):
         scene_from(raw)
-    raw["links"]["arm"]["fidelity"] = "rigid"
+    raw["links"]["arm"]["model"] = "rigid"
     with pytest.raises(SceneError, match=r"got rigid links only"):
         scene_from(raw)
     raw["fatigue"] = {"links": {"arm": STEEL}}

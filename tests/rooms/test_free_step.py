@@ -17,7 +17,7 @@ ASKED = 0.01
 PLANES = {"xy": (0, 1, 2), "yz": (1, 2, 0), "zx": (2, 0, 1)}
 
 
-def chain(plane: str = "xy", links: int = 1, fidelity: str = "beam", **analysis: Any) -> dict[str, Any]:
+def chain(plane: str = "xy", links: int = 1, model: str = "beam", **analysis: Any) -> dict[str, Any]:
     """Bars of 0.4 m in a row, hinged to the ground and to each other, which fall from the horizontal; in any plane."""
     first, second, axis = PLANES[plane]
 
@@ -30,10 +30,10 @@ def chain(plane: str = "xy", links: int = 1, fidelity: str = "beam", **analysis:
         ends = [at(0.4 * k), at(0.4 * (k + 1))]
         shape: dict[str, Any] = {"kind": "polyline", "points": ends}
         mesh: dict[str, Any] = {"element": "beam5", "mesh": {"elements": 2}}
-        if fidelity == "solid":
+        if model == "solid":
             shape, mesh = {"kind": "bar", "between": ends}, {"mesh": {"elements": [4, 1, 1]}}
         return {
-            "fidelity": fidelity,
+            "model": model,
             "material": "pom",
             "shape": {**shape, "width": 0.02, "thickness": 0.01},
             **mesh,
@@ -82,7 +82,7 @@ SCENES = {
     "pendulum, xy": chain(), "pendulum, yz": chain("yz"), "pendulum, zx": chain("zx"),
     "double pendulum, xy": chain(links=2), "double pendulum, zx": chain("zx", 2),
     "spring, xy": sprung("xy"), "spring, yz": sprung("yz"), "motor, xy": motored("xy"), "motor, zx": motored("zx"),
-    "free, xy": free("xy"), "solid": chain(fidelity="solid"),
+    "free, xy": free("xy"), "solid": chain(model="solid"),
 }  # fmt: skip
 
 
@@ -125,10 +125,10 @@ def test_a_solid_that_moves_freely_has_its_step_chosen_and_keeps_its_mesh(
 ) -> None:
     monkeypatch.setattr(free_step, "FIRST", 100)
     monkeypatch.setattr(free_step, "MOST", 800)
-    scene = scene_from(chain(fidelity="solid", end_time=0.05))
+    scene = scene_from(chain(model="solid", end_time=0.05))
     plan = plan_for(scene)
     assert plan is not None
     assert plan.scene.links == scene.links
     assert plan.scene.analysis.step is not None
     assert [share.what for share in plan.shares] == ["time step"]
-    assert plan_for(scene_from(chain(fidelity="solid", end_time=0.05, step=1e-4))) is None
+    assert plan_for(scene_from(chain(model="solid", end_time=0.05, step=1e-4))) is None

@@ -23,7 +23,7 @@ FOUR_BAR = Path(__file__).parents[2] / "examples" / "four_bar_beams" / "scene.to
 L, SIDE, E, RHO = 1.0, 0.01, 2.1e11, 7850.0  # an arm [m] of steel
 EI, EA = E * SIDE**4 / 12, E * SIDE**2
 LINE = RHO * SIDE**2  # kg/m
-BEAM = {"fidelity": "beam", "mesh": {"elements": 12}}
+BEAM = {"model": "beam", "mesh": {"elements": 12}}
 
 
 def blocks(ready: Prepared) -> list[Block]:
@@ -104,9 +104,9 @@ def test_a_load_across_a_cantilever_is_judged_as_the_elastica_does() -> None:
     [
         BEAM,
         {**BEAM, "beam": "spatial"},
-        {"fidelity": "plane", "mesh": {"elements": [16, 1]}},
+        {"model": "plane", "mesh": {"elements": [16, 1]}},
         {"mesh": {"elements": [16, 1, 1]}},
-        {"mesh": {"elements": [16, 1, 1]}, "reduced": True, "modes": 16},
+        {"mesh": {"elements": [16, 1, 1]}, "reduction": 16},
     ],
     ids=["beam", "spatial", "plane", "solid", "reduced"],
 )
@@ -216,8 +216,8 @@ def test_nodes_of_one_cross_section_are_never_parted_by_rounding(degrees: float,
 
 def test_a_rigid_rod_that_slides_in_a_rigid_barrel_on_an_elastic_boom_raises_no_alarm() -> None:
     """The tip moves by F L³/3EI = 4 mm, 0.3 % of its arm, and turns by 1.5 times as much [rad]; with beams alike."""
-    found = estimated(lifted_boom({"fidelity": "rigid"}))
-    beams = estimated(lifted_boom({"fidelity": "beam", "mesh": {"elements": 4}}))
+    found = estimated(lifted_boom({"model": "rigid"}))
+    beams = estimated(lifted_boom({"model": "beam", "mesh": {"elements": 4}}))
     assert 0 < found.turn < np.radians(1.0)
     assert_allclose(found.turn, beams.turn, rtol=0.5)
     assert not geometric_warning(found)
@@ -246,7 +246,7 @@ def lifted_boom(cylinder: dict[str, Any]) -> dict[str, Any]:
     return {
         "gravity": [0, -9.81, 0],
         "links": {
-            "boom": {"material": "steel", "fidelity": "beam", "shape": boom, "mesh": {"elements": 4}},
+            "boom": {"material": "steel", "model": "beam", "shape": boom, "mesh": {"elements": 4}},
             "barrel": {"material": "steel", **cylinder, "shape": bar(P, middle, 0.08)},
             "rod": {"material": "steel", **cylinder, "shape": bar(middle, Q, 0.05)},
         },
@@ -277,12 +277,12 @@ def slider_crank(rpm: float, initial: str) -> dict[str, Any]:
     links, probes = {}, {}
     for name, a, b, width in (("crank", [0, 0], B, 0.02), ("rod", B, C, 0.01)):
         shape = {"kind": "bar", "between": [a, b], "width": width, "thickness": 0.02}
-        links[name] = {"material": "steel", "fidelity": "beam", "mesh": {"elements": 16}, "shape": shape}
+        links[name] = {"material": "steel", "model": "beam", "mesh": {"elements": 16}, "shape": shape}
         along = np.subtract(b, a) / np.linalg.norm(np.subtract(b, a))
         middle = np.add(a, b) / 2 + 0.49 * width * np.array([-along[1], along[0]])
         probes[name] = {"link": name, "at": list(middle), "quantity": "stress"}
     return {
-        "links": {**links, "slider": {"fidelity": "rigid", "mass": 0.3}},
+        "links": {**links, "slider": {"model": "rigid", "mass": 0.3}},
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
             "B": {"kind": "revolute", "links": ["crank", "rod"], "at": B},

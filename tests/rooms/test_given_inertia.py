@@ -24,9 +24,9 @@ def six(J: np.ndarray) -> list[float]:
     return J[SIX].tolist()
 
 
-def bar(a: list[float], b: list[float], fidelity: str) -> dict[str, Any]:
+def bar(a: list[float], b: list[float], model: str) -> dict[str, Any]:
     shape = {"kind": "polyline", "points": [a, b], "width": WIDTH, "thickness": THICKNESS}
-    return {"material": "steel", "shape": shape, "fidelity": fidelity}
+    return {"material": "steel", "shape": shape, "model": model}
 
 
 def numbers(a: list[float], b: list[float]) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def numbers(a: list[float], b: list[float]) -> dict[str, Any]:
     m = STEEL * length * WIDTH * THICKNESS
     spread = (length**2 * np.outer(e, e) + WIDTH**2 * np.outer(w, w) + THICKNESS**2 * np.outer(t, t)) / 12
     J = m * (np.trace(spread) * np.eye(3) - spread)
-    return {"fidelity": "rigid", "mass": m, "centre": ((P + Q) / 2).tolist(), "inertia": six(J)}
+    return {"model": "rigid", "mass": m, "centre": ((P + Q) / 2).tolist(), "inertia": six(J)}
 
 
 def four_bar(crank: Any, coupler: Any) -> dict[str, Any]:
@@ -174,7 +174,7 @@ INERTIA = np.array([[0.02, 0.004, -0.003], [0.004, 0.015, 0.0], [-0.003, 0.0, 0.
 def pendulum(R: np.ndarray, **link: Any) -> dict[str, Any]:
     """One hinge about the third axis, weight along the first, a centre that is on neither axis."""
     made = {
-        "fidelity": "rigid",
+        "model": "rigid",
         "mass": MASS,
         "centre": (R @ CENTRE).tolist(),
         "inertia": six(R @ INERTIA @ R.T),
@@ -271,7 +271,7 @@ def test_a_pattern_turns_their_inertia() -> None:
         ({"material": "steel"}, r"^links\.p\.material: cannot be combined with centre and inertia, got material$"),
         ({"shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}},
          r"^links\.p\.shape: cannot be combined with centre and inertia, got shape$"),
-        ({"fidelity": "solid"}, r"^links\.p\.centre: must be given for a rigid link only, got fidelity 'solid'"),
+        ({"model": "solid"}, r"^links\.p\.centre: must be given for a rigid link only, got model 'solid'"),
     ],
 )  # fmt: skip
 def test_what_is_lacking_or_impossible_is_told(given: dict[str, Any], told: str) -> None:

@@ -186,7 +186,7 @@ def slider_crank_by_hand(t: float) -> Array:
 
 
 def test_a_slider_crank_bears_what_newton_and_euler_say() -> None:
-    beam = {"material": "alloy", "fidelity": "beam"}
+    beam = {"material": "alloy", "model": "beam"}
     shape = {"kind": "bar", "width": WIDTH, "thickness": WIDTH}
     raw = {
         **mechanisms()["slider-crank"],
@@ -195,7 +195,7 @@ def test_a_slider_crank_bears_what_newton_and_euler_say() -> None:
         "links": {
             "crank": {**beam, "shape": {**shape, "between": ["A", "B"]}},
             "rod": {**beam, "shape": {**shape, "between": ["B", "C"]}},
-            "piston": {"fidelity": "rigid", "mass": 0.7},
+            "piston": {"model": "rigid", "mass": 0.7},
         },
     }
     t = np.linspace(0.0, 0.1, 13)
@@ -253,7 +253,7 @@ def test_the_drives_torque_is_that_of_virtual_work_on_all_nodes(raw: dict[str, A
     raw = {key: x for key, x in raw.items() if key != "bodies"}
     if carried:
         crank = {key: x for key, x in raw["links"]["crank"].items() if key != "mesh"}
-        raw = {**raw, "links": {**raw["links"], "crank": {**crank, "fidelity": "rigid"}}}
+        raw = {**raw, "links": {**raw["links"], "crank": {**crank, "model": "rigid"}}}
     ready = meshed(scene_from(raw))
     model = ready.model
     _, motion = next(motions(ready.scene, ready.linkage, ready.path))
@@ -447,7 +447,7 @@ def five_bar() -> dict[str, Any]:
         "points": points,
         "gravity": [0, -9.81, 0],
         "links": {
-            name: {"material": "steel", "fidelity": "beam", "shape": {**shape, "between": list(ends)}}
+            name: {"material": "steel", "model": "beam", "shape": {**shape, "between": list(ends)}}
             for name, ends in pairs.items()
         },
         "joints": {name: {"kind": "revolute", "links": list(x), "at": name} for name, x in joints.items()},

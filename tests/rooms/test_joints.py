@@ -31,14 +31,14 @@ def histories(raw: dict[str, Any]) -> dict[str, np.ndarray]:
     return {name: np.concatenate([row[name] for row in taken]) for name in taken[0]}
 
 
-def arm(fidelity: str, pieces: int) -> dict[str, Any]:
+def arm(kind: str, pieces: int) -> dict[str, Any]:
     """A 0.6 m arm that swings up and down, of one bar or of bars welded end to end; the middle is always a node."""
     x = np.linspace(0, 0.6, pieces + 1)
     names = [f"piece{k}" for k in range(pieces)]
-    elements: Any = 12 // pieces if fidelity == "beam" else [12 // pieces, 2, 1]
+    elements: Any = 12 // pieces if kind == "beam" else [12 // pieces, 2, 1]
     links = {
         name: {
-            "fidelity": fidelity,
+            "model": kind,
             "material": "steel",
             "shape": {"kind": "bar", "between": [[a, 0], [b, 0]], "width": 0.03, "thickness": 0.02},
             "mesh": {"elements": elements},
@@ -59,9 +59,9 @@ def arm(fidelity: str, pieces: int) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize(("fidelity", "tolerance"), [("beam", 1e-9), ("solid", 4e-3)])
-def test_welded_pieces_are_one_piece(fidelity: str, tolerance: float) -> None:
-    one, two = histories(arm(fidelity, 1)), histories(arm(fidelity, 2))
+@pytest.mark.parametrize(("kind", "tolerance"), [("beam", 1e-9), ("solid", 4e-3)])
+def test_welded_pieces_are_one_piece(kind: str, tolerance: float) -> None:
+    one, two = histories(arm(kind, 1)), histories(arm(kind, 2))
     tip = one["probes/tip/displacement"]
     # beams share nodes: the same system; solids share the faces' mean and gradient, so the cut is a little softer
     assert_allclose(two["probes/tip/displacement"], tip, rtol=0, atol=tolerance * np.abs(tip).max())
@@ -96,7 +96,7 @@ def test_a_solid_slider_is_a_rigid_one_but_for_its_softness() -> None:
     solid["joints"]["guide"]["at"] = [c, 0.03]
     mass = 7850 * (0.06 * 0.06 - np.pi * 0.01**2) * 0.04  # steel as built in
     density = scene_from(solid).materials["steel"].density
-    rigid = solid_slider_crank({"fidelity": "rigid", "mass": mass * density / 7850})
+    rigid = solid_slider_crank({"model": "rigid", "mass": mass * density / 7850})
     a, b = histories(solid), histories(rigid)
     for name in ("drive/torque", "joints/C/force"):
         peak = np.abs(b[name]).max()

@@ -306,8 +306,8 @@ D = [-0.3, 0]
 
 [links]
 crank = {{}}
-block = {{ fidelity = "rigid"{mass} }}
-rocker = {{ fidelity = "rigid"{other} }}
+block = {{ model = "rigid"{mass} }}
+rocker = {{ model = "rigid"{other} }}
 
 [joints]
 A = {{ kind = "revolute", links = ["ground", "crank"], at = "A" }}
@@ -341,7 +341,7 @@ def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(
     pin = 0.1 * np.exp(1j * (np.pi / 2 + channels["joints/A/angle"][1][:, 0])) + 0.3
     assert_allclose(channels["joints/D/angle"][1][:, 0], np.angle(pin) - np.arctan2(1, 3), atol=1e-10)
     path.write_text(
-        BLOCK.format(mass="", other="").replace("crank = {}", 'crank = { fidelity = "rigid", mass = 1 }')
+        BLOCK.format(mass="", other="").replace("crank = {}", 'crank = { model = "rigid", mass = 1 }')
     )
     said = run_kedfem("kinematics", path)
     assert said.code == USER_ERROR
@@ -419,7 +419,7 @@ def scene_with_plots() -> Scene:
         {
             "points": {"A": [0, 0], "B": [0.5, 0]},
             "gravity": [0, -9.81, 0],
-            "links": {"arm": {"material": "steel", "shape": bar, "fidelity": "beam"}},
+            "links": {"arm": {"material": "steel", "shape": bar, "model": "beam"}},
             "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A"}},
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 3.0}},
             "analysis": {"revolutions": 1, "steps_per_revolution": 36},

@@ -61,7 +61,7 @@ def cases(spun: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Loa
         analysis={"end_time": 5e-3, "step": 1e-4, "initial": "rest", "accuracy": "quick"}, output=QUIET,
     )  # fmt: skip
     raw["points"]["N"] = {"between": ["B", "C"], "fraction": 0.5}
-    raw["links"]["crank"] |= {"fidelity": "reduced", "modes": 12}
+    raw["links"]["crank"] |= {"reduction": 12}
     raw["links"]["rocker"]["element"] = "tet10"
     linkage = analyse(scene_from(raw, tmp_path_factory.mktemp("linkage"))).folder
     found = {link: load_cases(linkage, link, INSTANTS) for link in ("crank", "coupler", "rocker")}
@@ -209,7 +209,7 @@ def test_what_cannot_be_solved_elsewhere_is_said(tmp_path: Path, monkeypatch: py
     assert any("CalculiX has no 27-node hexahedra" in said for said in found.warnings)
     assert (found.folder / "arm.csv").exists()
     for keys, message in (
-        ({"links": {"arm": {**bar(LENGTH, SIDE, SIDE), "fidelity": "beam"}}}, "must be an elastic solid"),
+        ({"links": {"arm": {**bar(LENGTH, SIDE, SIDE), "model": "beam"}}}, "must be an elastic solid"),
         ({"analysis": {**analysis, "frames": "co-rotational"}}, "analysis.frames: must be rigid-body"),
         ({"analysis": {**analysis, "stiffening": True}}, "analysis.stiffening: must be off"),
     ):  # fmt: skip

@@ -12,11 +12,9 @@ I = 0.02 * 0.005**3 / 12  # noqa: E741
 FOLLOWING = 2 * 2.1e11 * I  # N at the tip of a metre: P L²/EI = 2
 
 
-def cantilever(
-    held: str, load: dict[str, Any], fidelity: str = "beam", initial: str = "rest"
-) -> dict[str, Any]:
+def cantilever(held: str, load: dict[str, Any], model: str = "beam", initial: str = "rest") -> dict[str, Any]:
     """A slender steel cantilever that is loaded slowly; held by a drive that hardly turns, or welded."""
-    link = bar(fidelity, [0, 0], [1.0, 0], 8)
+    link = bar(model, [0, 0], [1.0, 0], 8)
     link["shape"] |= {"width": 0.005, "thickness": 0.02}
     raw: dict[str, Any] = {
         "links": {"arm": link},

@@ -308,7 +308,7 @@ class TestUnknowns:
             "part": {"kind": "part", "file": "crank_web.toml", "between": [[0, 0], [PARTS["crank_web"], 0]]},
         }[kind]
         plane = model == "plane"
-        sizes = {"fidelity": model} if plane else {"element": model}
+        sizes = {"model": model} if plane else {"element": model}
         link = LinkScene(shape=shape, mesh={"unknowns": wanted, **({} if plane else {"layers": 2})}, **sizes)
         mesh = (plane_mesh if plane else link_mesh)("arm", link, GEOMETRY)
         assert 0.75 < (2 if plane else 3) * len(mesh.points) / wanted < 1.33

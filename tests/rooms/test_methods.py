@@ -251,7 +251,7 @@ class TestKept:
 class TestScene:
     RAW: dict[str, Any] = {  # noqa: RUF012
         "analysis": {"end_time": 0.01, "step": 1e-3},
-        "links": {"crank": {"material": "steel", "step": "crank.step"}},
+        "links": {"crank": {"material": "steel", "file": "crank.step"}},
     }
 
     def test_step_is_short_for_a_shape_from_cad(self) -> None:
@@ -261,7 +261,7 @@ class TestScene:
         assert again.links == scene.links
 
     def test_a_solid_of_an_assembly_is_found_by_the_links_name(self) -> None:
-        raw = self.RAW | {"links": {"rod": {"material": "steel", "step": "engine.step"}}}
+        raw = self.RAW | {"links": {"rod": {"material": "steel", "file": "engine.step"}}}
         mesh = link_mesh("rod", scene_from(raw, GEOMETRY).links["rod"], GEOMETRY)
         alone = made("connecting_rod.step")
         assert_allclose(volume_and_centre(mesh)[0], volume_and_centre(alone)[0], rtol=1e-4)
@@ -269,15 +269,15 @@ class TestScene:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"step": "none.step"}, r"links.crank.step: must be a CAD file, got nothing at .*none.step"),
-            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.step: cannot be combined with "
+            ({"file": "none.step"}, r"links.crank.file: must be a CAD file, got nothing at .*none.step"),
+            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.file: cannot be combined with "
             r"shape, got both"),
             ({"mesh": {"unknowns": 500, "size": 0.003}}, r"links.crank.mesh.unknowns: cannot be combined "
             r"with size, got both"),
             ({"mesh": {"elements": [4, 2, 1]}}, r"links.crank.mesh.elements: must be left out for a cad"),
             ({"mesh": {"unknowns": 5}}, r"links.crank.mesh.unknowns: must be at least 100, got 5"),
-            ({"fidelity": "plane"}, r"links.crank.shape.kind: must be one of .* for a plane link, got 'cad'"),
-            ({"fidelity": "beam"}, r"links.crank.shape.kind: must be one of .* for a beam, got 'cad'"),
+            ({"model": "plane"}, r"links.crank.shape.kind: must be one of .* for a plane link, got 'cad'"),
+            ({"model": "beam"}, r"links.crank.shape.kind: must be one of .* for a beam, got 'cad'"),
         ],
     )  # fmt: skip
     def test_bad_keys_have_their_message(self, change: dict[str, Any], message: str) -> None:

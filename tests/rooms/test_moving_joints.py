@@ -56,7 +56,7 @@ def with_links(raw: dict[str, Any], **changes: Any) -> dict[str, Any]:
     return raw
 
 
-RIGID = {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
+RIGID = {"model": "rigid", "mesh": {"elements": [1, 1, 1]}}
 PARTNERS = {
     "a pin that the drive carries": lambda: with_links(
         inverted("solid", "slot", revolutions=0.02), crank=RIGID
@@ -64,7 +64,7 @@ PARTNERS = {
     "a slot in a rigid arm": lambda: with_links(inverted("solid", "slot", revolutions=0.02), arm=RIGID),
     "a rigid block": lambda: with_links(inverted("solid", "prismatic", revolutions=0.02), block=RIGID),
     "a slot in a reduced arm": lambda: with_links(
-        inverted("solid", "slot", revolutions=0.02), arm={"reduced": True}
+        inverted("solid", "slot", revolutions=0.02), arm={"reduction": "modal"}
     ),
 }
 
@@ -382,7 +382,7 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
 
 def test_a_rigid_slider_bears_no_joint_with_rows() -> None:
     raw = inverted("beam", "slot")
-    raw["links"]["shoe"] = {"fidelity": "rigid", "mass": 1.0}
+    raw["links"]["shoe"] = {"model": "rigid", "mass": 1.0}
     raw["joints"]["G"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.5, 0], "axis": "x"}
     raw["joints"]["T"] = {"kind": "slot", "links": ["shoe", "arm"], "at": [0.5, 0], "axis": "y"}
     scene = scene_from(raw)

@@ -13,7 +13,7 @@ from tests.scenes import arm, bar, constant_speed
 
 TABLE = Path(__file__).parents[2] / "docs" / "notation.md"
 PLACES: dict[str, tuple[str, ...]] = {
-    "functions": ("links", "arm"),
+    **dict.fromkeys(("fidelity", "functions", "modes", "reduced", "step"), ("links", "arm")),
     "reduction": ("analysis",),
     "port": ("joints", "A"),
     "turning_stiffness": ("joints", "A", "bushing"),

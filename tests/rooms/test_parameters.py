@@ -26,7 +26,7 @@ width = "=r/5 + 15 mm"
 
 [links.arm]
 material = "steel"
-fidelity = "beam"
+model = "beam"
 shape = { kind = "bar", between = [[0, 0], ["=20*r", 0]], width = "=width", thickness = "=hypot(12 mm, 16 mm)" }
 mesh = { elements = "=n^2/2" }
 
@@ -292,6 +292,6 @@ def test_only_regular_files_within_the_folder_where_that_is_asked_for(tmp_path: 
         os.mkfifo(tmp_path / "in" / "pipe.toml")
         with pytest.raises(SceneError, match="must be a regular file"):
             read_scene(written(tmp_path / "in", {"scene.toml": 'include = "pipe.toml"'}))
-    nested = {"scene.toml": 'include = "b.toml"', "b.toml": '[links.arm]\nstep = "../../part.step"\n'}
-    with pytest.raises(SceneError, match=r"links.arm.step: must be within"):
+    nested = {"scene.toml": 'include = "b.toml"', "b.toml": '[links.arm]\nfile = "../../part.step"\n'}
+    with pytest.raises(SceneError, match=r"links.arm.file: must be within"):
         read_scene(written(tmp_path / "in", nested), within=True)

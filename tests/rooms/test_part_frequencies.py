@@ -19,21 +19,21 @@ from tests.rooms.test_resolution import arm
 from tests.verification.meshes import box, mapped_mesh
 
 
-@pytest.mark.parametrize("fidelity", ["beam", "solid", "plane"])
+@pytest.mark.parametrize("model", ["beam", "solid", "plane"])
 def test_a_link_held_at_its_driven_joint_is_the_linkage_of_that_link_alone(
-    fidelity: str, tmp_path: Path
+    model: str, tmp_path: Path
 ) -> None:
-    scene = scene_from(arm(fidelity), tmp_path)
+    scene = scene_from(arm(model), tmp_path)
     whole = frequencies(scene, Wanted(modes=3, positions=1), tmp_path / "whole")
     found = part_frequencies(link_of_scene(scene, "arm", ["A"]), 3, tmp_path / "part")
     assert found.still == 0
     # two routes to the same eigenvalues; a joint's ports on its axis hold the surface's stretch along it too
-    assert_allclose(found.values, whole.values[0], rtol={"beam": 1e-7}.get(fidelity, 2e-4))
+    assert_allclose(found.values, whole.values[0], rtol={"beam": 1e-7}.get(model, 2e-4))
 
 
-@pytest.mark.parametrize(("fidelity", "motions"), [("beam", 3), ("plane", 3), ("solid", 6)])
-def test_motions_without_strain_are_those_of_a_free_body(fidelity: str, motions: int, tmp_path: Path) -> None:
-    raw = arm(fidelity)
+@pytest.mark.parametrize(("model", "motions"), [("beam", 3), ("plane", 3), ("solid", 6)])
+def test_motions_without_strain_are_those_of_a_free_body(model: str, motions: int, tmp_path: Path) -> None:
+    raw = arm(model)
     del raw["drive"]
     raw["analysis"] = {"end_time": 0.1, "step": 1e-3}
     scene = scene_from(raw, tmp_path)
@@ -93,7 +93,7 @@ def test_options_without_a_meaning_are_refused(options: list[str], said: str, pl
     [
         ({}, "rod", [], "--link: must be arm, got 'rod'"),
         ({}, "arm", ["B"], "--hold: must be A, got 'B'"),
-        ({"fidelity": "rigid"}, "arm", [], "--link: must be an elastic link"),
+        ({"model": "rigid"}, "arm", [], "--link: must be an elastic link"),
     ],
 )
 def test_links_and_joints_that_cannot_be_are_refused(

@@ -14,7 +14,7 @@ from kedfem.scene.read.files import outside
 
 Raw = dict[str, Any]
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.01}
-BEAM = {"fidelity": "beam", "material": "steel"}
+BEAM = {"model": "beam", "material": "steel"}
 PRESSURE = {
     "over": "angle",
     "at": ["0 deg", "90 deg", "180 deg"],
@@ -39,7 +39,7 @@ def radial(count: int) -> Raw:
                 "points": {"C": rod},
                 "links": {
                     "rod": {**BEAM, "shape": {**SHAPE, "between": ["B", "C"]}},
-                    "piston": {"fidelity": "rigid", "mass": "0.3 kg"},
+                    "piston": {"model": "rigid", "mass": "0.3 kg"},
                 },
                 "joints": {
                     "B": {"kind": "revolute", "links": ["crank", "rod"], "at": "B"},
@@ -70,7 +70,7 @@ def by_hand(count: int) -> Raw:
         at = [*(foot + np.sqrt(0.12**2 - (crank @ crank - foot**2))) * d]
         n = k + 1
         raw["links"][f"rod_{n}"] = {**BEAM, "shape": {**SHAPE, "between": ["B", at]}}
-        raw["links"][f"piston_{n}"] = {"fidelity": "rigid", "mass": 0.3}
+        raw["links"][f"piston_{n}"] = {"model": "rigid", "mass": 0.3}
         raw["joints"][f"B_{n}"] = {"kind": "revolute", "links": ["crank", f"rod_{n}"], "at": "B"}
         raw["joints"][f"C_{n}"] = {"kind": "revolute", "links": [f"rod_{n}", f"piston_{n}"], "at": at}
         raw["joints"][f"guide_{n}"] = {
@@ -143,7 +143,7 @@ def test_a_shift_moves_points_of_the_pattern_and_leaves_those_of_the_scene() -> 
         ({"count": 0, "turn": 1.0}, r"patterns\.p\.count: must be at least 1"),
         ({"count": 2, "turn": 1.0, "abuot": "z"}, r"patterns\.p\.abuot: unknown key, did you mean 'about'"),
         ({"links": {"a": {**BEAM, "width": 1}}}, r"^patterns\.p\.links\.a\.width: unknown key"),
-        ({"links": {"a": {"step": "a.step"}}}, r"patterns\.p\.links\.a: must not be a part of a file"),
+        ({"links": {"a": {"file": "a.step"}}}, r"patterns\.p\.links\.a: must not be a part of a file"),
         ({"links": {"a": {"shape": {"kind": "plate_link"}}}, "about": "x"}, r"patterns\.p\.links\.a: must be a bar"),
         ({"links": {"a": {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [0, 0, 1]]}}}}, r"p\.links\.a: .* `up`"),
         ({"joints": {"j": {"bushing": {"stiffness": [1, 2, 3]}}}}, r"patterns\.p\.joints\.j: must have a bushing alike"),
@@ -157,9 +157,9 @@ def test_what_a_pattern_cannot_be(pattern: Raw, message: str) -> None:
 
 
 def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(tmp_path: Path) -> None:
-    raw = {"patterns": {"p": {"links": {"a": {"step": "../a.step"}}}}}
+    raw = {"patterns": {"p": {"links": {"a": {"file": "../a.step"}}}}}
     assert outside(raw, tmp_path) == [
-        "patterns.p.links.a.step: must be within the scene's folder (--within), got '../a.step'"
+        "patterns.p.links.a.file: must be within the scene's folder (--within), got '../a.step'"
     ]
 
 

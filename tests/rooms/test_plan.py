@@ -46,11 +46,11 @@ def polyline_bar(kind: str, points: list[list[float]]) -> dict[str, Any]:
 
 
 def test_what_the_scene_states_stays() -> None:
-    raw = arm(fidelity="solid", mesh={"elements": [8, 2, 1]})
+    raw = arm(model="solid", mesh={"elements": [8, 2, 1]})
     raw["analysis"]["step"] = 1e-3
     plan = planned(scene_from(raw))
     link = plan.scene.links["arm"]
-    assert (link.fidelity, link.reduced, link.mesh.elements) == ("solid", False, (8, 2, 1))
+    assert (link.model, link.reduced, link.mesh.elements) == ("solid", False, (8, 2, 1))
     assert time_grid(plan.scene).steps == 200
     assert "the scene states all meshes; the run tells their error" in plan.notes
 
@@ -63,11 +63,11 @@ def test_links_whose_steps_in_full_would_be_dear_are_reduced_unless_they_or_the_
     monkeypatch.setattr("kedfem.accuracy.meshes.DEAR", 1e4)
 
     def plan(analysis: dict[str, Any], **link: Any) -> Plan:
-        raw = arm(fidelity="solid", mesh={"elements": [8, 2, 1]}, **link)
+        raw = arm(model="solid", mesh={"elements": [8, 2, 1]}, **link)
         raw["analysis"] |= analysis
         return planned(scene_from(raw))
 
-    chosen, full = plan({}), plan({}, reduced=False)
+    chosen, full = plan({}), plan({}, reduction="none")
     assert chosen.scene.links["arm"].reduced
     assert any("arm: reduced, as " in note for note in chosen.notes)
     assert not full.scene.links["arm"].reduced
@@ -86,7 +86,7 @@ def test_a_template_is_right_to_two_hundredths_as_it_stands(name: str, tmp_path:
     raw["output"] = {"folder": str(tmp_path), "probes": raw["output"]["probes"]}
     run = analyse(scene_from(raw))
     assert run.plan is not None
-    assert all(link.reduced or link.fidelity == "rigid" for link in run.plan.scene.links.values())
+    assert all(link.reduced or link.model == "rigid" for link in run.plan.scene.links.values())
     assert run.budget is not None
     assert max(run.budget.together.values()) < 0.02
 
@@ -103,7 +103,7 @@ def test_a_stated_step_that_is_too_long_is_said() -> None:
 
 def test_an_open_link_becomes_the_simplest_that_is_near_enough_and_shares_add_up() -> None:
     plan = planned(scene_from(arm()))
-    assert plan.scene.links["arm"].fidelity == "beam"  # slenderness 25: shear and ends change 1 %
+    assert plan.scene.links["arm"].model == "beam"  # slenderness 25: shear and ends change 1 %
     assert plan.scene.analysis.accuracy == "quick"
     assert plan.reached
     assert plan.error == pytest.approx(sum(share.error for share in plan.shares))
@@ -138,17 +138,17 @@ def test_planar_polylines_sliders_and_spatial_scenes_are_planned() -> None:
     raw["links"]["arm"]["shape"] = polyline_bar("polyline", [[0, 0], [0.3, 0], [0.5, 0.1]])
     plan = planned(scene_from(raw))
     assert plan.reached
-    assert plan.scene.links["arm"].fidelity == "beam"
+    assert plan.scene.links["arm"].model == "beam"
     raw = slider_crank("rigid")
     raw["analysis"] = {"revolutions": 0.25, "accuracy": 0.05, "initial": "quasi-static"}
     for name in ("crank", "rod"):
-        del raw["links"][name]["fidelity"], raw["links"][name]["mesh"]
+        del raw["links"][name]["model"], raw["links"][name]["mesh"]
     plan = planned(scene_from(raw))
     assert plan.scene.links["piston"] == scene_from(raw).links["piston"]
     raw = arm()
     raw["gravity"] = [0, 0, -9.81]  # out of the plane
     plan = planned(scene_from(raw))
-    assert plan.scene.links["arm"].fidelity in {"beam", "solid"}
+    assert plan.scene.links["arm"].model in {"beam", "solid"}
     assert plan.reached
 
 

@@ -51,7 +51,7 @@ SHAPES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def both(kind: str, **link: Any) -> tuple[QuadMesh, SolidMesh]:
     shape, mesh = SHAPES[kind]
     folder = ROOT / "geometry"
-    plane = LinkScene(shape=shape, mesh=mesh, fidelity="plane", **link)
+    plane = LinkScene(shape=shape, mesh=mesh, model="plane", **link)
     solid = LinkScene(shape=shape, mesh=mesh, element="hex27")
     return plane_mesh("any", plane, folder), link_mesh("any", solid, folder)
 
@@ -93,7 +93,7 @@ def test_a_plane_mesh_cannot_be_written_to() -> None:
 
 
 def test_shapes_without_a_plate_are_no_plane_links(tmp_path: Path) -> None:
-    link = LinkScene(shape={"kind": "mesh", "file": "any.vtu"}, fidelity="plane")
+    link = LinkScene(shape={"kind": "mesh", "file": "any.vtu"}, model="plane")
     message = "links.any.shape: must be bar, plate_link, extrusion, part, mesh or cad, got mesh"
     with pytest.raises(MeshError, match=message.replace(".", r"\.")):
         plane_mesh("any", link, tmp_path)
@@ -116,21 +116,21 @@ def test_welded_pieces_are_one_piece() -> None:
         assert_allclose(two[name], one[name], rtol=0, atol=4e-3 * np.abs(one[name]).max())
 
 
-@pytest.mark.parametrize(("fidelity", "sizes"), [("plane", (2, 4)), ("solid", (2, 4))])
-def test_a_driven_bore_is_as_stiff_whatever_its_mesh(fidelity: str, sizes: tuple[int, int]) -> None:
+@pytest.mark.parametrize(("kind", "sizes"), [("plane", (2, 4)), ("solid", (2, 4))])
+def test_a_driven_bore_is_as_stiff_whatever_its_mesh(kind: str, sizes: tuple[int, int]) -> None:
     """The principal directions of a circle are rounding's choice (here 90° apart), and must have no influence."""
     found, across = [], []
     for size in sizes:
         raw = four_bar("plate", steps_per_revolution=24, revolutions=1 / 24, initial="quasi-static")
         raw["drive"]["motion"]["speed"] = "60 rpm"
-        raw["links"]["crank"] |= {"fidelity": fidelity, "mesh": {"elements_across": size}}
+        raw["links"]["crank"] |= {"model": kind, "mesh": {"elements_across": size}}
         for name in ("coupler", "rocker"):
-            raw["links"][name] |= {"fidelity": "plane", "mesh": {"elements_across": 2}}
+            raw["links"][name] |= {"model": "plane", "mesh": {"elements_across": 2}}
         raw["output"] = {"probes": {"B": {"link": "crank", "at": [0.3048 * 0.4, 0.3048 * 0.4 * 3**0.5],
                                           "quantity": "displacement"}}}  # fmt: skip
         link = bare_links(scene_from(raw))["crank"]
         seat = joint_seat(link, "A", np.zeros(3), np.array([0.0, 0, 1]))
-        across.append(seat.directions[0 if fidelity == "plane" else 1] @ link.axes[:, 0])
+        across.append(seat.directions[0 if kind == "plane" else 1] @ link.axes[:, 0])
         found.append(histories(raw)["probes/B/displacement"][0])
     assert abs(abs(across[0]) - abs(across[1])) > 0.9
     # the mesh's own error; held along one direction only, the eye's compliance changed it by 40 %
@@ -138,12 +138,12 @@ def test_a_driven_bore_is_as_stiff_whatever_its_mesh(fidelity: str, sizes: tuple
 
 
 def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
-    """The four-bar of plates with a fidelity per link; beams are as wide as the waist."""
+    """The four-bar of plates with a kind per link; beams are as wide as the waist."""
     raw = four_bar("plate", steps_per_revolution=60, revolutions=0.5, initial="quasi-static", **analysis)
     raw["drive"]["motion"]["speed"] = "60 rpm"
-    for link, fidelity in zip(raw["links"].values(), fidelities, strict=True):
-        link["fidelity"] = fidelity
-        if fidelity == "beam":
+    for link, kind in zip(raw["links"].values(), fidelities, strict=True):
+        link["model"] = kind
+        if kind == "beam":
             bar = {"kind": "bar", "between": link["shape"]["between"], "width": 0.0254, "thickness": 0.0254}
             link |= {"shape": bar, "mesh": {"elements": 2}}
     return raw
@@ -183,12 +183,12 @@ def test_a_mixed_four_bar_behaves_as_its_solid_twin() -> None:
     assert_allclose(a["drive/rigid_torque"], b["drive/rigid_torque"], rtol=1e-11)
 
 
-def engine(fidelity: str) -> dict[str, Any]:
+def engine(kind: str) -> dict[str, Any]:
     """The example's crank, connecting rod and piston: parts, a guide along a side, a gas force on the crown."""
     raw = tomllib.loads((ROOT / "examples/slider_crank_solids/scene.toml").read_text("utf-8"))
     raw["analysis"] |= {"revolutions": 0.5, "steps_per_revolution": 180}
     for link in raw["links"].values():
-        link["fidelity"] = fidelity
+        link["model"] = kind
         link["shape"]["file"] = str(ROOT / "geometry" / Path(link["shape"]["file"]).name)
     return raw
 
@@ -236,13 +236,13 @@ def test_a_rigid_slider_rides_on_a_plane_rod() -> None:
         "bore_diameter": 0.02,
     }
 
-    def scene(fidelity: str, piston: str) -> dict[str, Any]:
+    def scene(kind: str, piston: str) -> dict[str, Any]:
         raw = slider_crank(piston)
         raw["analysis"]["steps_per_revolution"] = 120
         for name, ends in (("crank", ["A", "B"]), ("rod", ["B", "C"])):
             shape = {**plate, "between": ends}
             raw["links"][name] = {"material": "steel", "shape": shape, "mesh": {"elements_across": 1}}
-            raw["links"][name]["fidelity"] = fidelity
+            raw["links"][name]["model"] = kind
         return raw
 
     plane, solid = histories(scene("plane", "rigid")), histories(scene("solid", "rigid"))
@@ -258,7 +258,7 @@ def test_gravity_forces_and_pressure_have_their_resultants() -> None:
     raw["gravity"] = [0, -9.81, 0]
     raw["bodies"]["mass"] = {"kind": "point_mass", "link": "coupler", "at": "B", "mass": 3.0}
     raw["links"]["bar"] = {
-        "fidelity": "plane", "material": "steel", "mesh": {"elements": [4, 2]},
+        "model": "plane", "material": "steel", "mesh": {"elements": [4, 2]},
         "shape": {"kind": "bar", "between": ["D", [1.4144, 0]], "width": 0.05, "thickness": 0.02},
     }  # fmt: skip
     raw["joints"]["W"] = {"kind": "weld", "links": ["ground", "bar"], "at": "D"}

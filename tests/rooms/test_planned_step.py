@@ -74,7 +74,7 @@ def test_what_nothing_drives_has_its_beams_chosen() -> None:
     raw: dict[str, Any] = {
         "gravity": [0, -9.81, 0],
         "links": {"arm": {
-            "fidelity": "beam", "material": "pom",
+            "model": "beam", "material": "pom",
             "shape": {"kind": "bar", "between": [[0, 0], [0.6, 0]], "width": 0.008, "thickness": 0.02},
         }},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
@@ -97,5 +97,5 @@ def test_what_nothing_drives_has_its_beams_chosen() -> None:
     )
     assert worst(relative_errors(coarse, fine)) > 0.05  # 9.7 %, in the stress
     assert worst(relative_errors(chosen_, fine)) < 0.01
-    raw["links"]["arm"]["fidelity"] = "solid"
+    raw["links"]["arm"]["model"] = "solid"
     assert plan_for(scene_from(raw)) is None

@@ -18,9 +18,9 @@ from tests.runs import Ran, ran
 
 E, L, WIDTH = 2.1e11, 0.3, 0.012  # steel's modulus; length of the coupler, side of its square section [m]
 LINKS = {
-    "planar beam": {"fidelity": "beam", "beam": "planar", "mesh": {"elements": 2}},
-    "spatial beam": {"fidelity": "beam", "beam": "spatial", "mesh": {"elements": 2}},
-    "plane": {"fidelity": "plane", "mesh": {"elements": [6, 2]}},
+    "planar beam": {"model": "beam", "beam": "planar", "mesh": {"elements": 2}},
+    "spatial beam": {"model": "beam", "beam": "spatial", "mesh": {"elements": 2}},
+    "plane": {"model": "plane", "mesh": {"elements": [6, 2]}},
     "solid": {"element": "hex20", "mesh": {"elements": [6, 1, 1]}},
 }
 FRAMES = ["rigid-body", "co-rotational"]
@@ -37,7 +37,7 @@ def hinge(at: str, *links: str) -> dict[str, Any]:
 
 def four_bar(kind: str, frames: str, probes: dict[str, Any], **analysis: Any) -> dict[str, Any]:
     """A crank and a rocker that are rigid, a coupler of one kind, drawn level."""
-    rigid = {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
+    rigid = {"model": "rigid", "mesh": {"elements": [1, 1, 1]}}
     return {
         "points": {"A": [0, 0], "B": [0, 0.1], "C": [L, 0.1], "D": [L, -0.1]},
         "links": {
@@ -204,7 +204,7 @@ def test_a_slider_without_a_shape_moves_with_its_pin() -> None:
         "block": probe("block", [L, 0.1], "position"), "pin": probe("coupler", "C", "position"),
         "block moves": probe("block", [L, 0.1], "displacement", frame="world"),
     })  # fmt: skip
-    raw["links"]["block"] = {"fidelity": "rigid", "mass": 2.0}
+    raw["links"]["block"] = {"model": "rigid", "mass": 2.0}
     del raw["links"]["rocker"], raw["points"]["D"]
     raw["joints"]["C"]["links"] = ["coupler", "block"]
     raw["joints"]["D"] = {"kind": "prismatic", "links": ["ground", "block"], "at": "C", "axis": "x"}

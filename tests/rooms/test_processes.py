@@ -244,7 +244,7 @@ def test_nothing_needs_what_other_systems_lack(tmp_path: Path) -> None:
     text = """
 [links.arm]
 material = "steel"
-fidelity = "solid"
+model = "solid"
 shape = { kind = "plate_link", between = [[0, 0], [0.1, 0]], width = 0.02, thickness = 0.01, bore_diameter = 0.01 }
 mesh = { size = 0.01 }
 [joints.A]

@@ -55,7 +55,7 @@ def swung(**more: Any) -> dict[str, Any]:
 
 def beams() -> dict[str, Any]:
     link = {
-        "material": "steel", "fidelity": "beam", "mesh": {"elements": 2},
+        "material": "steel", "model": "beam", "mesh": {"elements": 2},
         "shape": {"kind": "bar", "width": 0.02, "thickness": 0.01},
     }  # fmt: skip
     return four_bar((0.12, 0.35, 0.3, 0.38), link, cycloidal(1.0, 0.1), analysis=TIMES, output=output())
@@ -373,17 +373,17 @@ output = { plots = false, picture = false, animation = false }
 points = { A = [0, 0], B = [0.1, 0], C = [0.35, 0.2], D = [0.4, 0] }
 
 [links.crank]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = ["A", "B"], width = 0.02, thickness = 0.01 }
 
 [links.coupler]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = ["B", "C"], width = 0.02, thickness = 0.01 }
 
 [links.rocker]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = ["C", "D"], width = 0.02, thickness = 0.01 }
 

@@ -52,7 +52,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
     """A crank at constant speed for two turns: the second turn takes its motion from the first."""
     beam = {
         "material": "soft",
-        "fidelity": "beam",
+        "model": "beam",
         "element": "beam3",
         "mesh": {"elements": 1},
         "shape": {"kind": "bar", "width": 0.02, "thickness": 0.01},

@@ -36,7 +36,7 @@ def scene(kind: str, rigid: tuple[str, ...] = (), stiff: tuple[str, ...] = ()) -
     }
     raw["bodies"] = {"wheel": {"kind": "flywheel", "link": "crank", "at": "A", "inertia": 0.01, "mass": 0.2}}
     for name in rigid:
-        raw["links"][name]["fidelity"] = "rigid"
+        raw["links"][name]["model"] = "rigid"
         raw["links"][name].pop("mesh")
     for name in stiff:
         raw["links"][name]["material"] = "hard"

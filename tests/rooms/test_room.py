@@ -80,18 +80,18 @@ def test_the_forecast_is_below_the_count_that_is_made(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize(
-    ("fidelity", "plane", "fits"), [("solid", False, False), ("rigid", False, True), ("plane", True, True)]
+    ("kind", "plane", "fits"), [("solid", False, False), ("rigid", False, True), ("plane", True, True)]
 )
 def test_what_is_not_factored_or_flat_takes_less(
-    monkeypatch: pytest.MonkeyPatch, fidelity: str, plane: bool, fits: bool
+    monkeypatch: pytest.MonkeyPatch, kind: str, plane: bool, fits: bool
 ) -> None:
     N = 1e6
     monkeypatch.setattr(room, "memory", lambda: LINK_BYTES * N + 0.5 * FACTOR_BYTES * N**1.5)
     if fits:
-        check_room("links.arm", N, fidelity != "rigid", plane)
+        check_room("links.arm", N, kind != "rigid", plane)
     else:
         with pytest.raises(MeshError, match="must fit in this machine's memory"):
-            check_room("links.arm", N, fidelity != "rigid", plane)
+            check_room("links.arm", N, kind != "rigid", plane)
 
 
 def test_links_that_fit_alone_but_not_together_are_refused_before_they_are_factored(

@@ -33,7 +33,7 @@ def oriented(direction: str, *x: float) -> list[float]:
     return [float(each) for each in DIRECTIONS[direction].apply(x)]
 
 
-def welded(fidelity: str, direction: str, ratio: float) -> dict[str, Any]:
+def welded(model: str, direction: str, ratio: float) -> dict[str, Any]:
     """A driven bar with a much stiffer one welded to its end, in a field of 100 g; about x, y, z or an oblique axis."""
 
     def at(*x: float) -> list[float]:
@@ -41,8 +41,8 @@ def welded(fidelity: str, direction: str, ratio: float) -> dict[str, Any]:
 
     def bar(material: str, a: float, b: float) -> dict[str, Any]:
         shape = {"kind": "bar", "between": [at(a, 0, 0), at(b, 0, 0)], "width": 0.02, "thickness": 0.02}
-        mesh = {"elements": ELEMENTS[fidelity]}
-        return {"fidelity": fidelity, "material": material, "shape": shape, "mesh": mesh}
+        mesh = {"elements": ELEMENTS[model]}
+        return {"model": model, "material": material, "shape": shape, "mesh": mesh}
 
     return {
         "materials": {"plain": STEEL, "stiffer": {**STEEL, "youngs_modulus": ratio * 2e11}},
@@ -74,7 +74,7 @@ def four_bar(link: str, ratio: float, **analysis: Any) -> dict[str, Any]:
     return raw | {"output": {"plots": False, "picture": False, "csv": False}}
 
 
-def corotational(stiff: str, fidelity: str, direction: str, ratio: float) -> dict[str, Any]:
+def corotational(stiff: str, model: str, direction: str, ratio: float) -> dict[str, Any]:
     """A four-bar with co-rotational frames, one of its links stiffer, moved by one turn from rest to rest."""
     corners = {"A": (0.0, 0.0, 0.0), "B": (0.1, 0.0, 0.0), "C": (0.2, 0.3, 0.0), "D": (0.4, 0.0, 0.0)}
     at = {name: oriented(direction, *x) for name, x in corners.items()}
@@ -86,10 +86,10 @@ def corotational(stiff: str, fidelity: str, direction: str, ratio: float) -> dic
         shape = {"kind": "bar", "between": [at[x] for x in ends[name]], "width": 0.02, "thickness": 0.02}
         material = "stiffer" if name == stiff else "plain"
         return {
-            "fidelity": fidelity,
+            "model": model,
             "material": material,
             "shape": shape,
-            "mesh": {"elements": ELEMENTS[fidelity]},
+            "mesh": {"elements": ELEMENTS[model]},
         }
 
     return {
@@ -142,8 +142,8 @@ def honest(runs: list[Ran], reference: Ran) -> None:
 
 def test_links_of_one_stiffness_lose_nothing_worth_telling() -> None:
     """And their rigid motions are what they take without force."""
-    for fidelity, direction in (("beam", "z"), ("beam", "oblique"), ("plane", "z"), ("solid", "oblique")):
-        run = ran(welded(fidelity, direction, 1.0))
+    for model, direction in (("beam", "z"), ("beam", "oblique"), ("plane", "z"), ("solid", "oblique")):
+        run = ran(welded(model, direction, 1.0))
         for link in run.ready.model.links:
             every = rigid_modes(link)
             scale = np.abs(link.K0).max() * np.abs(every).max()
@@ -172,7 +172,7 @@ def test_a_share_of_the_budget_with_the_link_and_what_to_do() -> None:
     (said,) = budget_warning(Budget((share,)))
     assert "most of it from the rounding" in said
     assert "link coupler is so stiff" in said
-    assert 'fidelity = "rigid"' in said
+    assert 'model = "rigid"' in said
 
 
 def test_a_run_that_rounding_makes_meaningless_is_doubtful(tmp_path: Path) -> None:
@@ -186,12 +186,12 @@ def test_a_run_that_rounding_makes_meaningless_is_doubtful(tmp_path: Path) -> No
 
 @pytest.mark.long
 @pytest.mark.parametrize("direction", ["x", "y", "z", "oblique"])
-@pytest.mark.parametrize("fidelity", ["beam", "plane", "solid"])
-def test_a_stiff_link_of_each_kind_in_each_direction(fidelity: str, direction: str) -> None:
-    if fidelity == "plane" and direction != "z":
+@pytest.mark.parametrize("model", ["beam", "plane", "solid"])
+def test_a_stiff_link_of_each_kind_in_each_direction(model: str, direction: str) -> None:
+    if model == "plane" and direction != "z":
         pytest.skip("plane links lie in xy")
-    runs = [ran(welded(fidelity, direction, each)) for each in (1e7, 3e7, 1e8)]
-    honest(runs, ran(welded(fidelity, direction, BASE)))
+    runs = [ran(welded(model, direction, each)) for each in (1e7, 3e7, 1e8)]
+    honest(runs, ran(welded(model, direction, BASE)))
 
 
 @pytest.mark.long
@@ -202,23 +202,23 @@ def test_a_stiff_link_and_the_literal_solver() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stiff", "fidelity", "direction"),
+    ("stiff", "model", "direction"),
     [
         ("rocker", "beam", "z"),
         *(
-            pytest.param(stiff, fidelity, direction, marks=pytest.mark.long)
+            pytest.param(stiff, model, direction, marks=pytest.mark.long)
             for stiff in ("crank", "coupler", "rocker")
-            for fidelity in ("beam", "plane", "solid")
+            for model in ("beam", "plane", "solid")
             for direction in DIRECTIONS
-            if (stiff, fidelity, direction) != ("rocker", "beam", "z")
-            and (fidelity != "plane" or direction == "z")
+            if (stiff, model, direction) != ("rocker", "beam", "z")
+            and (model != "plane" or direction == "z")
             and (stiff == "coupler" or direction not in {"x", "y"})
         ),
     ],
 )
-def test_a_stiff_link_with_co_rotational_frames(stiff: str, fidelity: str, direction: str) -> None:
-    runs = [ran(corotational(stiff, fidelity, direction, each)) for each in (1e6, 1e7)]
-    honest(runs, ran(corotational(stiff, fidelity, direction, 1e4)))
+def test_a_stiff_link_with_co_rotational_frames(stiff: str, model: str, direction: str) -> None:
+    runs = [ran(corotational(stiff, model, direction, each)) for each in (1e6, 1e7)]
+    honest(runs, ran(corotational(stiff, model, direction, 1e4)))
 
 
 def test_links_of_one_stiffness_with_co_rotational_frames_lose_nothing_worth_telling() -> None:

@@ -41,7 +41,7 @@ ARM = """
 A = [0, 0]
 B = ["300 mm", 0]
 [links.arm]
-fidelity = "beam"
+model = "beam"
 material = "steel"
 shape = { kind = "bar", between = ["A", "B"], width = 0.01, thickness = 0.01 }
 [joints.A]
@@ -212,7 +212,7 @@ def test_a_scene_from_records_is_the_scene_from_its_file(tmp_path):
         points={"A": A, "B": B},
         links={
             "arm": LinkScene(
-                fidelity="beam", material="steel", shape=Bar(between=(A, B), width=0.01, thickness=0.01)
+                model="beam", material="steel", shape=Bar(between=(A, B), width=0.01, thickness=0.01)
             )
         },
         joints={"A": Joint(kind="revolute", links=("ground", "arm"), at=A)},

@@ -101,15 +101,13 @@ def test_a_body_is_carried_by_its_own_links_hinge() -> None:
     assert {link.name for link in model.links} == {"crank", "rod"}
 
 
-@pytest.mark.parametrize("fidelity", ["solid", "plane"])
-def test_a_node_of_a_domed_face_stands_for_the_whole_face(fidelity: str) -> None:
+@pytest.mark.parametrize("kind", ["solid", "plane"])
+def test_a_node_of_a_domed_face_stands_for_the_whole_face(kind: str) -> None:
     """Where facets of a curved face meet, each lies in its own corners' plane; none of them is a flat face."""
     dome = {"via": [0.105, 0.03], "to": [0.1, 0.06]}
     shape = {"kind": "extrusion", "thickness": 0.02, "outline": [[0, 0], [0.1, 0], dome, [0, 0.06]]}
     raw = {
-        "links": {
-            "part": {"fidelity": fidelity, "material": "steel", "shape": shape, "mesh": {"size": 0.01}}
-        },
+        "links": {"part": {"model": kind, "material": "steel", "shape": shape, "mesh": {"size": 0.01}}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0.03]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
         "analysis": {"revolutions": 1},

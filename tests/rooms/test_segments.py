@@ -37,7 +37,7 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEDFEM_CACHE", "off")
 
 
-def bars(elements: int = 6, fidelity: str = "plane", **link: Any) -> dict[str, Any]:
+def bars(elements: int = 6, kind: str = "plane", **link: Any) -> dict[str, Any]:
     """[KED]'s four-bar (Nath and Ghosh 1980) of bars with co-rotational frames, from rest at 600 rpm."""
     raw = four_bar(
         "bar",
@@ -47,9 +47,9 @@ def bars(elements: int = 6, fidelity: str = "plane", **link: Any) -> dict[str, A
         frames="co-rotational",
         reduction_tolerance=0.02,
     )
-    mesh = {"plane": [elements, 1], "solid": [elements, 1, 1], "beam": elements}[fidelity]
+    mesh = {"plane": [elements, 1], "solid": [elements, 1, 1], "beam": elements}[kind]
     for each in raw["links"].values():
-        each |= {"fidelity": fidelity, "mesh": {"elements": mesh}, **link}
+        each |= {"model": kind, "mesh": {"elements": mesh}, **link}
     return raw
 
 
@@ -60,12 +60,12 @@ def ready(raw: dict[str, Any]) -> Prepared:
 # -- reduced ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("fidelity", ["plane", pytest.param("solid", marks=pytest.mark.long)])
-def test_reduced_segments_keep_to_their_tolerance(fidelity: str) -> None:
-    raw = bars(fidelity=fidelity, segments=3)
+@pytest.mark.parametrize("kind", ["plane", pytest.param("solid", marks=pytest.mark.long)])
+def test_reduced_segments_keep_to_their_tolerance(kind: str) -> None:
+    raw = bars(kind=kind, segments=3)
     full = histories(meshed(scene_from(raw)))
     for link in raw["links"].values():
-        link["reduced"] = True
+        link["reduction"] = "modal"
     small, found = prepared(scene_from(raw))
     assert found is not None
     assert worst(found.estimate) <= found.tolerance == 0.02
@@ -77,12 +77,12 @@ def test_reduced_segments_keep_to_their_tolerance(fidelity: str) -> None:
 
 
 def test_the_number_of_functions_is_that_of_each_segment() -> None:
-    model = ready(bars(segments=3, reduced=True, modes=9)).model
+    model = ready(bars(segments=3, reduction=9)).model
     assert [link.n for link in model.links] == 9 * [9]
 
 
 def test_beams_with_frames_that_follow_stay_in_full() -> None:
-    raw = bars(2, "beam", reduced=True)
+    raw = bars(2, "beam", reduction="modal")
     small, found = prepared(scene_from(raw))
     assert found is not None
     assert found.estimate == {}
@@ -90,7 +90,7 @@ def test_beams_with_frames_that_follow_stay_in_full() -> None:
 
 
 def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
-    link = bar(1, fidelity="plane", reduced=True, mesh={"elements": [4, 1]})
+    link = bar(1, model="plane", reduction="modal", mesh={"elements": [4, 1]})
     raw = arm(link, None, analysis={"end_time": 0.1, "step": 0.01})
     with pytest.raises(
         SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"
@@ -100,7 +100,7 @@ def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
 
 def test_functions_go_by_what_their_loss_costs() -> None:
     """As many functions sorted by their own energy leave out far more of the deflections' energy."""
-    full = ready(bars(segments=3, fidelity="solid"))
+    full = ready(bars(segments=3, kind="solid"))
     parts, moments = static_parts(full.model), instants(full.model, _training(full))
     found = bases(full.model, moments, parts)
     for k in (1, 4, 7):  # between two cuts
@@ -168,7 +168,7 @@ def stubby(folder: Path, **link: Any) -> dict[str, Any]:
     probe = {"link": "arm", "at": [0.05, 0], "quantity": "displacement"}
     return {
         "materials": {"soft": soft},
-        "links": {"arm": {"material": "soft", "fidelity": "plane", "frames": "co-rotational", "shape": shape, **link}},
+        "links": {"arm": {"material": "soft", "model": "plane", "frames": "co-rotational", "shape": shape, **link}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "300 rpm"}},
         "loads": {"P": {"kind": "force", "link": "arm", "at": [0.1, 0], "vector": [0, 400], "frame": "link"}},
@@ -196,7 +196,7 @@ def test_slices_shorter_than_their_link_is_wide_are_told(tmp_path: Path) -> None
 
 
 def test_a_link_is_one_row_with_its_number_of_segments(capsys: pytest.CaptureFixture[str]) -> None:
-    found = ready(bars(segments=3, reduced=True, modes=9))
+    found = ready(bars(segments=3, reduction=9))
     table = check_tables(found, None, None)[0]
     assert table.row_count == 3
     Console(width=200).print(table)
@@ -239,7 +239,7 @@ def test_segments_are_drawn_as_one_link_that_holds_together() -> None:
 
 
 def test_reduced_segments_are_the_same_from_a_file() -> None:
-    model = ready(bars(segments=2, reduced=True, modes=9)).model
+    model = ready(bars(segments=2, reduction=9)).model
     packed = stored_model(model)
     assert packed is not None
     again = restored_model(packed)

@@ -138,7 +138,7 @@ def bell_crank(pieces: int) -> dict[str, Any]:
     """Two arms at right angles about the driven node: welded there, or one polyline."""
     corners = [[0.4, 0.0], [0.0, 0.0], [0.0, 0.3]]
     sizes = {"width": 0.03, "thickness": 0.02}
-    beam = {"fidelity": "beam", "material": "steel", "mesh": {"elements": 4}}
+    beam = {"model": "beam", "material": "steel", "mesh": {"elements": 4}}
     names = ["arm"] if pieces == 1 else ["arm", "other"]
     lines = [corners] if pieces == 1 else [corners[:2], corners[1:]]
     raw: dict[str, Any] = {
@@ -183,7 +183,7 @@ def test_a_beam_piston_with_pin_and_guide_at_one_node_is_a_rigid_slider() -> Non
     c = float(np.sqrt(0.3**2 - 0.08**2))
     line = {"kind": "bar", "between": [[c, 0], [c + 0.05, 0]], "width": 0.06, "thickness": 0.06}
     elastic["links"]["piston"] = {
-        "fidelity": "beam",
+        "model": "beam",
         "material": "steel",
         "shape": line,
         "mesh": {"elements": 1},

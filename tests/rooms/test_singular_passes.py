@@ -42,7 +42,7 @@ def falling(
             name: {
                 "material": "steel",
                 "shape": {"kind": "bar", "between": list(p), "width": 0.02, "thickness": 0.01},
-                **({"fidelity": "rigid"} if name in rigid else {"fidelity": "beam", "mesh": {"elements": 1}}),
+                **({"model": "rigid"} if name in rigid else {"model": "beam", "mesh": {"elements": 1}}),
             }
             for name, p in ends.items()
         },

@@ -38,7 +38,7 @@ def four_bar(factor: float = 1.0, **change: Any) -> dict[str, Any]:
 
     def bar(between: list[str]) -> dict[str, Any]:
         shape = {"kind": "bar", "between": between, "width": width, "thickness": thickness}
-        return {"fidelity": "beam", "material": "mine", "shape": shape}
+        return {"model": "beam", "material": "mine", "shape": shape}
 
     def hinge(at: str, *links: str) -> dict[str, Any]:
         return {"kind": "revolute", "links": list(links), "at": at}

@@ -52,7 +52,7 @@ def rssr_of_beams(R: np.ndarray | None = None, **analysis: Any) -> dict[str, Any
     return {
         "links": {
             name: {
-                "fidelity": "beam",
+                "model": "beam",
                 "material": "aluminium",
                 "mesh": {"elements": 2},
                 "shape": {
@@ -173,7 +173,7 @@ def test_beams_and_solids_in_one_linkage(beams: tuple[str, ...], kind: str) -> N
         raw["drive"]["motion"]["speed"] = "60 rpm"
         raw["damping"] = {"alpha": 5, "beta": 1e-4}
         for link in raw["links"].values():
-            link["mesh"] = {"elements": 4 if link.get("fidelity") else [12, 2, 2]}
+            link["mesh"] = {"elements": 4 if link.get("model") else [12, 2, 2]}
     _, wanted = middles(alone)
     kinds, got = middles(mixed)
     assert kinds == {"solid", "beam" if kind == "planar" else "spatial_beam"}
@@ -213,7 +213,7 @@ def test_a_beam_welded_to_a_spatial_beam_or_a_solid_is_spatial() -> None:
     assert spatial_beams(scene_from(raw)) == set()
     raw["links"]["tip"]["beam"] = "spatial"
     assert spatial_beams(scene_from(raw)) == {"arm", "tip"}
-    raw["links"]["tip"] |= {"fidelity": "solid", "mesh": {"elements": [4, 1, 1]}}
+    raw["links"]["tip"] |= {"model": "solid", "mesh": {"elements": [4, 1, 1]}}
     del raw["links"]["tip"]["beam"]
     assert spatial_beams(scene_from(raw)) == {"arm"}
     model, _, _ = run(raw)  # and the weld finds its coupling surfaces: the solid's end face, the beam's end

@@ -252,11 +252,11 @@ def test_files_are_read_back_alike(ending: str, tmp_path: Path) -> None:
 def test_loads_on_what_the_drive_holds_are_named(tmp_path: Path) -> None:
     """A rigid crank that the drive carries takes a load to the drive: nothing moves."""
     raw = scene_of(Cell("revolute", "rigid-body", True, "planar beams"))
-    raw["links"]["crank"] |= {"fidelity": "rigid", "mesh": {"elements": [1, 1, 1]}}
+    raw["links"]["crank"] |= {"model": "rigid", "mesh": {"elements": [1, 1, 1]}}
     name = next(x for x in raw["links"] if x != "crank")
     at = raw["joints"]["J"]["at"]
     raw["output"] = {"probes": {"p": {"link": name, "at": at, "quantity": "displacement"}}}
-    if raw["links"][name]["fidelity"] == "rigid":
+    if raw["links"][name]["model"] == "rigid":
         pytest.fail("the other link bends")
     _, warnings = state_space(scene_from(raw, tmp_path), 2)
     assert warnings == (

@@ -45,8 +45,8 @@ def mixed() -> dict[str, Any]:
     raw = four_bar("bar", revolutions=0.25, steps_per_revolution=120)
     for link in raw["links"].values():
         link["mesh"] = {"elements": [3, 1, 1]}
-    raw["links"]["crank"] |= {"fidelity": "beam", "mesh": {"elements": 3}}
-    raw["links"]["coupler"] |= {"fidelity": "plane", "mesh": {"elements": [3, 1]}}
+    raw["links"]["crank"] |= {"model": "beam", "mesh": {"elements": 3}}
+    raw["links"]["coupler"] |= {"model": "plane", "mesh": {"elements": [3, 1]}}
     return raw
 
 

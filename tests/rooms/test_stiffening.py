@@ -180,7 +180,7 @@ def test_a_step_takes_few_passes() -> None:
 def test_where_stiffening_is_no_small_term_the_run_ends_and_says_so(kind: str) -> None:
     """A thin arm that turns fast, in steps far too long: what is done is kept."""
     shape = {"kind": "bar", "between": ["A", "B"], "width": 0.002, "thickness": 0.002}
-    arm = {"material": "steel", "fidelity": "beam", "shape": shape, "mesh": {"elements": 6}}
+    arm = {"material": "steel", "model": "beam", "shape": shape, "mesh": {"elements": 6}}
     arm |= {"beam": "spatial"} if kind == "spatial" else {}
     raw = {
         "points": {"A": [0, 0], "B": [1, 0]},
@@ -209,7 +209,7 @@ def test_reduced_links_are_stiffened_as_full_ones_are() -> None:
     raw = stiff(four_bar("bar", revolutions=0.5, steps_per_revolution=240, initial="quasi-static"))
     full = histories(meshed(scene_from(raw)))
     for link in raw["links"].values():
-        link["reduced"] = True
+        link["reduction"] = "modal"
     ready, _ = prepared(scene_from(raw))
     assert all(link.full is not None for link in ready.model.links)
     assert worst(relative_errors(histories(ready), full)) < 2e-3
@@ -238,7 +238,7 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
         "materials": {"m": {"density": 1000, "youngs_modulus": 1e9, "poisson_ratio": 0.0}},
         "links": {
             "arm": {
-                "material": "m", "fidelity": "beam", "beam": beam, "shape": shape, "mesh": {"elements": 6}
+                "material": "m", "model": "beam", "beam": beam, "shape": shape, "mesh": {"elements": 6}
             }
         },
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A", "axis": [0, 0, 1]}},

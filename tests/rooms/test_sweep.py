@@ -32,7 +32,7 @@ QUICK = Asked(quick=True)
 
 def arm(**analysis: Any) -> dict[str, Any]:
     return scenes.arm(
-        bar("=L", W, W, fidelity="beam", mesh={"elements": 2}),
+        bar("=L", W, W, model="beam", mesh={"elements": 2}),
         constant_speed("200 rpm"),
         parameters={"L": L},
         materials={"steel": material(RHO, 2.1e11)},
@@ -305,7 +305,7 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
 
 def reduced_four_bar() -> dict[str, Any]:
     """Of plane links that are reduced, with a load that does not grow with the speed."""
-    link = bar(fidelity="plane", reduced=True, mesh={"elements": [8, 1]})
+    link = bar(model="plane", reduction="modal", mesh={"elements": [8, 1]})
     return {
         **scenes.four_bar((0.1, 0.3, 0.25, 0.3), link, constant_speed("300 rpm")),
         "damping": {"beta": 1e-5},

@@ -35,19 +35,19 @@ from tests.scenes import arm, bar
 ARM = """
 gravity = [0, -9.81]
 [links.arm]
-fidelity = "beam"
+model = "beam"
 material = "aluminium"
 shape = { kind = "bar", between = [[0, 0], [0.6, 0]], width = 0.01, thickness = 0.02 }
 mesh = { elements = 2 }
 [links.shoe]
-fidelity = "rigid"
+model = "rigid"
 mass = 0.3
 [joints.A]
 kind = "revolute"
 links = ["ground", "crank"]
 at = [0, 0.2]
 [links.crank]
-fidelity = "rigid"
+model = "rigid"
 material = "steel"
 shape = { kind = "polyline", points = [[0, 0.2], [0, 0]], width = 0.01, thickness = 0.02 }
 [joints.B]
@@ -154,10 +154,10 @@ def test_links_start_with_velocities_that_close_the_joints() -> None:
     np.testing.assert_allclose(B @ z, held, atol=1e-12)
 
 
-@pytest.mark.parametrize("fidelity", ["beam", "plane", "solid", "rigid"])
-def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
+@pytest.mark.parametrize("kind", ["beam", "plane", "solid", "rigid"])
+def test_the_energy_at_the_start_is_that_of_a_rigid_bar(kind: str) -> None:
     """½ J ω² of a bar about its end, J = m (4 L² + h²)/12."""
-    raw = arm(bar(0.6, 0.03, 0.02, fidelity=fidelity) | {"material": "aluminium"}, None)
+    raw = arm(bar(0.6, 0.03, 0.02, model=kind) | {"material": "aluminium"}, None)
     raw["analysis"] = {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}}
     ready = meshed(scene_from(raw))
     rates, links = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
@@ -168,7 +168,7 @@ def test_the_energy_at_the_start_is_that_of_a_rigid_bar(fidelity: str) -> None:
 
 def test_a_scene_without_any_joint_can_be_built() -> None:
     raw = {
-        "links": {"arm": bar(1, 0.03, 0.02, fidelity="beam", mesh={"elements": 3})},
+        "links": {"arm": bar(1, 0.03, 0.02, model="beam", mesh={"elements": 3})},
         "analysis": {"end_time": 1, "step": 0.01,
                      "initial_motions": {"arm": {"at": [0.5, 0], "velocity": [1, 2], "angular_velocity": [0, 0, 30]}}},
     }  # fmt: skip

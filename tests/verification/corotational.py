@@ -32,7 +32,7 @@ def slender(elements: int, radius: float, nodes: int = 3) -> tuple[dict[str, Any
     second = area * radius**2
     section = {"kind": "constants", "area": area, "second_moment_width": second, "second_moment_thickness": second,
                "torsion_constant": 2 * second, "width": side, "thickness": side}  # fmt: skip
-    link = {"material": "m", "fidelity": "beam", "beam": "planar", "element": f"beam{nodes}",
+    link = {"material": "m", "model": "beam", "beam": "planar", "element": f"beam{nodes}",
             "shear_coefficient": 1.0, "mesh": {"elements": elements},
             "shape": {"kind": "polyline", "points": [[0, 0], [1, 0]], "section": section}}  # fmt: skip
     return {**SLENDER, "youngs_modulus": 1000.0 / radius**2}, link
@@ -43,7 +43,7 @@ def bar(length: float, height: float, thickness: float, elements: int, nodes: in
     shape = {"kind": "bar", "between": [[0, 0], [length, 0]], "width": height, "thickness": thickness}
     return {
         "material": "m",
-        "fidelity": "beam",
+        "model": "beam",
         "element": f"beam{nodes}",
         "shape": shape,
         "mesh": {"elements": elements},
@@ -91,7 +91,7 @@ def elastica() -> list[Row]:
 @case("Elastica: a full circle", "end moment 2π EI/L", long=True)
 def circle() -> list[Row]:
     """A motor between the tip and a light disc of great inertia, which takes the moment; loaded slowly, with damping."""
-    disc = {"fidelity": "rigid", "material": "light",
+    disc = {"model": "rigid", "material": "light",
             "shape": {"kind": "polyline", "points": [[1, 0], [1.1, 0]], "width": 0.001, "thickness": 0.001}}  # fmt: skip
     wheel = {"kind": "rigid_body", "link": "disc", "at": [1, 0], "mass": 1e-6, "centre": [1, 0],
              "inertia": [1e4, 1e4, 1e4, 0, 0, 0]}  # fmt: skip
@@ -165,7 +165,7 @@ def spun_up(h: float) -> Ran:
     angle = np.where(t < T, 6 / T * (t * t / 2 + (np.cos(k * t) - 1) / k**2), 6 * t - 45)
     section = {"kind": "constants", "area": 1.0, "second_moment_width": 5e-4, "second_moment_thickness": 5e-4,
                "torsion_constant": 1e-3, "width": 0.0775, "thickness": 0.0775}  # fmt: skip
-    link = {"material": "m", "fidelity": "beam", "element": "beam5", "shear_coefficient": 1.0, "mesh": {"elements": 4},
+    link = {"material": "m", "model": "beam", "element": "beam5", "shear_coefficient": 1.0, "mesh": {"elements": 4},
             "beam": "planar", "shape": {"kind": "polyline", "points": [[0, 0], [10, 0]], "section": section}}  # fmt: skip
     return ran({
         "materials": {"m": {"density": 1.2, "youngs_modulus": 2.8e7, "shear_modulus": 1e7}},
@@ -272,10 +272,10 @@ STEEL = {"density": 7850.0, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}
 SIDE = 0.03
 
 
-def swinging(fidelity: str, h: float) -> Ran:
-    link = bar(1.0, SIDE, SIDE, 4) | {"fidelity": fidelity}
-    if fidelity == "rigid":
-        link = {key: link[key] for key in ("material", "shape", "fidelity")}
+def swinging(model: str, h: float) -> Ran:
+    link = bar(1.0, SIDE, SIDE, 4) | {"model": model}
+    if model == "rigid":
+        link = {key: link[key] for key in ("material", "shape", "model")}
     return ran({
         "gravity": [0, -9.81],
         "materials": {"m": STEEL},
@@ -286,9 +286,9 @@ def swinging(fidelity: str, h: float) -> Ran:
 
 
 @cache
-def period(fidelity: str, h: float) -> float:
+def period(model: str, h: float) -> float:
     """From one passage through the vertical to the next but one."""
-    made = swinging(fidelity, h)
+    made = swinging(model, h)
     tip = made.position("rod", [1, 0])[:, 0]
     k = np.flatnonzero(tip[:-1] * tip[1:] < 0)
     # cubic through the passage
@@ -317,7 +317,7 @@ def pendulum() -> list[Row]:
 @cache
 def twice(h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The double pendulum of rigid rods: t, angles from the vertical (T, 2), energy; rods from the horizontal."""
-    rod = {"material": "m", "fidelity": "rigid"}
+    rod = {"material": "m", "model": "rigid"}
     made = ran({
         "gravity": [0, -9.81],
         "materials": {"m": STEEL},

@@ -29,7 +29,7 @@ def four_bar(analysis: dict[str, Any], link: dict[str, Any], **changes: Any) -> 
     raw["analysis"] = {"initial": "quasi-static", **analysis}
     for each in raw["links"].values():
         each.update(link)
-    if link.get("fidelity") == "solid":
+    if link.get("model") == "solid":
         for each in raw["links"].values():
             each["element"] = "hex27"
     return scene_from(raw | changes, SCENE.parent)
@@ -116,7 +116,7 @@ def solids() -> list[Row]:
     and the curves run apart with the turns."""
     scene = four_bar(
         {"revolutions": 1, "steps_per_revolution": 720},
-        {"fidelity": "solid", "mesh": {"elements": [16, 2, 1]}},
+        {"model": "solid", "mesh": {"elements": [16, 2, 1]}},
     )
     _, (curve,) = histories(scene, STRESS)
     error = difference(curve[:, 0] / 1e6, stress(16, 720)[:721])

@@ -134,13 +134,13 @@ CHANNELS = {
 
 
 @cache
-def four_bar(fidelity: str, thickness: float) -> list[np.ndarray]:
+def four_bar(kind: str, thickness: float) -> list[np.ndarray]:
     """Channels of the example's four-bar over a turn of 90 steps at 150 rpm, on the same quadrilaterals."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
     raw["analysis"] |= {"revolutions": 1, "steps_per_revolution": 90}
     for link in raw["links"].values():
-        link["fidelity"], link["shape"]["thickness"] = fidelity, thickness
-        link["element"] = {"plane": "quad9", "solid": "hex27"}[fidelity]
+        link["model"], link["shape"]["thickness"] = kind, thickness
+        link["element"] = {"plane": "quad9", "solid": "hex27"}[kind]
     return histories(scene_from(raw, SCENE.parent), *CHANNELS.values())[1]
 
 

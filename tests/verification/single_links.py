@@ -91,7 +91,7 @@ def tapered_link() -> list[Row]:
         "links": {
             "membrane": {
                 "material": "m",
-                "fidelity": "plane",
+                "model": "plane",
                 "shape": {"kind": "extrusion", "outline": outline, "thickness": 0.05},
                 "mesh": {"size": 0.5},
             }
@@ -111,7 +111,7 @@ def hinged_beam() -> list[Row]:
     """Bending modes are those of the test; hinges at both ends hold the beam along its axis too, √(E/ρ)/2L."""
     hinge = {"kind": "revolute", "links": ["ground", "bar"]}
     joints = {"left": hinge | {"at": [0, 0]}, "right": hinge | {"at": [10, 0]}}
-    part = of_bar(10.0, 2.0, joints, fidelity="beam", mesh={"elements": 40})
+    part = of_bar(10.0, 2.0, joints, model="beam", mesh={"elements": 40})
     targets = [*BENDING[:2], 250.0, BENDING[2]]
     names = ["bending 1", "bending 2", "axial 1", "bending 3"]
     return rows(names, targets, found(part, 4), 1e-5, text(part))
@@ -145,10 +145,10 @@ def free_timoshenko(near: float, length: float = 10.0) -> float:
 @case("Deep beam free at both ends", "Timoshenko's equations, transfer matrix; slender: Euler and Bernoulli")
 def free_beam() -> list[Row]:
     """FV5's beam without supports, and one 1,000 times as long as thick, cos kL cosh kL = 1."""
-    deep = of_bar(10.0, 2.0, {}, fidelity="beam", mesh={"elements": 40})
+    deep = of_bar(10.0, 2.0, {}, model="beam", mesh={"elements": 40})
     got = found(deep, 2)
     exact = [free_timoshenko(float(f)) for f in got]
-    slender = of_bar(1.0, 1e-3, {}, fidelity="beam", mesh={"elements": 40})
+    slender = of_bar(1.0, 1e-3, {}, model="beam", mesh={"elements": 40})
     kL = np.array([4.7300407449, 7.8532046241, 10.995607838])
     euler = kL**2 * np.sqrt(200e9 * 1e-6 / 12 / 8000) / (2 * np.pi)
     names = [f"slender, bending {k}" for k in (1, 2, 3)]

@@ -220,7 +220,7 @@ def turning_scene(mu: float, beam: str, force: list[float], stiffening: bool = T
     unit = np.sqrt(RUBBER.youngs_modulus * HEIGHT**2 / 12 / RUBBER.density) / LENGTH**2
     period = 2 * np.pi / (unit * np.hypot(3.5, mu if beam == "spatial" else 0.3 * mu))
     shape = {"kind": "bar", "between": ["A", "B"], "width": HEIGHT, "thickness": HEIGHT}
-    link = {"material": "m", "fidelity": "beam", "beam": beam, "shape": shape, "mesh": {"elements": 6}}
+    link = {"material": "m", "model": "beam", "beam": beam, "shape": shape, "mesh": {"elements": 6}}
     return scene_from(
         {
             "materials": {"m": {"density": 1000, "youngs_modulus": 1e9, "poisson_ratio": 0.0}},

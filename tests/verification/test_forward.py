@@ -21,15 +21,15 @@ FIDELITIES = ["rigid", "beam"]
 Run = tuple[np.ndarray, dict[str, np.ndarray], Account]
 
 
-def bar(fidelity: str, x: float = 0.0) -> dict[str, Any]:
-    link = scenes.bar(LENGTH, WIDTH, THICKNESS, fidelity=fidelity)
+def bar(model: str, x: float = 0.0) -> dict[str, Any]:
+    link = scenes.bar(LENGTH, WIDTH, THICKNESS, model=model)
     link["shape"]["between"] = [[x, 0], [x + LENGTH, 0]]
     return link
 
 
-def arm(fidelity: str, end_time: float, step: float, **more: Any) -> dict[str, Any]:
+def arm(model: str, end_time: float, step: float, **more: Any) -> dict[str, Any]:
     analysis = {"end_time": end_time, "step": step, **more.pop("analysis", {})}
-    return scenes.arm(bar(fidelity), None, analysis=analysis, **more)
+    return scenes.arm(bar(model), None, analysis=analysis, **more)
 
 
 def ran(raw: dict[str, Any]) -> Run:
@@ -49,44 +49,44 @@ def order(errors: list[float]) -> float:
     return float(np.log2(errors[-2] / errors[-1]))
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_a_compound_pendulum_swings_as_elliptic_integrals_say(fidelity: str) -> None:
+@pytest.mark.parametrize("model", FIDELITIES)
+def test_a_compound_pendulum_swings_as_elliptic_integrals_say(model: str) -> None:
     """From rest level with its pin: the period is 4 K(sin 45°) √(J / (m g L/2)); it is back after one."""
     g = 9.81
     period = 4 * ellipk(0.5) * np.sqrt(INERTIA / (MASS * g * LENGTH / 2))
     errors = []
     for steps in (200, 400):
-        t, x, _ = ran(arm(fidelity, 1.25 * period, period / steps, gravity=[0, -g]))
+        t, x, _ = ran(arm(model, 1.25 * period, period / steps, gravity=[0, -g]))
         rate = np.gradient(x["joints/A/angle"], t)
         back = np.flatnonzero((rate[:-1] > 0) & (rate[1:] <= 0))[-1]  # where it turns, after a whole swing
         found = t[back] + (t[1] - t[0]) * rate[back] / (rate[back] - rate[back + 1])
         errors.append(abs(found / period - 1))
         assert x["joints/A/angle"].min() == pytest.approx(-np.pi, rel=2e-3)
     assert errors[-1] < 2e-4
-    if fidelity == "rigid":  # a beam vibrates from its start, which hides where it turns to 1e-4
+    if model == "rigid":  # a beam vibrates from its start, which hides where it turns to 1e-4
         assert order(errors) > 1.5
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(fidelity: str) -> None:
+@pytest.mark.parametrize("model", FIDELITIES)
+def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(model: str) -> None:
     """T = T0 (1 − ω/ω0): ω = ω0 (1 − exp(−t/τ)), τ = J ω0 / T0; from the other end of the joint's links alike."""
     T0, w0 = 5.0, 40.0
     tau = INERTIA * w0 / T0
     errors = []
     for steps in (500, 1000):
         motor = {"joint": "A", "torque": {"over": "speed", "at": [0, w0], "value": [T0, 0]}}
-        t, x, account = ran(arm(fidelity, 2 * tau, tau / steps, motors={"m": motor}))
+        t, x, account = ran(arm(model, 2 * tau, tau / steps, motors={"m": motor}))
         turned = w0 * (t - tau * (1 - np.exp(-t / tau)))
         errors.append(float(np.abs(x["motors/m/angle"] - turned).max()) / turned[-1])
     assert errors[-1] < 1e-3
-    if fidelity == "rigid":  # a beam vibrates from the sudden torque, which hides the order
+    if model == "rigid":  # a beam vibrates from the sudden torque, which hides the order
         assert order(errors) > 1.5
     assert x["motors/m/speed"][-1] == pytest.approx(w0 * (1 - np.exp(-2)), rel=1e-3)
     assert account.balance.energy < 2e-3
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_an_arm_on_a_torsion_spring_rings_down(fidelity: str) -> None:
+@pytest.mark.parametrize("model", FIDELITIES)
+def test_an_arm_on_a_torsion_spring_rings_down(model: str) -> None:
     """J φ'' + c φ' + k (φ − φ0) = 0 from φ = φ' = 0."""
     k, zeta, free = 20.0, 0.1, 0.6
     w = np.sqrt(k / INERTIA)
@@ -94,17 +94,17 @@ def test_an_arm_on_a_torsion_spring_rings_down(fidelity: str) -> None:
     spring = {"kind": "torsion", "joint": "A", "stiffness": k, "damping": c, "free_angle": free}
     errors = []
     for steps in (200, 400):
-        t, x, _ = ran(arm(fidelity, 3 * 2 * np.pi / w, 2 * np.pi / w / steps, springs={"s": spring}))
+        t, x, _ = ran(arm(model, 3 * 2 * np.pi / w, 2 * np.pi / w / steps, springs={"s": spring}))
         wd = w * np.sqrt(1 - zeta**2)
         expected = free * (1 - np.exp(-zeta * w * t) * (np.cos(wd * t) + zeta * w / wd * np.sin(wd * t)))
         errors.append(float(np.abs(x["joints/A/angle"] - expected).max()) / free)
     assert errors[-1] < 1e-3
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_an_arm_set_going_coasts(fidelity: str) -> None:
+@pytest.mark.parametrize("model", FIDELITIES)
+def test_an_arm_set_going_coasts(model: str) -> None:
     """No force about the pin: ω stays as at the start, and the kinetic energy with it."""
-    t, x, _ = ran(arm(fidelity, 1.0, 0.002, analysis={"initial_speeds": {"A": "60 rpm"}}))
+    t, x, _ = ran(arm(model, 1.0, 0.002, analysis={"initial_speeds": {"A": "60 rpm"}}))
     # the error of a step: (ω h)²/12 = 1.3e-5, and as much again from the deformation
     np.testing.assert_allclose(x["joints/A/angle"], 2 * np.pi * t, rtol=1e-4, atol=1e-12)
     np.testing.assert_allclose(x["energy/kinetic"], 0.5 * INERTIA * (2 * np.pi) ** 2, rtol=2e-4)

@@ -32,7 +32,7 @@ def spatial(factor: float) -> Any:
     for name, link in raw["links"].items():
         link["material"] = "alloy"
         if name != "cross":
-            link |= {"fidelity": "beam", "mesh": {"elements": 2}}
+            link |= {"model": "beam", "mesh": {"elements": 2}}
     analysis = {"revolutions": 0.25, "steps_per_revolution": 720, "initial": "quasi-static"}
     return scene_from({**raw, "materials": alloy(factor), "drive": SLOW, "analysis": analysis, "damping": {}})
 

@@ -72,14 +72,12 @@ def open_beams(scene: Scene) -> list[str]:
 
 def beams_only(scene: Scene) -> bool:
     """Whether all links with a shape are beams or rigid."""
-    return all(
-        link.family == "beam" or link.fidelity == "rigid" for link in scene.links.values() if link.shape
-    )
+    return all(link.family == "beam" or link.model == "rigid" for link in scene.links.values() if link.shape)
 
 
 def elastic(link: LinkScene, family: str) -> bool:
     """Whether a link is elastic and of a family, stated so."""
-    return link.shape is not None and link.fidelity not in {"rigid", "auto"} and link.family == family
+    return link.shape is not None and link.model not in {"rigid", "auto"} and link.family == family
 
 
 def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:

@@ -145,7 +145,7 @@ REMEDIES = {
     "excites vibration beyond any step needs a smoother one, or damping",
     "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",
     "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
-    "rounding": 'links that are much stiffer than all others as fidelity = "rigid"',
+    "rounding": 'links that are much stiffer than all others as model = "rigid"',
 }  # fmt: skip
 
 

@@ -35,7 +35,7 @@ def with_fillets(scene: Scene, asked: float) -> Scene:
         name: filleted(link, float(angle))
         for name, link in scene.links.items()
         if isinstance(link.shape, Cad | Extrusion | Part)
-        and link.fidelity != "rigid"
+        and link.model != "rigid"
         and "mesh" not in link.model_fields_set
     }
     return with_links(scene, links) if links else scene
@@ -49,8 +49,7 @@ def open_modes(scene: Scene) -> list[str]:
     return [
         name
         for name, link in scene.links.items()
-        if (elastic(link, "solid") or elastic(link, "plane"))
-        and not link.model_fields_set & {"reduced", "modes"}
+        if (elastic(link, "solid") or elastic(link, "plane")) and not link.model_fields_set & {"reduction"}
     ]
 
 
@@ -106,5 +105,5 @@ def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
         f"{', '.join(names)}: reduced, as {steps:,} steps of {unknowns:,} unknowns would take long; the run tells what "
         "that costs"
     )
-    links = {name: scene.links[name].model_copy(update={"reduced": True}) for name in names}
+    links = {name: scene.links[name].model_copy(update={"reduction": "modal"}) for name in names}
     return with_links(scene, links)

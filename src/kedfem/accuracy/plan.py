@@ -43,7 +43,7 @@ from kedfem.store import itself, kept
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with co-rotational frames leave their number open
 VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
-FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose fidelity is open
+FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose model is open
 ROUGH = "beam5", 2  # elements of beams where the first step of a motion without a drive is looked for
 MESH_ORDER = (
     2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
@@ -113,12 +113,12 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
 
 def anything_open(scene: Scene) -> bool:
     """Whether a scene leaves something for an accuracy to choose."""
-    auto = any(link.fidelity == "auto" for link in scene.links.values())
+    auto = any(link.model == "auto" for link in scene.links.values())
     return auto or any(f(scene) for f in (open_frames, open_beams, open_meshes, open_step, open_segments))
 
 
 def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
-    """Choose fidelities, mesh sizes, modes, frames and step of a scene with `analysis.accuracy`.
+    """Choose models, mesh sizes, modes, frames and step of a scene with `analysis.accuracy`.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
     search = Trials(asked, stage)
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)
-    left_open = [name for name, link in scene.links.items() if link.fidelity == "auto"]
+    left_open = [name for name, link in scene.links.items() if link.model == "auto"]
     functions = open_modes(scene)
     scene = _opened(scene, left_open)
     shares: list[Share] = []
@@ -210,7 +210,7 @@ def _limits(plan: Plan) -> Iterator[str]:
 
 
 def _opened(scene: Scene, left_open: list[str]) -> Scene:
-    """Links that leave their fidelity open as the best that their shape allows, reduced."""
+    """Links that leave their model open as the best that their shape allows, reduced."""
     links = {
         name: _remeshed(
             scene.links[name], of_family(scene.links[name], families(scene.links[name])[-1], True)
@@ -221,7 +221,7 @@ def _opened(scene: Scene, left_open: list[str]) -> Scene:
 
 
 def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
-    """Another fidelity of a link with the mesh that the link states, if it does."""
+    """Another model of a link with the mesh that the link states, if it does."""
     keep: dict[str, Any] = {
         key: getattr(link, key) for key in ("mesh", "element") if key in link.model_fields_set
     }
@@ -231,7 +231,7 @@ def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
 def _with_mesh(
     search: Trials, scene: Scene, left_open: list[str], allowed: float
 ) -> tuple[Scene, float, float]:
-    """The scene with the coarsest mesh of links whose fidelity is open whose error is allowed, that error, and by what
+    """The scene with the coarsest mesh of links whose model is open whose error is allowed, that error, and by what
     it is finer.
     """
     open_links = [
@@ -280,7 +280,7 @@ def _with_simpler_links(
             except SceneError:  # such a model makes no sense, as one without any elastic link
                 continue
             except KedfemError as fault:
-                search.notes.append(f"{name}: not {simpler.fidelity}, {str(fault).splitlines()[0]}")
+                search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
                 continue
             verdict = "taken" if change <= allowed else "left out"
             search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
@@ -291,7 +291,7 @@ def _with_simpler_links(
 
 
 def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
-    """Simpler fidelities of a link, simplest first."""
+    """Simpler models of a link, simplest first."""
     for family in families(link)[:-1]:
         other = of_family(link, family, reduced=True)
         if family == "beam":
@@ -300,4 +300,4 @@ def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
 
 
 def _noun(link: LinkScene) -> str:
-    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.fidelity, "a solid")
+    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.category, "a solid")

@@ -147,7 +147,7 @@ class Rounding:
             "rounding",
             dict.fromkeys(kinds, self.relative),
             how,
-            f'{how}; take fidelity = "rigid" for it, or its true stiffness and larger elements',
+            f'{how}; take model = "rigid" for it, or its true stiffness and larger elements',
         )
 
 

@@ -21,7 +21,7 @@ def open_segments(scene: Scene) -> list[str]:
     """Names of the links whose number of segments the scene leaves open."""
     return [
         name for name, link in scene.links.items()
-        if link.fidelity in {"solid", "plane"} and link.segments is None and link_frames(scene, name) == "co-rotational"
+        if link.model in {"solid", "plane"} and link.segments is None and link_frames(scene, name) == "co-rotational"
     ]  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from kedfem.results.files import replacing
 from kedfem.results.table import text_file
 
 COLUMNS = (
-    "fidelity", "fineness", "times the steps", "reduction", "steps", "unknowns", "preparation [s]", "stepping [s]",
+    "model", "fineness", "times the steps", "reduction", "steps", "unknowns", "preparation [s]", "stepping [s]",
     "whole [s]", "runs", "error", "worst channel", "on the front", "note",
 )  # fmt: skip
 MARKERS = "osD^vP*X<>"

@@ -74,7 +74,7 @@ def fidelities(scene: Scene) -> list[Fidelity]:
 
 
 def _shaped(scene: Scene) -> list[LinkScene]:
-    return [link for link in scene.links.values() if link.shape is not None and link.fidelity != "rigid"]
+    return [link for link in scene.links.values() if link.shape is not None and link.model != "rigid"]
 
 
 def varied(scene: Scene, variant: Variant) -> Scene:
@@ -88,7 +88,7 @@ def varied(scene: Scene, variant: Variant) -> Scene:
     fidelity = variant.fidelity
     links = {
         name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)
-        for name, link in scene.links.items() if link.shape is not None and link.fidelity != "rigid"
+        for name, link in scene.links.items() if link.shape is not None and link.model != "rigid"
     }  # fmt: skip
     keys = {
         "accuracy": "quick",
@@ -103,9 +103,9 @@ def varied(scene: Scene, variant: Variant) -> Scene:
 def _modelled(link: LinkScene, variant: Variant) -> LinkScene:
     """A link of a family, with its own mesh where it is of that family already."""
     family, reduced = variant.fidelity.family, variant.fidelity.reduced
-    if link.fidelity != family:
+    if link.model != family:
         link = of_family(link, family, reduced)
-    link = link.model_copy(update={"reduced": reduced, "modes": None})
+    link = link.model_copy(update={"reduction": "modal" if reduced else "none"})
     return refined(link, variant.fineness)
 
 

@@ -110,5 +110,5 @@ def _texts(full: Prepared) -> list[str]:
 
 def _text(scene: Scene, name: str) -> str:
     """All that a link's mesh and matrices depend on."""
-    text = scene.links[name].model_dump_json(exclude={"reduced", "modes"})
+    text = scene.links[name].model_dump_json(exclude={"reduction"})
     return f"{name} {name in spatial_beams(scene)} {text}"

@@ -1,4 +1,4 @@
-"""Changed copies of a scene: other fidelities, sizes, modes, steps."""
+"""Changed copies of a scene: other models, sizes, modes, steps."""
 
 import math
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from kedfem.scene import (
 TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
 TURNS = 2  # of a trial run
 Family = Literal["solid", "plane", "beam", "rigid"]
-CHOSEN = {"element", "mesh", "fidelity", "reduced", "modes"}
+CHOSEN = {"element", "mesh", "model", "reduction"}
 
 
 def with_links(scene: Scene, links: Mapping[str, LinkScene]) -> Scene:
@@ -77,7 +77,8 @@ def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkSce
     """The link meshed in another way, with the usual element and mesh of that way."""
     gone = CHOSEN if family in {"plane", "solid"} else CHOSEN | {"segments"}
     given = {key: getattr(link, key) for key in link.model_fields_set - gone}
-    other = LinkScene.model_validate({**given, "fidelity": family, "reduced": reduced and family != "rigid"})
+    reduction = "modal" if reduced and family != "rigid" else "none"
+    other = LinkScene.model_validate({**given, "model": family, "reduction": reduction})
     return other if link.mesh.fillet_angle is None else filleted(other, link.mesh.fillet_angle)
 
 
@@ -107,7 +108,7 @@ def families(link: LinkScene) -> tuple[Family, ...]:
 def refined(link: LinkScene, factor: float) -> LinkScene:
     """The link with elements smaller by a factor, never fewer; a rigid link or a mesh from a file as it is."""
     mesh = link.mesh
-    if link.fidelity == "rigid" or isinstance(link.shape, MeshFile | None):
+    if link.model == "rigid" or isinstance(link.shape, MeshFile | None):
         return link
     if mesh.elements is not None:
         several = mesh.elements if isinstance(mesh.elements, tuple) else (mesh.elements,)

@@ -59,8 +59,9 @@ def frequencies(
     """Natural frequencies: of the linkage frozen at positions over a turn, or of one link or part, free or held."""
     from kedfem.frequencies import Wanted, link_of_scene, part_frequencies, part_from_file
     from kedfem.frequencies import frequencies as found_of
-    from kedfem.mesh import CAD_ENDINGS, MESH_ENDINGS
+    from kedfem.mesh import CAD_ENDINGS
     from kedfem.scene import face_from, link_from, material_from, read_scene
+    from kedfem.scene.records.shapes import MESH_ENDINGS
     from kedfem.tables import frequencies_tables, part_tables
 
     cad = what.suffix.lower() in CAD_ENDINGS

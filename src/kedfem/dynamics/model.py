@@ -213,7 +213,7 @@ def _prescribed(link: Link) -> Link:
 
 def hub_of(scene: Scene, name: str) -> str | None:
     """The driven joint by which a link, if it is rigid, turns on the ground with a drive; that of a moving ground."""
-    if scene.links[name].fidelity != "rigid":
+    if scene.links[name].model != "rigid":
         return None
     if name in (ground := moving_grounds(scene)):
         return ground[name]
@@ -328,7 +328,7 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
     ]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
-    if scene.links[body.link].fidelity == "rigid" and links[body.link].kind == "solid":
+    if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
         return body.link, _carrying(links[body.link], rigid_seat(links[body.link], at), where, body, axis)
     try:
         key, seat = on_part(

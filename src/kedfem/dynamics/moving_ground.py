@@ -29,7 +29,7 @@ def moving_ground(scene: Scene, name: str, hub: str) -> Link:
     edge = EDGE * scene_size(scene)
     x, y, z = at.tolist()
     ends = ((x - edge / 2, y, z), (x + edge / 2, y, z))
-    cube = LinkScene(fidelity="rigid", material="any", shape=Bar(between=ends, width=edge, thickness=edge))
+    cube = LinkScene(model="rigid", material="any", shape=Bar(between=ends, width=edge, thickness=edge))
     link = rigid(solid_link(name, link_mesh(name, cube, Path()), ANY, np.eye(3)))
     none = np.zeros((link.n, link.n))
     massless = replace(

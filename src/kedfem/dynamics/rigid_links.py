@@ -35,7 +35,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
     ----------
     thicken : whether a mass that lies in a plane gets next to no thickness, which bars between points need no more of
     """
-    made = {key for key, link in links.items() if scene.links[link.name].fidelity == "rigid"}
+    made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out, soft = dict(links), _mounts(scene)
     for key in made:

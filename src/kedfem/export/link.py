@@ -87,7 +87,7 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
     if link.unknowns > MOST:
         raise SceneError(
             f"links.{name}: must have {MOST:,} unknowns at most, as its matrices are dense, got {link.unknowns:,}: take "
-            '`fidelity = "reduced"`'
+            '`reduction = "modal"`'
         )
     return _exported(scene, name, link)
 

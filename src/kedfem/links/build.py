@@ -169,7 +169,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
     given = scene.links[name]
     if link_frames(scene, name) == "rigid-body":
         return Segments((link,))
-    if given.fidelity == "rigid" or link.full is not None:
+    if given.model == "rigid" or link.full is not None:
         return Segments((corotational(link),))
     material = scene.materials[str(given.material)]
     match link.kind:

@@ -1,4 +1,4 @@
-"""The one record that every link has, whatever its fidelity: the whole solver rests on it.
+"""The one record that every link has, whatever its model: the whole solver rests on it.
 
 A link is a scalar function space {N_a} with a vector at each function. Its state is an array (n, d), its mass scalar
 matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, but for plane links, which know

@@ -3,14 +3,12 @@
 from kedfem.mesh.cad.file import ENDINGS as CAD_ENDINGS
 from kedfem.mesh.elements.hexahedra import Face, SolidMesh
 from kedfem.mesh.elements.quality import Quality, checked_mesh, mesh_quality
-from kedfem.mesh.files.raw import ENDINGS as MESH_ENDINGS
 from kedfem.mesh.isolated import side_by_side
 from kedfem.mesh.link import link_mesh, part_mesh, plane_mesh
 from kedfem.mesh.planar.flat import QuadMesh
 
 __all__ = [
     "CAD_ENDINGS",
-    "MESH_ENDINGS",
     "Face",
     "QuadMesh",
     "Quality",

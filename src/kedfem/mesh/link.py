@@ -71,12 +71,12 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
             read = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
             mesh = placed(read, np.array(shape.origin), file_axes(shape))
         case Cad() as shape:
-            key = f"{where}.step" if link.step is not None else f"{where}.shape.file"
+            key = f"{where}.file" if link.file is not None else f"{where}.shape.file"
             mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
         case _:
             mesh = _swept(where, link, link_plate(where, link, folder, kept_whole))
     mesh = FORMS[str(link.element)](mesh)
-    check_room(where, 3.0 * len(mesh.points), link.fidelity != "rigid")
+    check_room(where, 3.0 * len(mesh.points), link.model != "rigid")
     return checked_mesh(where, mesh, link.min_quality)
 
 
@@ -110,7 +110,7 @@ def plane_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole =
     Parameters and errors are those of `link_mesh`; there are 9 nodes to an element.
     """
     mesh = middle_mesh(link_plate(f"links.{name}", link, folder, kept_whole))
-    check_room(f"links.{name}", 2.0 * len(mesh.points), link.fidelity != "rigid", plane=True)
+    check_room(f"links.{name}", 2.0 * len(mesh.points), link.model != "rigid", plane=True)
     return checked_mesh(f"links.{name}", mesh, link.min_quality)
 
 
@@ -148,7 +148,7 @@ def _swept(where: str, link: LinkScene, plate: Plate) -> SolidMesh:
     """A plate as a solid, if it fits in the memory."""
     layers = _layers(link)
     unknowns = 3.0 * NODES_EACH[str(link.element)] * len(plate.quads[1]) * layers
-    check_room(where, unknowns, link.fidelity != "rigid")
+    check_room(where, unknowns, link.model != "rigid")
     return swept_mesh(plate, layers)
 
 

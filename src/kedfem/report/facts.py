@@ -97,7 +97,7 @@ def links_table(scene: Mapping[str, Any], results: Results) -> Table:
         rows.append(
             (
                 name,
-                str(said.get("model", link.get("fidelity", ""))),
+                str(said.get("model", link.get("model", ""))),
                 str(link.get("material") or "–"),
                 str(shape.get("kind", "–")) + (f" {shape['file']}" if "file" in shape else ""),
                 *(_count(said.get(key)) for key in ("elements", "unknowns")),

@@ -31,7 +31,7 @@ poisson_ratio = 0.33
     "[links.NAME]": '''
 [links.coupler]
 material = "steel"
-fidelity = "reduced"                    # some twenty modes instead of all unknowns
+reduction = "modal"                     # some twenty modes instead of all unknowns
 shape = { kind = "bar", between = ["B", "C"], width = "20 mm", thickness = "10 mm" }
 ''',
     "[links.NAME.mesh]": '''
@@ -51,7 +51,7 @@ bore_diameter = "12 mm"
     "section of a polyline": '''
 [links.coupler]
 material = "steel"
-fidelity = "beam"
+model = "beam"
 
 [links.coupler.shape]
 kind = "polyline"
@@ -95,7 +95,7 @@ bushing = { stiffness = "20 kN/mm", damping = "1 kN*s/m", rotational_stiffness =
 ''',
     "[gears.NAME]": '''
 [links.wheel]
-fidelity = "rigid"
+model = "rigid"
 material = "steel"
 shape = { kind = "bar", between = [[-0.1, 0], [-0.1, 0.04]], width = "20 mm", thickness = "10 mm" }
 
@@ -188,7 +188,7 @@ points = { P = ["600 mm", 0], Q = ["700 mm", 0] }           # of pendulum_1; tho
 
 [patterns.pendulums.links.pendulum]
 material = "steel"
-fidelity = "beam"
+model = "beam"
 shape = { kind = "bar", between = ["P", "Q"], width = "10 mm", thickness = "10 mm" }
 
 [patterns.pendulums.joints.hinge]

@@ -44,11 +44,9 @@ def _chosen(link: LinkScene) -> str:
     sizes = ((key, value) for key, value in link.mesh if value is not None)
     mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
-    kind = f"{link.element} " if link.element and link.fidelity != "rigid" else ""
+    kind = f"{link.element} " if link.element and link.model != "rigid" else ""
     return (
-        f"{'reduced ' if link.reduced else ''}{kind}{link.fidelity}"
-        + (f" ({mesh})" if mesh else "")
-        + segments
+        f"{'reduced ' if link.reduced else ''}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
     )
 
 

@@ -7,20 +7,20 @@ from kedfem.accuracy.study import Measured, Study
 from kedfem.output.words import percent
 
 REFERENCE = "reference"
-STUDY_COLUMNS = ("fidelity", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
+STUDY_COLUMNS = ("model", "mesh", "steps", "red.", "size", "prep.", "step", "whole", "error")  # fmt: skip
 
 
 def study_tables(study: Study, machine: str) -> list[Table]:
     """Variants by time with their errors, and what the reference's own error is made of."""
     table = Table(title=Text(f"Speed against error: {study.title}"), pad_edge=False)
     for column in STUDY_COLUMNS:
-        left = column == "fidelity"
+        left = column == "model"
         table.add_column(
             column,
             justify="left" if left else "right",
             overflow="fold",
             no_wrap=not left,
-            min_width={"fidelity": 11, "error": len(REFERENCE)}.get(column),
+            min_width={"model": 11, "error": len(REFERENCE)}.get(column),
         )
     ran = [row for row in study.rows if row.seconds]
     for row in sorted(ran, key=lambda row: row.seconds.whole if row.seconds else 0.0):

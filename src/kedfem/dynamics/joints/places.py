@@ -19,7 +19,7 @@ T = TypeVar("T")
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
     if (
-        scene.links[name].fidelity != "rigid"
+        scene.links[name].model != "rigid"
         or scene.links[name].shape is not None
         or name in moving_grounds(scene)
     ):

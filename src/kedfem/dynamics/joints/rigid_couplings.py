@@ -25,7 +25,7 @@ def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]
         for link in (
             joint.links[:1] if joint.kind == "slot" else joint.links
         ):  # a slot's line is no coupling surface
-            if link not in meshed or not joint.stiff(link) or scene.links[link].fidelity == "rigid":
+            if link not in meshed or not joint.stiff(link) or scene.links[link].model == "rigid":
                 continue
             key, seat = part_seat(scene, name, out, link)
             which = (key, seat.facets.tobytes() if seat.facets is not None else b"")

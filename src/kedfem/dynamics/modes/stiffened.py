@@ -149,5 +149,5 @@ def _refuse_carried(driven: Model, free: bool) -> None:
         names = ", ".join(each.link.name for each in driven.carried)
         raise SceneError(
             "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
-            f"not known, got {names}: take fidelity = 'beam' or 'solid' for it"
+            f"not known, got {names}: take model = 'beam' or 'solid' for it"
         )

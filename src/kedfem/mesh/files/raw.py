@@ -13,10 +13,10 @@ from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.mesh.session import gmsh_model, numbered_nodes
+from kedfem.scene.records.shapes import MESH_ENDINGS
 
-THROUGH_GMSH = (".msh", ".unv", ".bdf", ".nas", ".med", ".mesh")
 THROUGH_MESHIO = (".inp", ".vtu", ".vtk", ".xdmf", ".xmf", ".e", ".exo")
-ENDINGS = (*THROUGH_GMSH, *THROUGH_MESHIO)
+THROUGH_GMSH = tuple(each for each in MESH_ENDINGS if each not in THROUGH_MESHIO)
 _NUMBERED = (".bdf", ".nas")  # surfaces by numbers of properties
 #: Corners of the solid cells that files may hold, by meshio's names.
 CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}

@@ -12,8 +12,9 @@ from kedfem.errors import MeshError
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, SolidMesh, without_spare_nodes
 from kedfem.mesh.files.groups import named_faces
 from kedfem.mesh.files.mixed import one_kind
-from kedfem.mesh.files.raw import CORNERS, ENDINGS, RawMesh, read_mesh
+from kedfem.mesh.files.raw import CORNERS, RawMesh, read_mesh
 from kedfem.mesh.isolated import MESH_FILE, READING, apart
+from kedfem.scene.records.shapes import MESH_ENDINGS
 from kedfem.store import contents, itself, kept
 
 #: Nodes of the solid cells that are taken.
@@ -30,9 +31,9 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
     where : str
         What the file is for, for messages.
     path : Path
-        Of one of ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical groups, sets
-        of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds become tetrahedra
-        of 10 nodes, hexahedra of several orders those of 20.
+        Of one of MESH_ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical groups,
+        sets of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds become
+        tetrahedra of 10 nodes, hexahedra of several orders those of 20.
     scale : float [m]
         Length of the file's unit.
 
@@ -60,10 +61,10 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
 
 def _read(where: str, path: Path) -> RawMesh:
     """What the file holds, read in a process of its own and kept between runs."""
-    wanted = f"must be a mesh file ({', '.join(ENDINGS)})"
+    wanted = f"must be a mesh file ({', '.join(MESH_ENDINGS)})"
     if not path.is_file():
         raise MeshError(f"{where}: {wanted}, got {'a folder' if path.is_dir() else 'nothing'} at {path}")
-    if path.suffix.lower() not in ENDINGS:
+    if path.suffix.lower() not in MESH_ENDINGS:
         raise MeshError(f"{where}: {wanted}, got {path}")
     key = sha256(path.suffix.lower().encode() + contents([path])).hexdigest()
 

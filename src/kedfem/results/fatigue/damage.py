@@ -74,7 +74,7 @@ def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
     out = {}
     for name, link in scene.links.items():
         data = asked.links.get(name) or asked.materials.get(link.material or "")
-        if data is not None and link.material is not None and link.fidelity != "rigid":
+        if data is not None and link.material is not None and link.model != "rigid":
             out[name] = strength_of(data, scene.materials[link.material].youngs_modulus)
     return out
 

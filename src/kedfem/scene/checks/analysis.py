@@ -30,7 +30,7 @@ def analysis_faults(parts: Parts) -> Iterator[str]:
     if analysis.has("step") and analysis.has("steps_per_revolution"):
         yield analysis.fault("step", "cannot be combined with steps_per_revolution, got both")
     if parts.driven:
-        yield from open_fidelity_faults(parts)
+        yield from open_model_faults(parts)
     drives = [drive for drive in parts.all_drives if drive.record is not None]
     for drive in drives:
         yield from drive_table_faults(parts, drive)
@@ -53,11 +53,11 @@ def _repeats(parts: Parts) -> bool:
     return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
 
 
-def open_fidelity_faults(parts: Parts) -> Iterator[str]:
-    """Links left open without saying for which accuracy."""
+def open_model_faults(parts: Parts) -> Iterator[str]:
+    """Models left open without saying for which accuracy."""
     for link in parts.links.values():
-        if link.word("fidelity") == "auto" and parts.analysis.word("accuracy") == "quick":
-            yield link.fault("fidelity", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
+        if link.word("model") == "auto" and parts.analysis.word("accuracy") == "quick":
+            yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
 
 
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[str]:

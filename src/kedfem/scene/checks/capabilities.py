@@ -79,7 +79,7 @@ REFUSALS = (
         "leave it out, or take another kind of joint"),
     Refusal("joints", {"joint": ("weld", "prismatic"), "partners": (MIXED,)}, "{where}.kind",
         "be revolute or spherical between a plane link and a solid or beam in space",
-        "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same fidelity"),
+        "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same model"),
     Refusal("joints", {"joint": ("weld",), "partners": (BESIDE,)}, "{where}.kind",
         "be revolute or spherical between a plane link and a rigid one that moves freely",
         "a plane link constrains no rotation out of its plane", "'weld' of {names}",

@@ -26,7 +26,7 @@ ELEMENTS = {
 
 
 def link_faults(parts: Parts) -> Iterator[str]:
-    """Links whose keys do not suit their fidelity."""
+    """Links whose keys do not suit their model."""
     for link in parts.links.values():
         if link.name == GROUND:
             yield line(link.where, "must have another name, got that of the frame")
@@ -67,9 +67,10 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
             if link.has(key):
                 got = link.word(key) or "one"
                 yield link.fault(key, f"must not be given for a rigid link without a shape, got {got!r}")
-    for key in ("reduced", "modes"):
-        if link.has(key) and link.raw[key] is not False:
-            yield link.fault(key, f"must be left out for a rigid link, got {shown(link.raw[key])}")
+    if link.has("reduction") and link.raw["reduction"] != "none":
+        yield link.fault(
+            "reduction", f"must be left out for a rigid link, got {shown(link.raw['reduction'])}"
+        )
 
 
 def is_slide(joint: Entry) -> bool:
@@ -90,8 +91,6 @@ def elastic_faults(link: Entry, sketch: bool) -> Iterator[str]:
     every_element = {name for names in ELEMENTS.values() for name in names}
     if element in every_element and element not in ELEMENTS[kind]:
         yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
-    if link.has("modes") and not (link.raw.get("reduced") is True or link.word("fidelity") == "reduced"):
-        yield link.fault("modes", f"must be combined with reduced = true, got {shown(link.raw['modes'])}")
     if link.record is not None and link.record.mass:
         yield link.fault(
             "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {noun}"

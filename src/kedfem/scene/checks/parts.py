@@ -186,10 +186,10 @@ def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, gravity:
 
 
 def category(link: Entry) -> str:
-    """The fidelity of a link as given; of one that leaves it open what it is meshed as."""
-    given = link.word("fidelity") or "solid"
-    if given not in {"reduced", "auto"}:
-        return given
+    """What a link is, as given; of one that leaves it open what it is meshed as."""
+    given = link.word("model")
+    if given not in {None, "auto"}:
+        return str(given)
     return "beam" if link.word("shape", "kind") == "polyline" else "solid"
 
 

@@ -42,9 +42,7 @@ def moving_grounds(scene: Scene) -> dict[str, str]:
 
     One that slides on the ground and whose other joints all share points is a slider instead: its mass rides on a link.
     """
-    shapeless = {
-        name for name, link in scene.links.items() if link.fidelity == "rigid" and link.shape is None
-    }
+    shapeless = {name for name, link in scene.links.items() if link.model == "rigid" and link.shape is None}
     return dict(_moved_by_drives(shapeless, scene)) if shapeless else {}
 
 

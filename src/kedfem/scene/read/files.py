@@ -79,14 +79,8 @@ def _with_names(x: Any, where: Where, of: Callable[[Where, str], str]) -> Any:
         return [_with_names(each, (*where, k), of) for k, each in enumerate(x)]
     if isinstance(x, Mapping):
         return {key: _with_names(each, (*where, str(key)), of) for key, each in x.items()}
-    names = where and isinstance(x, str) and (where[-1] in {"file", "folder"} or is_step_file(where))
+    names = where and isinstance(x, str) and where[-1] in {"file", "folder"}
     return of(where, x) if names else x
-
-
-def is_step_file(where: Where) -> bool:
-    """Whether a key is the CAD file of a link, not the step of an analysis."""
-    inner = where[2:] if where and where[0] == "patterns" else where
-    return len(inner) == 3 and inner[0] == "links" and inner[2] == "step"
 
 
 def inside(folder: Path, name: str | Path) -> bool:
@@ -151,13 +145,12 @@ def file_faults(parts: Parts) -> Iterator[str]:
     """Files of shapes that are missing, and parts that do not fit between their points."""
     for link in parts.links.values():
         shape = link.record.shape if link.record is not None else None
-        if isinstance(shape, MeshFile) and not (parts.folder / shape.file).is_file():
+        if isinstance(shape, Cad | MeshFile) and not (parts.folder / shape.file).is_file():
+            what = "CAD" if isinstance(shape, Cad) else "mesh"
+            key, inner = ("file", ()) if link.has("file") else ("shape", ("file",))
             yield link.fault(
-                "shape", f"must be a mesh file, got nothing at {parts.folder / shape.file}", "file"
+                key, f"must be a {what} file, got nothing at {parts.folder / shape.file}", *inner
             )
-        if isinstance(shape, Cad) and not (parts.folder / shape.file).is_file():
-            key, inner = ("step", ()) if link.has("step") else ("shape", ("file",))
-            yield link.fault(key, f"must be a CAD file, got nothing at {parts.folder / shape.file}", *inner)
         if isinstance(shape, Part):
             try:
                 part = part_geometry(parts.folder / shape.file)

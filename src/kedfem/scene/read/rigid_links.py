@@ -35,9 +35,9 @@ def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
         name: link
         for name, link in (links.items() if isinstance(links, Mapping) else ())
         if isinstance(link, Mapping)
-        and link.get("fidelity") == "rigid"
+        and link.get("model") == "rigid"
         and "inertia" in link
-        and not link.keys() & {"shape", "step", "material"}
+        and not link.keys() & {"shape", "file", "material"}
     }
     out = dict(raw)
     for name, link in given.items():

@@ -92,10 +92,10 @@ def _spelt_out(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _left_open(link: Any) -> Any:
-    """A raw link of a scene that asks for an accuracy: with a shape and no fidelity stated it is `auto`."""
-    if not isinstance(link, Mapping) or "shape" not in link or link.keys() & {"fidelity", "reduced"}:
+    """A raw link of a scene that asks for an accuracy: with a shape and no model stated it is `auto`."""
+    if not isinstance(link, Mapping) or "shape" not in link or link.keys() & {"model", "reduction"}:
         return link
-    return {**link, "fidelity": "auto"}
+    return {**link, "model": "auto"}
 
 
 def _with_files(raw: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:

@@ -79,7 +79,7 @@ class Analysis(Record):
     with one beside the deflection of `initial = "quasi-static"`"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
-    it by short trial runs: frames, elements, mesh sizes, segments, modes, step and levels in time, and fidelities
+    it by short trial runs: frames, elements, mesh sizes, segments, modes, step and levels in time, and models
     that are `"auto"`. Without a drive elements of beams and the step are. `"quick"`: plain defaults are taken
     instead, which `kedfem run --quick` means too"""
     reduction_tolerance: Annotated[float, Quantity("1", above=0.0, below=1.0)] = 1e-3

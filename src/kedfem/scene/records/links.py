@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, StrictBool, StrictInt, model_validator
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import SceneError
 from kedfem.scene.records.base import Fault, FileName, Record, refuse
@@ -14,7 +15,7 @@ from kedfem.scene.records.bushings import Bushing
 from kedfem.scene.records.faces import ChosenFace, Faces
 from kedfem.scene.records.inertia import Inertia, inertia_faults
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, Point, apart
-from kedfem.scene.records.shapes import Bar, Cad, Polyline, Shape
+from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
 from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault
 from kedfem.scene.records.wording import one_of, shown, unknown_name
 
@@ -73,30 +74,36 @@ class Meshing(Record):
     """a part from CAD: hexahedra where nothing can be swept too, four in each tetrahedron; tetrahedra if not given"""
 
 
+def checked_reduction(value: object) -> object:
+    """Whether a link is reduced, and to how many modes."""
+    if value in {"none", "modal"} or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
+        return value
+    raise fault(f"must be 'none', 'modal' or a number of modes, got {shown(value)}")
+
+
 def spelt_out(link: Any) -> Any:
-    """A raw link that gives a CAD file in short, with the shape that this means."""
-    if not isinstance(link, Mapping) or link.get("step") is None or link.get("shape") is not None:
+    """A raw link that gives the file of its shape in short, with the shape that this means."""
+    if not isinstance(link, Mapping) or link.get("file") is None or link.get("shape") is not None:
         return link
-    return {**link, "shape": {"kind": "cad", "file": link["step"]}}
+    cad = not isinstance(link["file"], str) or PurePath(link["file"]).suffix.lower() not in MESH_ENDINGS
+    return {**link, "shape": {"kind": "cad" if cad else "mesh", "file": link["file"]}}
 
 
 class LinkScene(Record):
-    """A link: its material, shape, fidelity and mesh."""
+    """A link: its material, shape, model and mesh."""
 
-    fidelity: Literal["solid", "plane", "beam", "rigid", "reduced", "auto"] = "solid"
-    """hexahedra, quadrilaterals in plane stress, beams, a rigid body; `reduced`: the solid (of a polyline the beam) with
-    `reduced = true`; `auto`: the cheapest of all these for `analysis.accuracy`, and if that is given the default"""
-    reduced: StrictBool = False
-    """whether an elastic link moves in the span of a few modes only: as many as `analysis.reduction_tolerance` asks for;
-    with co-rotational frames each segment does, and beams stay unreduced"""
-    modes: Count | None = None
-    """number of these modes, instead of `analysis.reduction_tolerance`; with co-rotational frames of each segment"""
+    model: Literal["solid", "plane", "beam", "rigid", "auto"] | None = None
+    """hexahedra or tetrahedra, quadrilaterals in plane stress, beams, a rigid body; `auto`: the cheapest of these for
+    `analysis.accuracy`, and the default if that and no `reduction` is given, else a solid, of a polyline a beam"""
+    reduction: Annotated[Literal["none", "modal"] | Count, BeforeValidator(checked_reduction)] = "none"
+    """whether an elastic link moves in the span of a few modes only: `modal`: as many as `analysis.reduction_tolerance`
+    asks for, or their number; with co-rotational frames those of each segment, and beams stay unreduced"""
     material: str | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
     """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""
-    step: FileName | None = None
-    """a CAD file (STEP, IGES or BREP): short for `shape = { kind = "cad", file = … }`"""
+    file: FileName | None = None
+    """a file of its shape: short for `shape = { kind = "cad", file = … }` (STEP, IGES, BREP) or `{ kind = "mesh", … }`"""
     mass: Mass = 0.0
     """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
     that drives alone move (no other joint holds it), which these bear"""
@@ -126,16 +133,16 @@ class LinkScene(Record):
 
     @model_validator(mode="before")
     @classmethod
-    def _step_is_a_shape(cls, raw: Any) -> Any:
+    def _file_is_a_shape(cls, raw: Any) -> Any:
         return spelt_out(raw)
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
-        if self.step is not None and not (isinstance(self.shape, Cad) and self.shape.file == self.step):
-            refuse([(("step",), "cannot be combined with shape, got both")])
+        own = isinstance(self.shape, (Cad, MeshFile)) and self.shape.file == self.file
+        if self.file is not None and not own:
+            refuse([(("file",), "cannot be combined with shape, got both")])
+        self.fill(model=self.model or self.family)
         refuse(self._body_faults())
-        if self.fidelity == "reduced":
-            self.fill(fidelity=self.family, reduced=True)
         element = self.element or self._usual_element()
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
@@ -143,11 +150,10 @@ class LinkScene(Record):
         """What is wrong with a link given by mass, centre and inertia."""
         if self.centre is None and self.inertia is None:
             return []
-        if self.fidelity != "rigid":
+        if self.model != "rigid":
             keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
             return [
-                ((key,), f"must be given for a rigid link only, got fidelity {self.fidelity!r}")
-                for key in keys
+                ((key,), f"must be given for a rigid link only, got model {self.model!r}") for key in keys
             ]
         present = [key for key in ("shape", "material") if getattr(self, key) is not None]
         if present:
@@ -173,19 +179,29 @@ class LinkScene(Record):
     @property
     def family(self) -> Literal["solid", "plane", "beam"]:
         """What the link is meshed as: of one that does not say, beams for a polyline, else hexahedra."""
-        if self.fidelity in {"rigid", "reduced", "auto"}:
+        if self.model in {"rigid", "auto", None}:
             return "beam" if isinstance(self.shape, Polyline) else "solid"
-        return self.fidelity  # type: ignore[return-value]
+        return self.model  # type: ignore[return-value]
+
+    @property
+    def reduced(self) -> bool:
+        """Whether it moves in the span of a few modes only."""
+        return self.reduction != "none"
+
+    @property
+    def modes(self) -> int | None:
+        """The number of these modes; None: as many as a tolerance asks for."""
+        return self.reduction if isinstance(self.reduction, int) else None
 
     @property
     def category(self) -> Literal["solid", "plane", "beam", "rigid"]:
         """What the link is: rigid, or what it is meshed as."""
-        return "rigid" if self.fidelity == "rigid" else self.family
+        return "rigid" if self.model == "rigid" else self.family
 
     @property
     def rigid_line(self) -> bool:
         """Whether it is a rigid polyline, which is made of beams."""
-        return self.fidelity == "rigid" and isinstance(self.shape, Polyline)
+        return self.model == "rigid" and isinstance(self.shape, Polyline)
 
     def _mesh_defaults(self) -> dict[str, Any]:
         if self.shape is None:
@@ -196,10 +212,10 @@ class LinkScene(Record):
             along = math.dist(*self.shape.between) / (1.5 * self.shape.width)
             along = min(max(math.ceil(along), 4), 40) if math.isfinite(along) else 4
             usual = (along, 2) if self.family == "plane" else (along, 2, 1)
-            if self.fidelity == "rigid":
+            if self.model == "rigid":
                 usual = (1, 1, 1)
             return {"elements": self.mesh.elements or usual}
-        fewest = 1 if self.fidelity == "rigid" else 2
+        fewest = 1 if self.model == "rigid" else 2
         given = self.mesh.size is not None or self.mesh.unknowns is not None
         across = self.mesh.elements_across or (None if given else fewest)
         return {"elements_across": across}
@@ -312,5 +328,5 @@ def require_elastic(links: Mapping[str, LinkScene], name: str) -> None:
     """
     if name not in links:
         raise SceneError(f"--link: {one_of(list(links), name)}")
-    if links[name].fidelity == "rigid":
+    if links[name].model == "rigid":
         raise SceneError("--link: must be an elastic link, got a rigid one")

@@ -47,6 +47,23 @@ def along_up(pairs: list[tuple[XYZ, XYZ]], up: XYZ | None) -> list[Fault]:
     return []
 
 
+MESH_ENDINGS = (
+    ".msh",
+    ".unv",
+    ".bdf",
+    ".nas",
+    ".med",
+    ".mesh",
+    ".inp",
+    ".vtu",
+    ".vtk",
+    ".xdmf",
+    ".xmf",
+    ".e",
+    ".exo",
+)
+
+
 class Bar(Record):
     """A straight bar of rectangular section that ends exactly at two points; solid or beam."""
 
@@ -189,7 +206,7 @@ class MeshFile(Record):
 
 
 class Cad(Record):
-    """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra. `step = "rod.step"` in a link is short for it."""
+    """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra. `file = "rod.step"` in a link is short for it."""
 
     kind: Literal["cad"] = "cad"
     file: FileName

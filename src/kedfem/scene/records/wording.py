@@ -7,7 +7,11 @@ from difflib import get_close_matches
 from typing import Any
 
 KEYS = {  # of scenes by their former names: messages about unknown words name the present ones
-    "functions": "modes",
+    "functions": "reduction",
+    "modes": "reduction",
+    "reduced": "reduction",
+    "fidelity": "model",
+    "step": "file",
     "reduction": "reduction_tolerance",
     "port": "coupling",
     "turning_stiffness": "rotational_stiffness",
