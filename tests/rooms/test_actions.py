@@ -32,7 +32,7 @@ from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import resting
 from kedfem.results.recording import recording, rows
-from kedfem.scene import Scene, scene_from
+from kedfem.scene import Factor, Pieces, Scene, pieces, scene_from
 from tests.laws.strategies import examples
 from tests.scenes import bar
 
@@ -42,6 +42,10 @@ Z = np.array([0.0, 0.0, 1.0])
 def end(form: int, X: Any, k: int = 0) -> End:
     X = np.atleast_2d(np.asarray(X, float))
     return End(k, 1, form, np.ones((len(X), 1)), X)
+
+
+def straight(at: tuple[float, ...], value: tuple[float, ...]) -> Pieces:
+    return pieces(Factor(at=at, value=value))
 
 
 def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> ForceElement:
@@ -138,7 +142,7 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
     """Forces · δx = Q δq by central differences, from any deformed and tilted state."""
     rng = np.random.default_rng(seed)
     axis = unit(seed) if ANGLE not in (one, other) else Z
-    action = hinge(one, other, axis, at=(0.0,), value=(2.5,))
+    action = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
     x = turned(drawn([action])[0], action, [rng.uniform(-2, 2) * axis, 0 * axis])
     x += 0.1 * rng.normal(size=x.shape)
     v = rng.normal(size=x.shape)
@@ -153,7 +157,7 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
 def test_torques_on_both_ends_balance(one: int, other: int) -> None:
     """Σ x × f over all directions is the moment; on the first end it is T n where nothing is tilted."""
     axis = unit(3)
-    action = hinge(one, other, axis, at=(0.0,), value=(2.5,))
+    action = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
     x = turned(drawn([action])[0], action, [0.9 * axis, 0.2 * axis])
     moments = np.cross(x, found(action, x)[0]).sum(axis=1)
     np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
@@ -163,7 +167,7 @@ def test_torques_on_both_ends_balance(one: int, other: int) -> None:
 
 def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
     for axis in (Z, -Z):
-        action = hinge(ANGLE, ANGLE, axis, at=(0.0,), value=(2.5,))
+        action = hinge(ANGLE, ANGLE, axis, curve=straight((0.0,), (2.5,)))
         f, _ = found(action, turned(drawn([action])[0], action, [4 * Z, 1 * Z]))
         np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
         assert not f[:, 1].any()
@@ -201,7 +205,7 @@ def test_a_spring_of_no_length_has_no_direction() -> None:
 def test_a_slide_is_pushed_along_its_axis() -> None:
     axis = unit(5)
     action = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
-                    over=POSITION, at=(0.0, 1.0), value=(0.0, 8.0))  # fmt: skip
+                    over=POSITION, curve=straight((0.0, 1.0), (0.0, 8.0)))  # fmt: skip
     x = drawn([action])[0]
     x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
     f, values = found(action, x)
@@ -212,7 +216,7 @@ def test_a_slide_is_pushed_along_its_axis() -> None:
 @pytest.mark.parametrize("over", [0, SPEED, POSITION])
 def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
     at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
-    action = hinge(PAIR, PAIR, Z, over=over, at=at, value=value)
+    action = hinge(PAIR, PAIR, Z, over=over, curve=straight(at, value))
     x0 = drawn([action])[0]
     for s in np.linspace(-2, 3, 21):
         x = turned(x0, action, [(s if over == POSITION else 0.3) * Z, 0 * Z])
@@ -225,7 +229,7 @@ def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> Non
 def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
     every = [hinge(PAIR, PAIR, Z, **LAWS), ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0,
     0])), 2.0),
-             hinge(ANGLE, PAIR, Z, at=(0.0, 1.0), value=(1.0, 2.0))]  # fmt: skip
+             hinge(ANGLE, PAIR, Z, curve=straight((0.0, 1.0), (1.0, 2.0)))]  # fmt: skip
     x0, t = drawn(every), np.linspace(0, 2, 9)
     x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
                   for s in t])  # fmt: skip

@@ -20,6 +20,18 @@ Raw = dict[str, Any]
 AT = {"at": [0.1, 0]}
 
 
+def over(what: str, link: str = "arm") -> Raw:
+    """A load and a spring with factors over the angle or travel of a drive."""
+    factor, end = {"over": what, "at": [0], "value": [1]}, {"link": link, "at": [0.1, 0]}
+    between = [end, {"link": "ground", "at": [1, 1]}]
+    return {
+        "loads": {"p": {"kind": "force", **end, "vector": [0, 1], "factor": factor}},
+        "springs": {
+            "s": {"kind": "spring", "between": between, "stiffness": 1.0, "stiffness_factor": factor}
+        },
+    }
+
+
 def test_the_page_is_the_table() -> None:
     page = Path(__file__).parents[2] / "docs" / "capabilities.md"
     said = "python -m kedfem.scene.capability_page > docs/capabilities.md"
@@ -116,6 +128,8 @@ SCENES: list[Raw] = [
     planar("weld", "rigid"),
     bare(kind="torque", at=[1, 0], vector=[0, 0, 1]), bare(kind="body", force_density=[0, 1]),
     bare(kind="surface", at=[1, 0], axis="x", force=[0, 1]), bare(kind="pressure", at=[1, 0], axis="x", pressure=5),
+    {**inverted(), **over("travel")}, {**driven_slide(), **over("angle", "one")},
+    {**inverted(), **over("angle"), "drive": None, "drives": {"a": turning(), "b": {**turning(), "joint": "B"}}},
     changed(BASES["free"], {
         "analysis/frames": "rigid-body", "links/arm/frames": "rigid-body", "analysis/initial": "quasi-static",
         "analysis/revolutions": 1, "analysis/steps_per_revolution": 10, "damping": {"alpha": 1.0, "beta": 1e-5},

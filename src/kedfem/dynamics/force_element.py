@@ -13,6 +13,7 @@ from jaxtyping import Float
 from kedfem.dynamics.history import Block
 from kedfem.motion.constraints import cross, perpendiculars
 from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import Pieces
 
 TURN, SLIDE, DISTANCE = 0, 1, 2
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
@@ -23,6 +24,9 @@ IN_SPACE = (1.0, 1.0, 1.0)
 Vector = Float[np.ndarray, "3"]
 Times = Float[np.ndarray, " T"]
 Factor = Callable[[Times, Times], Times]
+
+
+NO_CURVE = Pieces()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +66,7 @@ class ForceElement:
     factor : of a spring, times (T,) and the drive's angles (T,) → what its stiffness is multiplied by; none: one
     limits : of a stop, between which it has no force; none: no stop
     axis : of a hinge or slide, as drawn
-    over, at, value : of a motor, its curve; none: no points
+    over, curve : of a motor; none: no points
     """
 
     name: str
@@ -75,15 +79,14 @@ class ForceElement:
     limits: tuple[float, float] | None = None
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     over: int = 0
-    at: tuple[float, ...] = ()
-    value: tuple[float, ...] = ()
+    curve: Pieces = NO_CURVE
 
 
 Table = tuple[np.ndarray, ...]
 
 
 def kernel_table(every: Sequence[ForceElement]) -> Table:
-    """What the kernel takes of actions: kinds, forms, numbers, over, first, at, height."""
+    """What the kernel takes of actions: kinds, forms, numbers, over, first, at, cubics, periods."""
     numbers = np.zeros((len(every), 16))
     for row, action in zip(numbers, every, strict=True):
         row[:2] = action.stiffness, action.damping
@@ -97,9 +100,10 @@ def kernel_table(every: Sequence[ForceElement]) -> Table:
         np.array([[end.form for end in action.ends] for action in every], int).reshape(-1, 2),
         numbers,
         np.array([action.over for action in every], int),
-        np.concatenate([[0], np.cumsum([len(action.at) for action in every], dtype=int)]),
-        np.array([x for action in every for x in action.at], float),
-        np.array([x for action in every for x in action.value], float),
+        np.concatenate([[0], np.cumsum([len(action.curve.at) for action in every], dtype=int)]),
+        np.array([x for action in every for x in action.curve.at], float),
+        np.array([c for action in every for c in action.curve.coefficients], float).reshape(-1, 4),
+        np.array([action.curve.period for action in every], float),
     )
 
 

@@ -29,7 +29,7 @@ from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis
-from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, load_factor
+from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, load_factor, pieces
 
 
 def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -190,7 +190,7 @@ def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:
 def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> ForceElement:
     curve = motor.curve
     made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
-    return replace(made, over=OVER[curve.over], at=curve.at, value=curve.value)
+    return replace(made, over=OVER[curve.over], curve=pieces(curve))
 
 
 def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement:

@@ -18,7 +18,8 @@ A : actions; every array has a row per action
         angle as drawn; upper q without force, of a spring the lower one
     over : (A,) TIME, SPEED, POSITION: what the curve is over
     first : (A + 1,) where the points of its curve begin
-    at, height : (c,) the curves, one after the other
+    at : (c,), cubics : (c, 4) the curves, one after the other, as `Pieces` has them
+    periods : (A,) of the curves, 0: held outside
 """
 
 import numpy as np
@@ -32,7 +33,7 @@ STIFFNESS, DAMPING, LOWER, AXIS, E1, E2, DRAWN, UPPER = 0, 1, 2, 3, 6, 9, 12, 14
 @compiled
 def evaluate(t, factors, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
     """Forces and values of all actions at one time, into `forces` and `values`."""
-    kinds, forms, numbers, over, first, at, height = table
+    kinds, forms, numbers, over, first, at, cubics, periods = table
     for i in range(len(kinds)):
         gradient = forces[i]
         gradient[:] = 0.0
@@ -55,7 +56,7 @@ def evaluate(t, factors, x, v, before, table, forces, values):  # type: ignore[n
             Q = 0.0
         if first[i] < first[i + 1]:
             along = t if over[i] == TIME else rate if over[i] == SPEED else q
-            Q += on_curve(along, at[first[i] : first[i + 1]], height[first[i] : first[i + 1]])
+            Q += on_curve(along, at[first[i] : first[i + 1]], cubics[first[i] : first[i + 1]], periods[i])
         for e in range(2):
             for k in range(2):
                 for c in range(3):
@@ -76,15 +77,15 @@ def evaluate_all(t, factors, x, v, before, table, forces, values):  # type: igno
 
 
 @compiled
-def on_curve(x, at, height):  # type: ignore[no-untyped-def]
-    """A curve at x: linear between its points, held outside."""
+def on_curve(x, at, cubics, period):  # type: ignore[no-untyped-def]
+    """A curve at x: held outside, or repeated."""
+    if period > 0.0:
+        x -= period * np.floor((x - at[0]) / period)
     k = np.searchsorted(at, x, side="right")
     if k == 0:
-        return height[0]
-    if k == len(at):
-        return height[-1]
-    s = (x - at[k - 1]) / (at[k] - at[k - 1])
-    return height[k - 1] + s * (height[k] - height[k - 1])
+        return cubics[0, 0]
+    s, c = x - at[k - 1], cubics[k - 1]
+    return c[0] + s * (c[1] + s * (c[2] + s * c[3]))
 
 
 @compiled

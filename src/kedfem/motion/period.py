@@ -15,6 +15,7 @@ from kedfem.scene import (
     Ramp,
     Scene,
     Table,
+    curves,
     cycle,
     drive_angle,
     factors,
@@ -125,12 +126,9 @@ def _never(scene: Scene, asked: str) -> Iterator[str]:
     for name, drive in scene.driven_joints.items():
         if not isinstance(drive.motion, Table) and cycle(drive.motion) is None:
             yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
-    for name, factor in factors(scene):
-        if factor.over == "time" and factor.period is None and not is_constant(factor):
+    for name, curve in curves(scene):
+        if curve.over == "time" and curve.period is None and not is_constant(curve):
             yield f"{name}: {where}, got a table over time without one: give it its period"
-    for name, motor in scene.motors.items():
-        if motor.curve.over == "time" and len(set(motor.curve.value)) > 1:
-            yield f"motors.{name}: {where}, got a table over time: make it a load"
 
 
 def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
@@ -143,21 +141,23 @@ def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
     returned = along.periodic and _whole(gone, along.period)
     if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, Table)):
         yield (f"{asked}: must be of a linkage that returns, got one that is elsewhere after {time:.6g} s")
+    for name, curve in curves(scene):
+        if (
+            curve.over == "time"
+            and not is_constant(curve)
+            and curve.period
+            and not _whole(time, curve.period)
+        ):
+            yield f"{name}.period: must be a part of the motion's period, got {curve.period:.6g} s"
     for name, factor in factors(scene):
-        if is_constant(factor):
+        if factor.over == "time" or is_constant(factor) or not gone:
             continue
-        if factor.over == "time" and factor.period is not None and not _whole(time, factor.period):
-            yield f"{name}.period: must be a part of the motion's period, got {factor.period:.6g} s"
-        if factor.over == "angle" and gone:
-            if factor.period is None:
-                yield (
-                    f"{name}.period: is required with {asked} and a drive that goes on turning, got nothing"
-                )
-            elif not _whole(gone, factor.period):
-                yield (
-                    f"{name}.period: must be a part of the motion's period, got "
-                    f"{math.degrees(factor.period):.6g} deg"
-                )
+        if factor.period is None:
+            yield f"{name}.period: is required with {asked} and a drive that goes on turning, got nothing"
+        elif not _whole(gone, factor.period):
+            angle = factor.over == "angle"
+            got = f"{math.degrees(factor.period):.6g} deg" if angle else f"{factor.period:.6g} m"
+            yield f"{name}.period: must be a part of the motion's period, got {got}"
 
 
 def _gone(motion: MotionLaw, time: float) -> bool:

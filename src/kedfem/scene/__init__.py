@@ -1,7 +1,9 @@
 """The scene: what a user describes, validated completely; SI units, points as coordinates."""
 
+from kedfem.scene.questions.curves import Pieces, pieces
 from kedfem.scene.questions.frames import corotational, corotational_links, link_frames
 from kedfem.scene.questions.laws import (
+    curves,
     drive_angle,
     factor_table,
     factors,
@@ -15,6 +17,7 @@ from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps
 from kedfem.scene.read.files import part_geometry
 from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from
 from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
+from kedfem.scene.records.curves import Curve, Factor, ForceCurve, TorqueCurve
 from kedfem.scene.records.damping import Damping, rayleigh
 from kedfem.scene.records.drives import (
     ConstantSpeed,
@@ -35,7 +38,6 @@ from kedfem.scene.records.links import DIRECTED, GROUND, ROTARY, Joint, LinkScen
 from kedfem.scene.records.loads import (
     Body,
     BodyLoad,
-    Factor,
     Flywheel,
     ForceLoad,
     Load,
@@ -46,7 +48,7 @@ from kedfem.scene.records.loads import (
     TorqueLoad,
 )
 from kedfem.scene.records.materials import Material
-from kedfem.scene.records.motors import ForceCurve, Motor, TorqueCurve
+from kedfem.scene.records.motors import Motor
 from kedfem.scene.records.outlines import Arc, Hole
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.sections import (
@@ -85,6 +87,7 @@ __all__ = [
     "ChosenFace",
     "ConstantSpeed",
     "ConstantsSection",
+    "Curve",
     "Cycloidal",
     "Damping",
     "Drive",
@@ -112,6 +115,7 @@ __all__ = [
     "Output",
     "Part",
     "PartGeometry",
+    "Pieces",
     "PlateLink",
     "PointMass",
     "Polyline",
@@ -138,6 +142,7 @@ __all__ = [
     "TubeSection",
     "corotational",
     "corotational_links",
+    "curves",
     "cycle",
     "drive_angle",
     "enforced_by_equations",
@@ -154,6 +159,7 @@ __all__ = [
     "moving_grounds",
     "part_geometry",
     "path_parameter",
+    "pieces",
     "rayleigh",
     "read_keys",
     "read_scene",

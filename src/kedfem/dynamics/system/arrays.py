@@ -190,7 +190,7 @@ class Constraints(NamedTuple):
 
     term_at : (r + 1,); kind, i, j, a, a_j, b, factor : of each term
     linear, law : (r,); numbers : (r, 4) of a law; drive : (r,) whose travel is taken from the coordinate, −1: none
-    over, curve_at, abscissa, ordinate : of curves
+    over, curve_at, abscissa, period : of curves; cubics : (c, 4) from each abscissa on, as `Pieces` has them
     jumps : (r,) stops with damping, whose push begins at once: a step in which it does is divided
     """
 
@@ -209,7 +209,8 @@ class Constraints(NamedTuple):
     over: Any
     curve_at: Any
     abscissa: Any
-    ordinate: Any
+    cubics: Any
+    period: Any
     jumps: Any
 
 

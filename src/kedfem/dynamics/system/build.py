@@ -55,6 +55,7 @@ from kedfem.scene import (
     TravelLimit,
     is_constant,
     load_factor,
+    pieces,
 )
 from kedfem.scene.checks.capabilities import SLOTS
 
@@ -179,7 +180,7 @@ class _Builder:
         """The law of a spring, motor or limit on its coordinate, which its links' own motion tells."""
         law: Law
         if isinstance(element, Motor):
-            law = Curve(OVER[element.curve.over], element.curve.at, element.curve.value)
+            law = Curve(OVER[element.curve.over], pieces(element.curve))
         elif isinstance(element, AngleLimit | TravelLimit):
             law = Stop(*element.range, element.stiffness, element.damping)
         else:

@@ -152,14 +152,14 @@ def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
 
 @inlined
 def interpolated(of, r, x):  # type: ignore[no-untyped-def]
-    """Value and slope of a curve that is linear between its points and held outside."""
-    first, last = of.curve_at[r], of.curve_at[r + 1] - 1
-    if x <= of.abscissa[first]:
-        return of.ordinate[first], 0.0
-    if x >= of.abscissa[last]:
-        return of.ordinate[last], 0.0
+    """Value and slope of a curve of cubics, held outside or repeated."""
+    first, last, period = of.curve_at[r], of.curve_at[r + 1] - 1, of.period[r]
+    if period > 0.0:
+        x -= period * np.floor((x - of.abscissa[first]) / period)
+    elif x <= of.abscissa[first]:
+        return of.cubics[first, 0], 0.0
     k = first
-    while x > of.abscissa[k + 1]:
+    while k < last and x >= of.abscissa[k + 1]:
         k += 1
-    slope = (of.ordinate[k + 1] - of.ordinate[k]) / (of.abscissa[k + 1] - of.abscissa[k])
-    return of.ordinate[k] + slope * (x - of.abscissa[k]), slope
+    s, c = x - of.abscissa[k], of.cubics[k]
+    return c[0] + s * (c[1] + s * (c[2] + s * c[3])), c[1] + s * (2.0 * c[2] + s * 3.0 * c[3])

@@ -49,6 +49,7 @@ from kedfem.dynamics.system.sparse import (
     stiffness_tables,
 )
 from kedfem.links.record import BeamPoint, Link
+from kedfem.scene import Pieces
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
 TOLERANCE = (
@@ -219,7 +220,9 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
     """All constraints and laws as flat arrays."""
     terms = [term for each in constraints for term in each.terms]
     laws = [_law(each.law) for each in constraints]
-    curves = [each.law if isinstance(each.law, Curve) else Curve(COORDINATE, (), ()) for each in constraints]
+    curves = [
+        each.law if isinstance(each.law, Curve) else Curve(COORDINATE, Pieces()) for each in constraints
+    ]
     return Constraints(
         term_at=ends_of([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
         i=np.array([x.i for x in terms], int), j=np.array([x.j for x in terms], int),
@@ -228,8 +231,10 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
         law=np.array([kind for kind, _, _ in laws], int),
         numbers=np.array([x for _, x, _ in laws], float).reshape(-1, 4),
         drive=np.array([x for _, _, x in laws], int), over=np.array([x.over for x in curves], int),
-        curve_at=ends_of([len(x.at) for x in curves]), abscissa=_flat([np.array(x.at) for x in curves]),
-        ordinate=_flat([np.array(x.value) for x in curves]),
+        curve_at=ends_of([len(x.force.at) for x in curves]),
+        abscissa=_flat([np.array(x.force.at) for x in curves]),
+        cubics=np.array([c for x in curves for c in x.force.coefficients], float).reshape(-1, 4),
+        period=np.array([x.force.period for x in curves], float),
         jumps=np.array([isinstance(x.law, Stop) and x.law.damping > 0 for x in constraints], bool),
     )  # fmt: skip
 

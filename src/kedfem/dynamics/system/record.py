@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.force_element import Factor, Times
 from kedfem.links.stations import Stations
+from kedfem.scene import Pieces
 
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
 TIME, RATE, COORDINATE = range(3)
@@ -48,14 +49,14 @@ class Spring:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A force along the coordinate: linear between values, held outside.
+    """A force along the coordinate.
 
     over : TIME, RATE or COORDINATE
+    force : there
     """
 
     over: int
-    at: tuple[float, ...]
-    value: tuple[float, ...]
+    force: Pieces
 
 
 @dataclass(frozen=True, slots=True)

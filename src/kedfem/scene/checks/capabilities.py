@@ -192,9 +192,17 @@ REFUSALS = (
     Refusal("loads", {"element": ("body",), "link": ("slider",)}, "{where}.link",
         "name a link with a shape for a body load", "a slider without a shape has no volume",
         "{name!r}, which is rigid", "take a load of kind force, or give it a shape"),
-    *(Refusal(section, {"factor": ("angle",), "drive": ("none",)}, f"{{where}}.{key}.over",
-        "be combined with a drive over whose angle it is", "no other angle is prescribed", "a scene without one",
-        "take a factor over time") for section, key in (("loads", "factor"), ("springs", "stiffness_factor"))),
+    *(Refusal(section, {"factor": over, "driven": (driven,)}, f"{{where}}.{key}.over", must, why, got, take)
+        for section, key in (("loads", "factor"), ("springs", "stiffness_factor"))
+        for over, driven, must, why, got, take in (
+            (("angle", "travel"), "nothing", "be combined with a drive over whose angle or travel it is",
+             "no other is prescribed", "a scene without one", "take a factor over time"),
+            (("angle", "travel"), "several", "be combined with one drive over whose angle or travel it is",
+             "it does not say which", "several", "take a factor over time"),
+            (("angle",), "prismatic", "be over the travel of a drive on a slide", "it has no angle", "an angle",
+             "take 'travel'"),
+            (("travel",), "revolute", "be over the angle of a drive on a hinge", "it has no travel", "a travel",
+             "take 'angle'"))),
 )  # fmt: skip
 
 

@@ -109,6 +109,15 @@ def drives(parts: Parts) -> Iterator[Told]:
         yield "drives", {**facts, "shaft": shaft}, {**words, "where": place(drive.where)}
 
 
+def driven(parts: Parts) -> dict[str, str]:
+    """The kind of joint of the only drive, whose angle or travel a factor may be over."""
+    names = [drive.word("joint") for drive in parts.all_drives]
+    if len(names) != 1:
+        return {"driven": "several" if names else "nothing"}
+    joint = parts.joints.get(names[0] or "")
+    return {"driven": "" if joint is None else str(joint.word("kind"))}
+
+
 def gears(parts: Parts) -> Iterator[Told]:
     """Gears as a whole, and their joints."""
     for gear in parts.gears.values():
@@ -132,7 +141,11 @@ def elements(parts: Parts) -> Iterator[Told]:
     for spring in parts.springs.values():
         facts, words = on_joint(parts, spring.word("joint"))
         element = "torsion" if spring.word("kind") == "torsion" else "along"
-        facts |= {"element": element, "factor": spring.word("stiffness_factor", "over") or ""}
+        facts |= {
+            "element": element,
+            "factor": spring.word("stiffness_factor", "over") or "",
+            **driven(parts),
+        }
         yield "springs", facts, {**words, "where": place(spring.where)}
     for limit in parts.limits.values():
         facts, words = on_joint(parts, limit.word("joint"))
@@ -235,7 +248,7 @@ def loads(parts: Parts) -> Iterator[Told]:
         kind = "slider" if slider(link) else category(link)
         facts = {"element": str(load.word("kind")), "link": kind}
         words = {"where": place(load.where), "name": link.name, "noun": category(link)}
-        yield "loads", {**facts, "factor": load.word("factor", "over") or ""}, words
+        yield "loads", {**facts, "factor": load.word("factor", "over") or "", **driven(parts)}, words
 
 
 def slider(link: Entry) -> bool:

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.scene.questions.curves import pieces
+from kedfem.scene.records.curves import Curve, Factor
 from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp, Table
-from kedfem.scene.records.loads import Factor
 from kedfem.scene.records.scene import Scene
 
 Times = Float[np.ndarray, " t"]
@@ -178,16 +179,14 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
 
 
 def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
-    """A factor at times t (t,) [s] and angles phi (t,) of the drive [rad].
-
-    Linear between the table's points; held outside, or repeated after its period.
-    """
-    at, value = np.array(factor.at), np.array(factor.value)
+    """A factor at times t (t,) [s] and angles or travels phi (t,) of the drive [rad or m]."""
     x = np.asarray(t if factor.over == "time" or phi is None else phi, dtype=float)
-    if factor.period is not None:
-        x = at[0] + np.mod(x - at[0], factor.period)
-        at, value = np.append(at, at[0] + factor.period), np.append(value, value[0])
-    return np.asarray(np.interp(x, at, value))
+    of = pieces(factor)
+    at, c = np.array(of.at), np.array(of.coefficients)
+    x = at[0] + np.mod(x - at[0], of.period) if of.period else np.maximum(x, at[0])
+    k = np.searchsorted(at, x, side="right") - 1
+    s = x - at[k]
+    return np.asarray(c[k, 0] + s * (c[k, 1] + s * (c[k, 2] + s * c[k, 3])))
 
 
 def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
@@ -197,9 +196,16 @@ def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
         yield f"springs.{name}.stiffness_factor", spring.stiffness_factor
 
 
-def is_constant(factor: Factor) -> bool:
+def curves(scene: Scene) -> Iterator[tuple[str, Curve]]:
+    """All curves of a scene, each with where it stands: factors, torques and forces of motors."""
+    yield from factors(scene)
+    for name, motor in scene.motors.items():
+        yield f"motors.{name}.{motor.curve.what[0]}", motor.curve
+
+
+def is_constant(curve: Curve) -> bool:
     """Whether it is the same always."""
-    return len(set(factor.value)) < 2
+    return len(set(curve.value)) < 2
 
 
 def factor_table(factor: Factor, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from kedfem.errors import SceneError
 from kedfem.scene.read.files import file_text
-from kedfem.scene.records.loads import FACTOR_UNITS
+from kedfem.scene.records.curves import Curve, Factor, ForceCurve, TorqueCurve
 from kedfem.scene.records.units import si_number
 
 
@@ -112,33 +112,44 @@ def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[
     return {**drive, "motion": {**others, "time": time, key: values}}, []
 
 
-def with_factor_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """A raw scene with the factors of its loads and springs read from the files that they name; and faults."""
+CURVES: dict[tuple[str, str], type[Curve]] = {
+    ("loads", "factor"): Factor,
+    ("springs", "stiffness_factor"): Factor,
+    ("motors", "torque"): TorqueCurve,
+    ("motors", "force"): ForceCurve,
+}
+"""Keys of a section's tables that hold curves."""
+
+
+def with_curve_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """A raw scene with its curves read from the files that they name; and faults."""
     read, faults = dict(raw), list[str]()
-    for section, key in (("loads", "factor"), ("springs", "stiffness_factor")):
-        if isinstance(raw.get(section), Mapping):
-            read[section], more = _with_factors(raw[section], section, key, folder)
-            faults += more
+    for (section, key), curve in CURVES.items():
+        every = read.get(section)
+        for name, each in every.items() if isinstance(every, Mapping) else ():
+            given = each.get(key) if isinstance(each, Mapping) else None
+            if isinstance(given, Mapping) and isinstance(given.get("file"), str):
+                made, more = _with_curve(given, curve, folder)
+                faults += [f"{section}.{name}.{key}.file: {fault}" for fault in more]
+                read[section] = {**read[section], name: {**each, key: made}}
     return read, faults
 
 
-def _with_factors(
-    every: Mapping[str, Any], section: str, key: str, folder: Path
-) -> tuple[dict[str, Any], list[str]]:
-    """The same of one section: its tables by name, their factors under `key`."""
-    read, faults = dict(every), list[str]()
-    for name, each in every.items():
-        factor = each.get(key) if isinstance(each, Mapping) else None
-        if not isinstance(factor, Mapping) or not isinstance(factor.get("file"), str):
-            continue
-        over = factor.get("over", "time")
-        if over not in FACTOR_UNITS or factor.keys() & {"time", "at", "value"}:
-            continue
-        try:
-            at, value = two_columns(folder / factor["file"], (over, "factor"), (FACTOR_UNITS[over].unit, "1"))
-        except SceneError as error:
-            faults += [f"{section}.{name}.{key}.file: {fault}" for fault in error.faults]
-            continue
-        table = {word: x for word, x in factor.items() if word != "file"}
-        read[name] = {**each, key: {**table, "over": over, "at": at, "value": value}}
-    return read, faults
+def _with_curve(
+    given: Mapping[str, Any], curve: type[Curve], folder: Path
+) -> tuple[Mapping[str, Any], list[str]]:
+    """A raw curve with the columns of its file, if it is one that its record can read; and faults."""
+    over = given.get("over", "time")
+    if over not in curve.units or given.keys() & {"time", "at", "value"}:
+        return given, []
+    word, unit = curve.what
+    try:
+        at, value = two_columns(folder / given["file"], (over, word), (curve.units[over], unit))
+    except SceneError as error:
+        return given, list(error.faults)
+    return {
+        **{key: x for key, x in given.items() if key != "file"},
+        "over": over,
+        "at": at,
+        "value": value,
+    }, []

@@ -20,7 +20,7 @@ from kedfem.scene.read.parameters import with_expressions
 from kedfem.scene.read.patterns import in_patterns, steep_faults, with_patterns
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.read.rigid_links import with_rigid_bodies
-from kedfem.scene.read.tables import with_factor_tables, with_motion_tables
+from kedfem.scene.read.tables import with_curve_tables, with_motion_tables
 from kedfem.scene.records.base import plain
 from kedfem.scene.records.links import spelt_out
 from kedfem.scene.records.materials import BUILT_IN
@@ -101,7 +101,7 @@ def _left_open(link: Any) -> Any:
 def _with_files(raw: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
     """A raw scene with the tables of numbers that it names files of; and faults."""
     raw, faults = with_motion_tables(raw, folder)
-    raw, more = with_factor_tables(raw, folder)
+    raw, more = with_curve_tables(raw, folder)
     return raw, faults + more
 
 

@@ -2,68 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Self
 
-from pydantic import BeforeValidator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import model_validator
 
 from kedfem.scene.records.base import Record, refuse
-from kedfem.scene.records.loads import Abscissa, Force, Torque, curve_faults
-from kedfem.scene.records.units import Quantity
-
-
-class Curve(Record):
-    """What curves of motors share: increasing abscissae `at`, a value for each."""
-
-    units: ClassVar[dict[str, str]]
-    over: str
-    at: tuple[Abscissa, ...]
-    value: tuple[float, ...]
-
-    @model_validator(mode="after")
-    def _numbers(self) -> Self:
-        quantity = Quantity(self.units[self.over])
-        numbers: list[float] = []
-        for i, given in enumerate(self.at):
-            try:
-                numbers.append(quantity.number(given))
-            except PydanticCustomError as reason:
-                refuse([(("at", i), reason.message())])
-        refuse(curve_faults(numbers, self.value, quantity))
-        return self.fill(at=tuple(numbers))
-
-
-class TorqueCurve(Curve):
-    """A torque over time, speed or angle: linear between the values, held outside."""
-
-    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "rad/s", "angle": "rad"}
-    over: Literal["time", "speed", "angle"]
-    """what it depends on; speed and angle are those of the joint, the angle from the reference position"""
-    at: tuple[Abscissa, ...]
-    """times, speeds or angles, increasing"""
-    value: tuple[Torque, ...]
-    """torque there"""
-
-
-class ForceCurve(Curve):
-    """A force over time, speed or travel: linear between the values, held outside."""
-
-    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "m/s", "travel": "m"}
-    over: Literal["time", "speed", "travel"]
-    """what it depends on; speed and travel are those of the joint, the travel from the reference position"""
-    at: tuple[Abscissa, ...]
-    """times, speeds or travels, increasing"""
-    value: tuple[Force, ...]
-    """force there"""
-
-
-def constant_as_curve(value: Any) -> Any:
-    """A constant as a curve of one value."""
-    return value if isinstance(value, (dict, Curve)) else {"over": "time", "at": [0.0], "value": [value]}
-
-
-TorqueOver = Annotated[TorqueCurve, BeforeValidator(constant_as_curve)]
-ForceOver = Annotated[ForceCurve, BeforeValidator(constant_as_curve)]
+from kedfem.scene.records.curves import ForceCurve, ForceOver, TorqueCurve, TorqueOver
 
 
 class Motor(Record):

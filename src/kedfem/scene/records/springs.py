@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from kedfem.scene.records.base import Record, refuse
-from kedfem.scene.records.loads import ONE, FactorOver, Force, Torque
+from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.units import Angle, Length, Quantity
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import PPoly
 
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.system.forces.turning_loads import shown_by
@@ -41,9 +42,11 @@ def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[flo
     match law_at(each.law, at.t, at.phi):
         case Spring(stiffness=k, damping=c, free=free):
             return (k * (e - free) + c * rate,)
-        case Curve(over=over, at=places, value=value):
+        case Curve(over=over, force=of):
             x = float(at.t[0]) if over == TIME else (rate if over == RATE else e)
-            return (-float(np.interp(x, places, value)),)
+            x = of.at[0] + (x - of.at[0]) % of.period if of.period else max(x, of.at[0])
+            cubics = PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])
+            return (-float(cubics(x)),)
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
             if lower <= e <= upper:
                 return (0.0,)

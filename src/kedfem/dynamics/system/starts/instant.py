@@ -156,13 +156,11 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
     match law:
         case Spring(stiffness=k, damping=c, free=free):
             return -k * (e - free) - c * rate, k, c
-        case Curve(over=over, at=at, value=value):
+        case Curve(over=over, force=force_at):
             x = {TIME: t, RATE: rate, COORDINATE: e}[over]
-            n = min(max(int(np.searchsorted(at, x)), 1), len(at) - 1)
-            inside = at[0] < x < at[-1]
-            slope = (value[n] - value[n - 1]) / (at[n] - at[n - 1]) if inside else 0.0
+            value, slope = force_at(x)
             falls = {TIME: (0.0, 0.0), RATE: (0.0, -slope), COORDINATE: (-slope, 0.0)}[over]
-            return float(np.interp(x, at, value)), *falls
+            return value, *falls
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
             beyond = max(e - upper, 0.0) + min(e - lower, 0.0)
             force = -k * beyond - c * rate
