@@ -518,7 +518,7 @@ def expect_whole_animation(folder: Path, results: Results) -> None:
 def test_a_scene_of_a_quick_run_can_be_read_again(kind: str, run_kedfem: Command, tmp_path: Path) -> None:
     """What takes results up, such as `kedfem loads`, reads their scene: with several drives its step was not in it."""
     assert run_kedfem("new", kind).code == 0
-    quick = cli._quick(read_scene(tmp_path / f"{kind}.toml"))
+    quick = cli.with_plain_defaults(read_scene(tmp_path / f"{kind}.toml"))
     again = scene_from(json.loads(quick.model_dump_json()), tmp_path)
     assert time_grid(again) == time_grid(quick)
 

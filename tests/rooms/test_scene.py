@@ -241,7 +241,7 @@ def test_a_template_is_a_scene_and_survives_a_round_trip(path):
     scene = read_scene(path)
     assert time_grid(scene).steps > 100
     assert Scene.model_validate(scene.model_dump()).model_dump() == scene.model_dump()
-    assert scene_from(json.loads(scene.model_dump_json())).model_dump() == scene.model_dump()
+    assert scene_from(json.loads(scene.model_dump_json()), path.parent).model_dump() == scene.model_dump()
     assert Scene(**dict(scene)).model_dump() == scene.model_dump()
 
 

@@ -3,7 +3,7 @@
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 
@@ -11,28 +11,16 @@ from kedfem.cli.comparing import compare
 from kedfem.cli.exporting import export
 from kedfem.cli.frequencies import frequencies
 from kedfem.cli.loading import loads
+from kedfem.cli.new import KINDS, new
 from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, Quick, ScenePath, Within
-from kedfem.cli.reporting import WRITTEN, report, view
+from kedfem.cli.reporting import report, say_where, view
+from kedfem.cli.running import run, with_plain_defaults
 from kedfem.cli.screen import err, out, progress, show, stages
 from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted, interruption_asked, one_blas_thread
 
 __all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
-
-KINDS = (
-    "four-bar",
-    "slider-crank",
-    "single-arm",
-    "press",
-    "scissor-lift",
-    "excavator",
-    "wishbone",
-    "stewart",
-    "robot-arm",
-    "valve-train",
-    "panel",
-)
 
 app = typer.Typer(
     name="kedfem",
@@ -57,45 +45,7 @@ def _root(
     del context
 
 
-@app.command()
-def run(
-    scene: ScenePath,
-    quick: Quick = False,
-    within: Within = False,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on from the last state that an interrupted or killed run stored."),
-    ] = False,
-    states: Annotated[float, typer.Option(metavar="SECONDS", help="Time between stored states.")] = 10.0,
-) -> None:
-    """Analyse a scene: time series, animation, plots, a picture."""
-    from kedfem.analysis import analyse
-    from kedfem.results import abandoned_rows
-    from kedfem.resume import has_state
-    from kedfem.scene import read_scene
-    from kedfem.tables import run_tables, size_line
-
-    loaded = read_scene(scene, within=within)
-    loaded = _quick(loaded) if quick else loaded
-    file = loaded.results_folder / "results.h5"
-    before = _version(file)
-    if not resume and (rows := abandoned_rows(file)) is not None:
-        said = f"{file}: an earlier run was killed after {rows} rows; they stay until this run's first rows replace them"
-        said += "; --resume would go on with it" * has_state(file.parent)
-        err.print(f"warning: {said}", style="yellow", markup=False, soft_wrap=True)
-    try:
-        with progress() as watch:
-            done = analyse(loaded, watch, resume, states)
-    except KeyboardInterrupt:
-        _interrupted(file, _version(file) != before)
-    if done.sizes:
-        out.print(size_line(done.sizes), markup=False, soft_wrap=True)
-    show(run_tables(loaded, done), done.warnings)
-    _say_where(done.folder)
-    if done.results.status == "doubtful":
-        said = f"doubtful: {done.results.reason}; these results mean nothing"
-        err.print(said, style="red", markup=False, soft_wrap=True)
-        raise typer.Exit(DOUBTFUL)
+app.command()(run)
 
 
 @app.command()
@@ -109,7 +59,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     from kedfem.tables import assembly_tables, check_tables, size_line
 
     read = read_scene(scene, within=within)
-    loaded, assembly = assembled(_quick(read) if quick else read)
+    loaded, assembly = assembled(with_plain_defaults(read) if quick else read)
     with stages() as stage:
         plan = plan_for(loaded, stage)
         ready, reduction = prepared(plan.scene if plan else loaded, stage)
@@ -135,7 +85,7 @@ def kinematics(
     with progress() as watch:
         done = moved_by(loaded, folder, watch)
     show(kinematics_tables(loaded, done), done.warnings)
-    _say_where(done.folder)
+    say_where(done.folder)
 
 
 @app.command()
@@ -231,71 +181,7 @@ def accuracy(
         out.print(f"{target / name}", markup=False, soft_wrap=True)
 
 
-@app.command()
-def new(
-    kind: Annotated[
-        str | None,
-        typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + "; left out with --from."),
-    ] = None,
-    path: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="Default: KIND.toml or ASSEMBLY.toml here.")
-    ] = None,
-    assembly: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            metavar="ASSEMBLY",
-            help="A CAD file (STEP, IGES or BREP): its solids become links, joints where they meet are proposed.",
-        ),
-    ] = None,
-    scale: Annotated[
-        float | None, typer.Option(help="Metres per unit of ASSEMBLY, if not its own unit.")
-    ] = None,
-) -> None:
-    """Write a commented scene to start from."""
-    if assembly is not None:
-        if path is not None or kind in KINDS:
-            raise SceneError(f"KIND: must be left out with --from, got '{kind}'")
-        _new_from(assembly, Path(kind or f"{assembly.stem}.toml"), scale)
-        return
-    from importlib.resources import files
-
-    if kind not in KINDS or scale is not None:
-        from kedfem.scene.records.wording import one_of
-
-        if scale is not None:
-            raise SceneError("--scale: must be combined with --from, got it alone")
-        raise SceneError(f"KIND: {one_of(list(KINDS), kind)}")
-    text = (files("kedfem") / "templates" / f"{kind.replace('-', '_')}.toml").read_text(encoding="utf-8")
-    _write_new(path or Path(f"{kind}.toml"), text)
-
-
-def _new_from(assembly: Path, target: Path, scale: float | None) -> None:
-    from kedfem.tables.draft import draft_scene
-
-    if target.exists():
-        raise _exists(target)
-    if not target.parent.is_dir():
-        raise OutputError(f"{target}: must be in a folder that is there, got none at {target.parent}")
-    with progress() as watch:
-        watch("assembly", 0, 0)
-        text = draft_scene(assembly, target.parent, scale)
-    _write_new(target, text)
-
-
-def _exists(target: Path) -> OutputError:
-    return OutputError(f"{target}: must be a new file, got one that exists already")
-
-
-def _write_new(target: Path, text: str) -> None:
-    try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise _exists(target) from None
-    except OSError as error:
-        raise OutputError(f"{target}: must be a file that can be written, got {error.strerror}") from None
-    out.print(f"{target} written; try: kedfem check {target}", markup=False, soft_wrap=True)
+app.command()(new)
 
 
 @app.command()
@@ -343,59 +229,6 @@ app.command()(compare)
 app.command()(report)
 app.command()(export)
 app.command()(view)
-
-
-def _quick(scene: Any) -> Any:
-    """The scene with plain defaults for what it leaves open; the step is stated where no turns of a drive tell it."""
-    from kedfem.scene import time_grid
-    from kedfem.scene.questions.timing import scene_speed
-
-    analysis = scene.analysis.model_copy(update={"accuracy": "quick"})
-    quick = scene.model_copy(update={"analysis": analysis})
-    if not scene.driven_joints or scene_speed(scene) or analysis.step is not None:
-        return quick
-    step = {"step": time_grid(quick).step}
-    return quick.model_copy(update={"analysis": analysis.model_copy(update=step)})
-
-
-def _version(file: Path) -> tuple[int, int] | None:
-    """Something that changes with a file; None where there is none."""
-    return (file.stat().st_ino, file.stat().st_mtime_ns) if file.exists() else None
-
-
-def _interrupted(file: Path, begun: bool) -> NoReturn:
-    from kedfem.results import run_status
-    from kedfem.resume import has_state
-
-    kept = (
-        f"what was computed is readable in {file} (status: {run_status(file)})"
-        if begun
-        else "nothing was written"
-    )
-    kept += "; kedfem run --resume goes on with it" * has_state(file.parent)
-    err.print(f"interrupted; {kept}", style="yellow", markup=False, soft_wrap=True)
-    raise typer.Exit(INTERRUPTED)
-
-
-def _say_where(folder: Path) -> None:
-    for name, what in (
-        ("results.h5", "time series"),
-        ("results.csv", "the same as a table"),
-        ("results.parquet", "the same for pandas"),
-        ("animation.pvd", "animation, open in ParaView"),
-        ("paraview.py", "state for ParaView that opens all of it"),
-        ("animation.vtkhdf", "the same in one file"),
-        ("plots", "plots"),
-        ("envelope.vtu", "highest stresses over all steps, for ParaView"),
-        ("peaks.csv", "top ten of each link"),
-        ("worst.png", "picture of the highest stress"),
-        ("fatigue.vtu", "damage and utilisation, for ParaView"),
-        ("fatigue.csv", "life at the worst places of each link"),
-        ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
-        ("report.html", WRITTEN),
-    ):
-        if (folder / name).exists():
-            out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)
 
 
 def main() -> None:

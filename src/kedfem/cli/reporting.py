@@ -78,3 +78,25 @@ def _of_scene(file: Path, within: bool) -> Path:
             f"(kedfem run {file}), or give the folder to see the earlier ones"
         )
     return scene.results_folder
+
+
+def say_where(folder: Path) -> None:
+    """What a command has written into a folder."""
+    for name, what in (
+        ("results.h5", "time series"),
+        ("results.csv", "the same as a table"),
+        ("results.parquet", "the same for pandas"),
+        ("animation.pvd", "animation, open in ParaView"),
+        ("paraview.py", "state for ParaView that opens all of it"),
+        ("animation.vtkhdf", "the same in one file"),
+        ("plots", "plots"),
+        ("envelope.vtu", "highest stresses over all steps, for ParaView"),
+        ("peaks.csv", "top ten of each link"),
+        ("worst.png", "picture of the highest stress"),
+        ("fatigue.vtu", "damage and utilisation, for ParaView"),
+        ("fatigue.csv", "life at the worst places of each link"),
+        ("mesh_error.vtu", "where the mesh is coarse, for ParaView"),
+        ("report.html", WRITTEN),
+    ):
+        if (folder / name).exists():
+            out.print(f"{folder / name}  {what}", markup=False, soft_wrap=True)
