@@ -429,6 +429,18 @@ def test_what_has_no_period_is_refused() -> None:
     assert "must have a period" in refused({**rise, "analysis": {"step": 1e-3}}, end_time=0.2)
 
 
+def test_a_motor_whose_torque_repeats_itself_on_a_joint_that_goes_on_turning() -> None:
+    """Its steady state is what a march comes to; without a period its torque would grow for ever."""
+    cogging = {"over": "angle", "at": ["0 deg", "90 deg", "200 deg"], "value": [0.0, 2.0, -1.0]}
+    periodic = {**cogging, "interpolation": "smooth", "period": "360 deg"}
+    raw = planar("beam", motors={"m": {"joint": "B", "torque": periodic}})
+    ready, found, _ = steady(raw)
+    still = steady(planar("beam"))[1]
+    assert np.abs(found - still).max() > 0.01 * np.abs(found).max()
+    assert off(raw, 48, found, ready) < 1e-6
+    assert "goes on turning" in refused(planar("beam", motors={"m": {"joint": "B", "torque": cogging}}))
+
+
 def test_a_spring_that_is_wound_up_is_refused() -> None:
     wound = {"kind": "torsion", "joint": "B", "stiffness": 1.0}
     assert "goes on turning" in refused(planar("beam", springs={"s": wound}))

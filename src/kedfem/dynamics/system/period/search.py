@@ -28,7 +28,9 @@ from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.errors import SolveError
+from kedfem.scene import Pieces
 
+REPEATED = 1e-3  # of a curve's period, which elastic links may miss by so much
 CLOSED = 1e-9  # what a period may leave of the size of a state
 ENOUGH, LOOSE = 1e-8, 1e-6  # what is taken where nothing less is found, of linear systems and of others
 ROUGH = 0.3  # of the tolerance of iterations: what a period may leave where steps iterate
@@ -213,6 +215,12 @@ def _resonant(of: PeriodMap, shapes: Sequence[Flat]) -> str:
     )
 
 
+def _repeats(curve: Pieces, gone: float) -> bool:
+    """Whether a curve is where it was after a coordinate has gone on."""
+    times = gone / curve.period if curve.period else 0.5
+    return abs(times - round(times)) < REPEATED
+
+
 def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
     """Refuse springs on hinges that go on turning: they are wound up further in each period.
 
@@ -222,10 +230,11 @@ def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
     """
     before, after = (map_.state(each).e[0] for each in (x, y))
     for n, each in enumerate(map_.of.system.constraints):
+        gone = float(after[n] - before[n])
         depends = isinstance(each.law, Spring) or (
-            isinstance(each.law, Curve) and each.law.over == COORDINATE
+            isinstance(each.law, Curve) and each.law.over == COORDINATE and not _repeats(each.law.force, gone)
         )
-        winds = any(term.kind == ANGLE for term in each.terms) and abs(after[n] - before[n]) > TURN / 2
+        winds = any(term.kind == ANGLE for term in each.terms) and abs(gone) > TURN / 2
         if depends and winds:
             raise SolveError(
                 f"{each.name}: must act on a joint that swings for a steady state, got one that goes on turning: its "
