@@ -15,6 +15,7 @@ from jaxtyping import Float, UInt8
 FORMAT = 3
 """Version of the file's layout."""
 
+CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8 MB of each that is open
 CHUNK_ROWS = 512
 """Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
 
@@ -36,7 +37,7 @@ def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
     """
     import h5py
 
-    return h5py.File(path, mode, locking=locking, libver=("v108", "v110"))
+    return h5py.File(path, mode, locking=locking, libver=("v108", "v110"), rdcc_nbytes=CACHED)
 
 
 def new_rows(file: Any, name: str, width: tuple[int, ...]) -> Any:
