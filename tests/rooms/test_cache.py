@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from kedfem import store
 from kedfem.accuracy import reduction
-from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import histories
+from kedfem.accuracy.prepared import key
 from kedfem.accuracy.reduction import prepared
 from kedfem.cli import app
 from kedfem.dynamics.model import Model

@@ -13,7 +13,6 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from kedfem.accuracy.cache import key
 from kedfem.accuracy.choices import (
     DEARER,
     beams_only,
@@ -26,6 +25,7 @@ from kedfem.accuracy.choices import (
     with_beams,
 )
 from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_fillets, with_modes
+from kedfem.accuracy.prepared import key
 from kedfem.accuracy.segments import open_segments, with_segments
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (

@@ -1,14 +1,17 @@
-"""A scene with everything that does not need a time step."""
+"""A scene with everything that does not need a time step, and the key that what was found for it is kept under."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
 
 from kedfem.dynamics.model import Model, elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
-from kedfem.scene import Scene
+from kedfem.scene import Cad, MeshFile, Part, Scene
+from kedfem.store import contents
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,3 +47,13 @@ def moving(scene: Scene) -> tuple[Linkage, Path]:
     joined = linkage(scene)
     initial_twists(scene, joined)
     return joined, path(joined, *drive_range(scene))
+
+
+def key(scene: Scene) -> str:
+    """A digest of everything in a scene that a plan or a reduced model depends on, the contents of its files too."""
+    said = scene.model_dump(mode="json", exclude={"title", "fatigue"})
+    said["output"] = said["output"]["probes"]
+    digest = sha256(json.dumps(said).encode())
+    shapes = (link.shape for link in scene.links.values())
+    digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)))
+    return digest.hexdigest()

@@ -19,9 +19,8 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.cache import key
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.prepared import Prepared, key, meshed
 from kedfem.accuracy.shared_modes import as_alike, damped_as, last_of
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.history import Snapshot

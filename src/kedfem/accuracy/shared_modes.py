@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from kedfem.accuracy.cache import key
-from kedfem.accuracy.prepared import Prepared, moving
+from kedfem.accuracy.prepared import Prepared, key, moving
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.period.map import Carried

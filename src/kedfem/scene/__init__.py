@@ -32,9 +32,20 @@ from kedfem.scene.records.drives import (
 )
 from kedfem.scene.records.faces import ChosenFace
 from kedfem.scene.records.fatigue import Fatigue, FatigueData, StrainLife
+from kedfem.scene.records.force_elements import (
+    AngleLimit,
+    Limit,
+    LineSpring,
+    Motor,
+    Spring,
+    SpringEnd,
+    TorsionSpring,
+    TravelLimit,
+)
 from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.initial import InitialMotion
-from kedfem.scene.records.links import DIRECTED, GROUND, ROTARY, Joint, LinkScene, Meshing, require_elastic
+from kedfem.scene.records.joints import DIRECTED, ROTARY, Joint
+from kedfem.scene.records.links import GROUND, LinkScene, Meshing, require_elastic
 from kedfem.scene.records.loads import (
     Body,
     BodyLoad,
@@ -48,7 +59,6 @@ from kedfem.scene.records.loads import (
     TorqueLoad,
 )
 from kedfem.scene.records.materials import Material
-from kedfem.scene.records.motors import Motor
 from kedfem.scene.records.outlines import Arc, Hole
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.sections import (
@@ -69,8 +79,6 @@ from kedfem.scene.records.shapes import (
     Polyline,
     Shape,
 )
-from kedfem.scene.records.springs import LineSpring, Spring, SpringEnd, TorsionSpring
-from kedfem.scene.records.stops import AngleLimit, Limit, TravelLimit
 
 __all__ = [
     "DIRECTED",

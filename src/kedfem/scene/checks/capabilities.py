@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
-from kedfem.scene.records.links import JointKind
+from kedfem.scene.records.joints import JointKind
 
 Facts = Mapping[str, str]
 """Level of each factor that is known of a part of a scene."""

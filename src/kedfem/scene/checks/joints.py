@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 
 from kedfem.scene.checks.faults import line
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
-from kedfem.scene.records.links import DIRECTED, GROUND, SQUARE
+from kedfem.scene.records.joints import DIRECTED, SQUARE
+from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.wording import NOUNS, unknown_name
 
 

@@ -15,14 +15,13 @@ from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.records.damping import Damping
 from kedfem.scene.records.drives import Drive, Gear
 from kedfem.scene.records.fatigue import Fatigue
-from kedfem.scene.records.links import Joint, LinkScene
+from kedfem.scene.records.force_elements import Limit, Motor, Spring
+from kedfem.scene.records.joints import Joint
+from kedfem.scene.records.links import LinkScene
 from kedfem.scene.records.loads import Body, Load
 from kedfem.scene.records.materials import BUILT_IN
-from kedfem.scene.records.motors import Motor
 from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.scene import Scene
-from kedfem.scene.records.springs import Spring
-from kedfem.scene.records.stops import Limit
 
 TYPES: dict[str, Any] = {
     "links": LinkScene,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from kedfem.scene.records.drives import Drive
-from kedfem.scene.records.links import GROUND, Joint
+from kedfem.scene.records.joints import Joint
+from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.scene import Scene
 
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go

@@ -11,7 +11,7 @@ from typing import Any
 
 from kedfem.scene.questions.moving_joints import enforced_by_equations
 from kedfem.scene.records.base import Fault
-from kedfem.scene.records.links import Joint
+from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.points import XYZ, Apart
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.shapes import Bar, Polyline

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
@@ -11,13 +11,11 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import SceneError
 from kedfem.scene.records.base import Fault, FileName, Record, refuse
-from kedfem.scene.records.bushings import Bushing
-from kedfem.scene.records.faces import ChosenFace, Faces
 from kedfem.scene.records.inertia import Inertia, inertia_faults
-from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, Point, apart
+from kedfem.scene.records.points import Point
 from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
 from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault
-from kedfem.scene.records.wording import one_of, shown, unknown_name
+from kedfem.scene.records.wording import one_of, shown
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
@@ -25,14 +23,6 @@ Element = Literal[
     "hex27", "hex20", "hex8", "tet10", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"
 ]
 Count = Annotated[StrictInt, Field(ge=1)]
-JointKind = Literal[
-    "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
-]
-DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
-ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
-SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
-COUPLINGS = ("distributing", "rigid")
-Coupling = Literal["distributing", "rigid"]
 Frames = Literal["rigid-body", "co-rotational"]
 
 
@@ -219,104 +209,6 @@ class LinkScene(Record):
         given = self.mesh.size is not None or self.mesh.unknowns is not None
         across = self.mesh.elements_across or (None if given else fewest)
         return {"elements_across": across}
-
-
-def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
-    """Something for each of several links, by their names."""
-    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-        raise fault(f"must be a table by names of links, got {shown(value)}")
-    return {name: what(each) for name, each in value.items()}
-
-
-def couplings(value: object) -> object:
-    """How a joint holds its coupling surfaces: one word, or one for each link."""
-    if isinstance(value, Mapping):
-        return of_links(value, couplings)
-    if value not in COUPLINGS:
-        raise fault(one_of(list(COUPLINGS), value))
-    return value
-
-
-def by_link(value: object) -> object:
-    """A table by names of links."""
-    return of_links(value, lambda each: each)
-
-
-class Joint(Record):
-    """A joint between two links, or a link and the ground."""
-
-    kind: JointKind
-    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without turning;
-    cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
-    axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
-    the second"""
-    links: tuple[str, str]
-    """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
-    at: JointPoint
-    """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
-    `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
-    axis: Axis | None = None
-    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
-    of what slides, the normal of a planar joint (required for those); for a ball or a weld the axis of the bore that
-    holds it"""
-    axes: tuple[Axis, Axis] | None = None
-    """of a universal joint: the axis in the first link and that in the second, at right angles"""
-    lead: Annotated[float, Quantity("m")] | None = None
-    """of a screw: travel in one revolution, positive if right-handed"""
-    coupling: Annotated[Coupling | dict[str, Coupling], BeforeValidator(couplings)] = "distributing"
-    """how it holds bores and faces of solids and plane links: by their mean displacement and rotation, or so that they
-    keep their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
-    faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
-    """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
-    groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
-    given, what lies about `at`"""
-
-    bushing: Bushing | None = None
-    """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
-
-    def stiff(self, link: str) -> bool:
-        """Whether the coupling surface on a link keeps its shape."""
-        return (self.coupling.get(link) if isinstance(self.coupling, dict) else self.coupling) == "rigid"
-
-    def face_names(self, link: str) -> tuple[str, ...]:
-        """What the faces of a link that hold it are called: their names, or what was said of them."""
-        return tuple(each if isinstance(each, str) else each.label for each in self.faces.get(link, ()))
-
-    def chosen_faces(self, link: str) -> tuple[ChosenFace, ...]:
-        """The faces of a link that are chosen by what they are."""
-        return tuple(each for each in self.faces.get(link, ()) if not isinstance(each, str))
-
-    @property
-    def points(self) -> dict[str, XYZ]:
-        """Its points by link [m], where it has one for each."""
-        return self.at.points if isinstance(self.at, Apart) else {}
-
-    @property
-    def open(self) -> bool:
-        """Whether its links are drawn apart."""
-        return len(set(self.points.values())) > 1
-
-    def on(self, link: str) -> XYZ:
-        """Its point on a link [m]."""
-        return self.points.get(link, self.at)
-
-    @model_validator(mode="after")
-    def _point_of_each_link(self) -> Self:
-        if not isinstance(self.at, Apart):
-            return self
-        given, names = self.at.points, list(self.links)
-        wrong = [
-            (("at", name), unknown_name("a link of the joint", name, names))
-            for name in given
-            if name not in names
-        ]
-        lacking = [(("at", name), "is required [m], got nothing") for name in names if name not in given]
-        refuse([*wrong, *lacking])
-        return self.fill(at=apart({name: given[name] for name in names}))
-
-    @model_validator(mode="after")
-    def _hinge_along_z(self) -> Self:
-        return self.fill(axis=(0.0, 0.0, 1.0)) if self.kind == "revolute" and self.axis is None else self
 
 
 def require_elastic(links: Mapping[str, LinkScene], name: str) -> None:

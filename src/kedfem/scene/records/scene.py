@@ -14,14 +14,13 @@ from kedfem.scene.records.damping import Damping
 from kedfem.scene.records.drives import Drive, Gear, MotionLaw
 from kedfem.scene.records.expressions import Parameter, ParameterName
 from kedfem.scene.records.fatigue import Fatigue
-from kedfem.scene.records.links import Joint, LinkScene
+from kedfem.scene.records.force_elements import Limit, Motor, Spring
+from kedfem.scene.records.joints import Joint
+from kedfem.scene.records.links import LinkScene
 from kedfem.scene.records.loads import Body, Load
 from kedfem.scene.records.materials import Material
-from kedfem.scene.records.motors import Motor
 from kedfem.scene.records.patterns import Pattern
 from kedfem.scene.records.points import AccelerationVector, Point
-from kedfem.scene.records.springs import Spring
-from kedfem.scene.records.stops import Limit
 
 
 class Scene(Record):

@@ -1,4 +1,4 @@
-"""Springs with dampers: between two points, along a slide or about a hinge."""
+"""Force elements: motors, springs with dampers, limits of joints."""
 
 from __future__ import annotations
 
@@ -7,10 +7,50 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from kedfem.scene.records.base import Record, refuse
-from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
+from kedfem.scene.records.base import Fault, Record, refuse
+from kedfem.scene.records.curves import (
+    ONE,
+    FactorOver,
+    Force,
+    ForceCurve,
+    ForceOver,
+    Torque,
+    TorqueCurve,
+    TorqueOver,
+)
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.units import Angle, Length, Quantity
+
+
+class Motor(Record):
+    """A torque on a hinge or a force on a slider: on the joint's first link that is not the ground, against the other.
+
+    A curve over speed or angle is one over those of that link against the other.
+    """
+
+    joint: str
+    """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force"""
+    torque: TorqueOver | None = None
+    """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
+    force: ForceOver | None = None
+    """of a slider, positive along its direction: a number, or such a table"""
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if self.torque is None and self.force is None:
+            refuse([(("torque",), "is required [N*m], or force [N] of a slider, got neither")])
+        if self.torque is not None and self.force is not None:
+            refuse([(("torque",), "cannot be combined with force, got both")])
+        return self
+
+    @property
+    def curve(self) -> TorqueCurve | ForceCurve:
+        """The torque or the force."""
+        curve = self.torque or self.force
+        if curve is None:
+            raise ValueError("a motor has a torque or a force")  # refused already
+        return curve
+
 
 Stiffness = Annotated[float, Quantity("N/m", least=0.0)]
 Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
@@ -140,3 +180,77 @@ class TorsionSpring(_Elastic):
 
 
 Spring = Annotated[LineSpring | TorsionSpring, Field(discriminator="kind")]
+
+
+StopStiffness = Annotated[float, Quantity("N/m", above=0.0)]
+TorsionStopStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]
+
+
+class _Range(Record):
+    """What both kinds share."""
+
+    @model_validator(mode="after")
+    def _holds_the_reference_position(self) -> Self:
+        lower, upper = getattr(self, "lower", None), getattr(self, "upper", None)
+        unit = "rad" if self.__class__ is AngleLimit else "m"
+        faults: list[Fault] = []
+        if lower is None and upper is None:
+            faults.append((("lower",), f"is required, or upper [{unit}], got neither"))
+        elif lower is not None and upper is not None and lower >= upper:
+            faults.append((("lower",), f"must be below upper {upper:.6g} [{unit}], got {lower:.6g}"))
+        else:
+            drawn = f"0 [{unit}], the reference position, which must be within the limits"
+            if lower is not None and lower > 0.0:
+                faults.append((("lower",), f"must be at most {drawn}, got {lower:.6g}"))
+            if upper is not None and upper < 0.0:
+                faults.append((("upper",), f"must be at least {drawn}, got {upper:.6g}"))
+        refuse(faults)
+        return self
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Lower and upper end [rad or m]; −inf and inf where there is none."""
+        lower, upper = getattr(self, "lower", None), getattr(self, "upper", None)
+        return (-math.inf if lower is None else lower, math.inf if upper is None else upper)
+
+
+class TravelLimit(_Range):
+    """Stops along a slide: beyond one they push back with k s + c s', s how far beyond, and never pull.
+
+    The travel is that of the joint's first link that is not the ground against the other, from the reference position.
+    """
+
+    kind: Literal["travel"] = "travel"
+    joint: str
+    """a prismatic or cylindrical joint that no drive moves"""
+    lower: Length | None = None
+    """least travel that is free; no stop there if not given"""
+    upper: Length | None = None
+    """largest travel that is free; no stop there if not given"""
+    stiffness: StopStiffness
+    """k of the stops"""
+    damping: Damper = 0.0
+    """c of the stops"""
+
+
+class AngleLimit(_Range):
+    """Stops about a hinge: beyond one they turn back with k s + c s', s how far beyond, and never pull.
+
+    The angle is the rotation of the joint's first link that is not the ground against the other, about the joint's axis,
+    from the reference position.
+    """
+
+    kind: Literal["angle"] = "angle"
+    joint: str
+    """a hinge, cylindrical joint or screw that no drive moves"""
+    lower: Angle | None = None
+    """least angle that is free; no stop there if not given"""
+    upper: Angle | None = None
+    """largest angle that is free; no stop there if not given"""
+    stiffness: TorsionStopStiffness
+    """k of the stops"""
+    damping: TorsionDamper = 0.0
+    """c of the stops"""
+
+
+Limit = Annotated[TravelLimit | AngleLimit, Field(discriminator="kind")]

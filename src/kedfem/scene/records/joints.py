@@ -1,0 +1,166 @@
+"""Joints between links, and the bushings in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.faces import ChosenFace, Faces
+from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, apart
+from kedfem.scene.records.units import Quantity, fault
+from kedfem.scene.records.wording import one_of, shown, unknown_name
+
+JointKind = Literal[
+    "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
+]
+DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
+ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
+SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
+COUPLINGS = ("distributing", "rigid")
+Coupling = Literal["distributing", "rigid"]
+
+
+def three(value: object) -> Any:
+    """One number for all directions, or three."""
+    if isinstance(value, (list, tuple)) and len(value) != 3:
+        raise fault(f"must be one number or three, along x, y, z of the joint, got {shown(value)}")
+    return value if value is None or isinstance(value, (list, tuple)) else (value, value, value)
+
+
+Rate = Annotated[float, Quantity("N/m", above=0.0)]
+Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
+TurningRate = Annotated[float, Quantity("N*m/rad", above=0.0)]
+TurningDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
+Rates = Annotated[tuple[Rate, Rate, Rate], BeforeValidator(three)]
+Dampers = Annotated[tuple[Damper, Damper, Damper], BeforeValidator(three)]
+TurningRates = Annotated[tuple[TurningRate, TurningRate, TurningRate], BeforeValidator(three)]
+TurningDampers = Annotated[tuple[TurningDamper, TurningDamper, TurningDamper], BeforeValidator(three)]
+
+
+class Bushing(Record):
+    """What a joint holds, held by springs and dampers; what it leaves free stays free.
+
+    One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right angles to
+    z and to that world axis which is farthest from it in the reference position (of equals the first), y at right angles
+    to both. Without an `axis` they are the world's in the reference position. They are fixed in the joint's second link,
+    or the ground if that is one."""
+
+    stiffness: Rates | None = None
+    """of displacements; held rigidly if not given"""
+    damping: Dampers = (0.0, 0.0, 0.0)
+    """of displacements"""
+    rotational_stiffness: TurningRates | None = None
+    """of turns; held rigidly if not given. Of a universal joint, whose one turn held is about the normal of its cross,
+    the third"""
+    rotational_damping: TurningDampers = (0.0, 0.0, 0.0)
+    """of turns"""
+
+    @model_validator(mode="after")
+    def _springs(self) -> Self:
+        if self.stiffness is None and self.rotational_stiffness is None:
+            refuse([(("stiffness",), "is required [N/m], or rotational_stiffness [N m/rad], got neither")])
+        for stiffness, damping in (("stiffness", "damping"), ("rotational_stiffness", "rotational_damping")):
+            if getattr(self, stiffness) is None and any(getattr(self, damping)):
+                refuse([((damping,), f"must be combined with {stiffness}, got it alone")])
+        return self
+
+
+def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
+    """Something for each of several links, by their names."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise fault(f"must be a table by names of links, got {shown(value)}")
+    return {name: what(each) for name, each in value.items()}
+
+
+def couplings(value: object) -> object:
+    """How a joint holds its coupling surfaces: one word, or one for each link."""
+    if isinstance(value, Mapping):
+        return of_links(value, couplings)
+    if value not in COUPLINGS:
+        raise fault(one_of(list(COUPLINGS), value))
+    return value
+
+
+def by_link(value: object) -> object:
+    """A table by names of links."""
+    return of_links(value, lambda each: each)
+
+
+class Joint(Record):
+    """A joint between two links, or a link and the ground."""
+
+    kind: JointKind
+    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without turning;
+    cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
+    axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
+    the second"""
+    links: tuple[str, str]
+    """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
+    at: JointPoint
+    """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
+    `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
+    axis: Axis | None = None
+    """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
+    of what slides, the normal of a planar joint (required for those); for a ball or a weld the axis of the bore that
+    holds it"""
+    axes: tuple[Axis, Axis] | None = None
+    """of a universal joint: the axis in the first link and that in the second, at right angles"""
+    lead: Annotated[float, Quantity("m")] | None = None
+    """of a screw: travel in one revolution, positive if right-handed"""
+    coupling: Annotated[Coupling | dict[str, Coupling], BeforeValidator(couplings)] = "distributing"
+    """how it holds bores and faces of solids and plane links: by their mean displacement and rotation, or so that they
+    keep their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
+    faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
+    """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
+    groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
+    given, what lies about `at`"""
+
+    bushing: Bushing | None = None
+    """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
+
+    def stiff(self, link: str) -> bool:
+        """Whether the coupling surface on a link keeps its shape."""
+        return (self.coupling.get(link) if isinstance(self.coupling, dict) else self.coupling) == "rigid"
+
+    def face_names(self, link: str) -> tuple[str, ...]:
+        """What the faces of a link that hold it are called: their names, or what was said of them."""
+        return tuple(each if isinstance(each, str) else each.label for each in self.faces.get(link, ()))
+
+    def chosen_faces(self, link: str) -> tuple[ChosenFace, ...]:
+        """The faces of a link that are chosen by what they are."""
+        return tuple(each for each in self.faces.get(link, ()) if not isinstance(each, str))
+
+    @property
+    def points(self) -> dict[str, XYZ]:
+        """Its points by link [m], where it has one for each."""
+        return self.at.points if isinstance(self.at, Apart) else {}
+
+    @property
+    def open(self) -> bool:
+        """Whether its links are drawn apart."""
+        return len(set(self.points.values())) > 1
+
+    def on(self, link: str) -> XYZ:
+        """Its point on a link [m]."""
+        return self.points.get(link, self.at)
+
+    @model_validator(mode="after")
+    def _point_of_each_link(self) -> Self:
+        if not isinstance(self.at, Apart):
+            return self
+        given, names = self.at.points, list(self.links)
+        wrong = [
+            (("at", name), unknown_name("a link of the joint", name, names))
+            for name in given
+            if name not in names
+        ]
+        lacking = [(("at", name), "is required [m], got nothing") for name in names if name not in given]
+        refuse([*wrong, *lacking])
+        return self.fill(at=apart({name: given[name] for name in names}))
+
+    @model_validator(mode="after")
+    def _hinge_along_z(self) -> Self:
+        return self.fill(axis=(0.0, 0.0, 1.0)) if self.kind == "revolute" and self.axis is None else self
