@@ -1,11 +1,9 @@
 """The whole job: a scene in; time series, animation, plots and a picture out."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path as FilePath
-from time import perf_counter
-from typing import TypeVar
 
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of, meaningless
 from kedfem.accuracy.estimates import Strained, budget
@@ -30,11 +28,9 @@ from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.solvers import Steps, eased_warning
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
-from kedfem.errors import SceneError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
-from kedfem.motion.period import repeats_after
 from kedfem.output.derived import (
     MESH,
     WORST,
@@ -55,7 +51,7 @@ from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
-from kedfem.results.fatigue.damage import fatigue_of, kept_since
+from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import measured_actions
 from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
@@ -65,10 +61,8 @@ from kedfem.results.stresses.hot_spots import hot_spots
 from kedfem.results.stresses.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
-from kedfem.scene import Scene, time_grid, without_vibration
-from kedfem.stepping import Watch, Watched, stepped
-
-T = TypeVar("T")
+from kedfem.scene import Scene, without_vibration
+from kedfem.stepping import Clock, Watch, Watched, stepped
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,7 +248,7 @@ def _drawn(
     return write_vibration(ready.scene, ready.model, recoveries, grows, folder) if grows else ()
 
 
-def _about_steps(ready: Prepared, clock: "Clock") -> list[str]:
+def _about_steps(ready: Prepared, clock: Clock) -> list[str]:
     """Warnings of steps that are too long for what moves and for what loads do; refused if turns cannot be counted."""
     require_counted(ready.scene, ready.linkage, ready.path)
     if without_vibration(ready.scene):
@@ -273,25 +267,6 @@ def _stress_files(
     write_top(folder, hot_spots(extremes.found, extremes.when, doubts), named)
     if (worst := envelope.worst) is not None:
         write_frame(folder / WORST, worst.t, fields(scene, ready.model, envelope.recoveries, worst))
-
-
-def stress_period(scene: Scene) -> float:
-    """The time after which stresses repeat, where damage is asked for, else 0 [s].
-
-    Raises
-    ------
-    SceneError
-        The motion does not repeat itself, or the analysis is shorter.
-    """
-    if scene.fatigue is None:
-        return 0.0
-    end = time_grid(scene).end
-    if scene.analysis.kind == "steady":
-        return end
-    period = scene.fatigue.period or repeats_after(scene)
-    if end < period * (1 - 1e-9):
-        raise SceneError(f"fatigue: needs a whole period, {period:.6g} s, got an analysis of {end:.6g} s")
-    return period
 
 
 def _damaged(
@@ -319,29 +294,3 @@ def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
     """The channels of a run as its errors are judged."""
     channels = {name: each for name, each in results.channels.items() if kind_of(each[0]) is not None}
     return Histories(results.time, channels, begun=steady_state(solvers))
-
-
-@dataclass
-class Clock:
-    """Seconds of each stage, told to the watcher as it begins."""
-
-    watch: Watch
-    seconds: dict[str, float] = field(default_factory=dict)
-    _name: str = ""
-    _since: float = 0.0
-
-    def stage(self, name: str, words: str = "") -> None:
-        """End the running stage and begin the next, told in its own words if there are any."""
-        now = perf_counter()
-        if self._name:
-            self.seconds[self._name] = now - self._since
-        self._name, self._since = name, now
-        if name:
-            self.watch(words or name, 0, 0)
-
-    def timed(self, name: str, work: Callable[[], T], words: str = "") -> T:
-        """Do the work of one stage."""
-        self.stage(name, words)
-        out = work()
-        self.stage("")
-        return out

@@ -9,7 +9,6 @@ from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import moved
-from kedfem.analysis import Clock
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.nominal import all_motions
@@ -33,7 +32,7 @@ from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, time_grid
-from kedfem.stepping import Watch, frame_steps
+from kedfem.stepping import Clock, Watch, frame_steps
 
 
 @dataclass(frozen=True, slots=True)

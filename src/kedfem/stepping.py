@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -38,6 +38,7 @@ from kedfem.scene import Scene, time_grid, turn_steps
 
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 
+T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
 """Told of progress: (stage, done, total)."""
 
@@ -228,3 +229,29 @@ class _Table:
             if first:
                 remove_derived(self.folder)
                 remove_state(self.folder)
+
+
+@dataclass
+class Clock:
+    """Seconds of each stage, told to the watcher as it begins."""
+
+    watch: Watch
+    seconds: dict[str, float] = field(default_factory=dict)
+    _name: str = ""
+    _since: float = 0.0
+
+    def stage(self, name: str, words: str = "") -> None:
+        """End the running stage and begin the next, told in its own words if there are any."""
+        now = perf_counter()
+        if self._name:
+            self.seconds[self._name] = now - self._since
+        self._name, self._since = name, now
+        if name:
+            self.watch(words or name, 0, 0)
+
+    def timed(self, name: str, work: Callable[[], T], words: str = "") -> T:
+        """Do the work of one stage."""
+        self.stage(name, words)
+        out = work()
+        self.stage("")
+        return out

@@ -2,16 +2,14 @@
 
 from collections.abc import Collection, Iterable
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
-from kedfem.links.beams.beam import beam_link, line_axes, spaced
-from kedfem.links.beams.beam_axis import Axis, directions, smooth_axis, straight_axis
-from kedfem.links.beams.section import scene_section
-from kedfem.links.beams.spatial_beam import spatial_beam_link
+from kedfem.links.beams.beam import line_axes
+from kedfem.links.beams.beam_axis import directions
+from kedfem.links.beams.of_scene import scene_axis, scene_beam
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.segments import (
@@ -36,16 +34,12 @@ from kedfem.scene import (
     MeshFile,
     Part,
     PlateLink,
-    PointMass,
     Polyline,
-    RectangleSection,
     Scene,
     link_frames,
     spatial_beams,
 )
 
-SEATED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
-SAME = 1e-6  # of a segment's length: what is so near is at one place
 SEGMENTS = 6  # of a solid or plane link with co-rotational frames, where none are given
 
 
@@ -138,7 +132,7 @@ def bare_link(
         return plane_link(
             name, plane_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
         )
-    return _beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
+    return scene_beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
 
 
 def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]:
@@ -176,7 +170,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case "beam":
             return beam_segments(link, material)
         case "spatial_beam":
-            return space_segments(link, _axis(scene, name), material)
+            return space_segments(link, scene_axis(scene, name), material)
         case _:
             ends = _ends(scene, name)
             whole = _whole(scene, name, link, along(link, ends))
@@ -232,70 +226,3 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
             s = link.X[link.cells[link.basis.mesh.f2t[0, seat.facets]]] @ e
             out.append((float(s.min()), float(s.max())))
     return out
-
-
-def _beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
-    link = scene.links[name]
-    shape, material = link.shape, scene.materials[str(link.material)]
-    if not isinstance(shape, Bar | Polyline):
-        raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
-    of_section = shape.of_section if isinstance(shape, Polyline) else _of_bar(shape)
-    section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
-    if name in spatial:
-        return spatial_beam_link(name, _axis(scene, name), section, material)
-    points, elements = beam_points(scene, name, spatial=False), link.mesh.elements
-    count = elements if isinstance(elements, int) else 1
-    return beam_link(name, points, section, material, count, beam_nodes(link))
-
-
-def _axis(scene: Scene, name: str) -> Axis:
-    """The axis of a beam in space."""
-    link = scene.links[name]
-    shape = link.shape
-    if not isinstance(shape, Bar | Polyline):
-        raise TypeError("a beam is a bar or a polyline")  # refused by the scene already
-    smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, shape.upward)
-    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
-    make = smooth_axis if smooth else straight_axis
-    points = beam_points(scene, name, spatial=True)
-    return make(points, elements, beam_nodes(link), None if up is None else np.array(up))
-
-
-def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 3"]:
-    """The corners of a beam, and where joints and bodies sit between them: segments begin and end there.
-
-    Those that have a node already need no corner, but for bodies with inertia on a beam in space.
-    """
-    link = scene.links[name]
-    shape = link.shape
-    points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
-    if getattr(shape, "smooth", False):
-        return points
-    held = [x.on(name) for x in scene.joints.values() if name in x.links and x.kind in SEATED]
-    light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
-    heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
-    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
-    nodes = spaced(elements, beam_nodes(link)) / elements
-    out = [points[:1]]
-    for P, Q in pairwise(points):
-        length = float(np.linalg.norm(Q - P))
-        inside, corners = [], []
-        for at, corner in [*((x, False) for x in (*held, *light)), *((x, spatial) for x in heavy)]:
-            f = float((np.asarray(at) - P) @ (Q - P)) / length**2
-            beside = float(np.linalg.norm(P + f * (Q - P) - at))
-            if beside <= SAME * length and SAME < f < 1.0 - SAME:
-                inside.append(f)
-                corners.append(corner or np.abs(nodes - f).min() > SAME)
-        apart = [f for k, f in enumerate(sorted(inside)) if k == 0 or f - sorted(inside)[k - 1] > SAME]
-        apart = apart if any(corners) else []  # one new corner moves all nodes of the segment
-        out += [P + np.array(apart)[:, None] * (Q - P), Q[None]]
-    return np.concatenate(out)
-
-
-def beam_nodes(link: LinkScene) -> int:
-    """Nodes of each element of a beam: the number in its name."""
-    return int(str(link.element).removeprefix("beam"))
-
-
-def _of_bar(bar: Bar) -> RectangleSection:
-    return RectangleSection(width=bar.width, thickness=bar.thickness)

@@ -10,7 +10,9 @@ from functools import partial
 import numpy as np
 
 from kedfem.dynamics.model import Model
+from kedfem.errors import SceneError
 from kedfem.links.recovery import StressRecovery
+from kedfem.motion.period import repeats_after
 from kedfem.results.fatigue.strength import Strength, strength_of, verdict
 from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
 from kedfem.results.records import Fatigue, FatigueSpot
@@ -140,3 +142,22 @@ def _spot(look: Look, point: int, asked: Asked, period: Period) -> FatigueSpot:
         float(judged.found[0, 2]), float(judged.found[0, 3]), float(judged.disproportion[0]), found.support,
         found.cycles, look.near[point],
     )  # fmt: skip
+
+
+def stress_period(scene: Scene) -> float:
+    """The time after which stresses repeat, where damage is asked for, else 0 [s].
+
+    Raises
+    ------
+    SceneError
+        The motion does not repeat itself, or the analysis is shorter.
+    """
+    if scene.fatigue is None:
+        return 0.0
+    end = time_grid(scene).end
+    if scene.analysis.kind == "steady":
+        return end
+    period = scene.fatigue.period or repeats_after(scene)
+    if end < period * (1 - 1e-9):
+        raise SceneError(f"fatigue: needs a whole period, {period:.6g} s, got an analysis of {end:.6g} s")
+    return period
