@@ -12,6 +12,8 @@ from kedfem.processes import machine
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 MEASURED = "Measured on: "
+MOST_TICKS = 12  # of an axis that names every size
+MANY = 6  # curves: their names stand beside the plot
 
 
 def script(benchmark: Callable[[Path, bool], None]) -> None:
@@ -66,11 +68,15 @@ def write_loglog(folder: Path, name: str, curves: Mapping[str, tuple[Sequence[fl
     for (label, (x, y)), marker in zip(curves.items(), "osd^vx*" * 2, strict=False):
         axes.loglog(x, y, marker=marker, label=label)
     sizes = sorted({value for x, _ in curves.values() for value in x})
-    axes.set_xticks(sizes, [f"{size:,.0f}" for size in sizes])
-    axes.set_xticks([], minor=True)
+    if len(sizes) <= MOST_TICKS:
+        axes.set_xticks(sizes, [f"{size:,.0f}" for size in sizes])
+        axes.set_xticks([], minor=True)
     axes.set_xlabel(labels[0])
     axes.set_ylabel(labels[1])
     axes.grid(visible=True, which="both", alpha=0.3)
-    axes.legend()
+    if len(curves) > MANY:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=7)
+    else:
+        axes.legend()
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / f"{name}.png", dpi=130)
