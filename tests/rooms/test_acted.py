@@ -30,10 +30,11 @@ def four_bar(frames: str, model: str = "beam", steps: int = 180, **rest: Any) ->
         "initial": "quasi-static",
     }
     mesh = {"elements": 2} if model == "beam" else {}
+    kind = {"model": "solid", "reduction": "modal"} if model == "reduced" else {"model": model}
     shape = {"kind": "bar", "width": 0.02, "thickness": 0.01}
     return scenes.four_bar(
         (0.1, 0.3, 0.25, 0.3),
-        {"material": "m", "model": model, "mesh": mesh, "shape": shape},
+        {"material": "m", "mesh": mesh, "shape": shape, **kind},
         scenes.constant_speed("60 rpm"),
         materials={"m": scenes.material(RHO, E)},
         analysis={**analysis, **rest.pop("analysis", {})},

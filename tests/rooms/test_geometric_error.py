@@ -86,7 +86,7 @@ def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_
 
 
 def test_reduced_links_are_judged_as_full_ones() -> None:
-    full, reduced = (estimated(four_bar(400, 8, reduced=x)) for x in (False, True))
+    full, reduced = (estimated(four_bar(400, 8, reduction=x)) for x in ("none", "modal"))
     assert_allclose(reduced.axial / reduced.strain, full.axial / full.strain, rtol=0.05)
     assert_allclose(reduced.turn, full.turn, rtol=0.02)
 
