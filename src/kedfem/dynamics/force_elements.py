@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis
-from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, load_factor, pieces
+from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, factor_law, pieces
 
 
 def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -194,7 +193,7 @@ def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> ForceElement:
 
 
 def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement:
-    factor = partial(load_factor, spring.stiffness_factor)
+    factor = factor_law(spring.stiffness_factor)
     law: dict[str, Any] = {
         "stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free, "factor": factor,
     }  # fmt: skip

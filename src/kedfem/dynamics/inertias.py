@@ -6,7 +6,6 @@ All that a rigid body does to the balance of forces is in ∫ρ dV, ∫ρ X dV a
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -28,8 +27,8 @@ from kedfem.scene import (
     PointMass,
     RigidBody,
     Scene,
+    factor_law,
     inertia_tensor,
-    load_factor,
     moving_grounds,
 )
 
@@ -257,7 +256,7 @@ def _add_forces(out: Inertias, scene: Scene, linkage: Linkage, links: Iterable[s
             out.loads.append(
                 RigidLoad(
                     linkage.bodies.index(load.link), f, np.outer(arm, f), 0.0, load.frame == "link",
-                    partial(load_factor, load.factor),
+                    factor_law(load.factor),
                 )
             )  # fmt: skip
 

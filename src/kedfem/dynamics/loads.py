@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -29,6 +28,7 @@ from kedfem.scene import (
     Scene,
     SurfaceLoad,
     TorqueLoad,
+    factor_law,
     factor_table,
     factors,
     load_factor,
@@ -126,7 +126,7 @@ def _load_patterns(
 ) -> dict[str, list[Pattern]]:
     """The patterns of a load on each segment of its link."""
     parts = {key: link for key, link in links.items() if link.name == load.link}
-    factor = partial(load_factor, load.factor)
+    factor = factor_law(load.factor)
     match load:
         case TorqueLoad() if parts:
             return _torque(scene, where, load, parts)
@@ -148,7 +148,7 @@ def _torque(
     scene: Scene, where: str, load: TorqueLoad, parts: Mapping[str, Link]
 ) -> dict[str, list[Pattern]]:
     """A couple on the segment that has its seat; of fixed direction m it is Σ (m · R e_k) times the one about R e_k."""
-    m, factor = np.asarray(load.vector), partial(load_factor, load.factor)
+    m, factor = np.asarray(load.vector), factor_law(load.factor)
     at = np.asarray(scene.joints[load.joint].at if load.joint is not None else load.at)
     key, couples = on_part(parts, load.link, at, lambda link: _couples(scene, where, load, link, at))
     if load.frame == "link" or parts[key].planar:
@@ -199,7 +199,7 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
 def slider_pattern(link: Link, name: str, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
     """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
-    return Pattern(forces, False, partial(load_factor, load.factor), load=name)
+    return Pattern(forces, False, factor_law(load.factor), load=name)
 
 
 def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:

@@ -5,6 +5,7 @@ from kedfem.scene.questions.frames import corotational, corotational_links, link
 from kedfem.scene.questions.laws import (
     curves,
     drive_angle,
+    factor_law,
     factor_table,
     factors,
     is_constant,
@@ -155,6 +156,7 @@ __all__ = [
     "drive_angle",
     "enforced_by_equations",
     "face_from",
+    "factor_law",
     "factor_table",
     "factors",
     "inertia_tensor",

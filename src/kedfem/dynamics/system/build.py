@@ -6,7 +6,6 @@ motors and limits are laws on the same coordinates.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -53,8 +52,8 @@ from kedfem.scene import (
     Scene,
     TorsionSpring,
     TravelLimit,
+    factor_law,
     is_constant,
-    load_factor,
     pieces,
 )
 from kedfem.scene.checks.capabilities import SLOTS
@@ -99,7 +98,7 @@ def spring_law(spring: LineSpring | TorsionSpring) -> Spring:
     factor = spring.stiffness_factor
     if is_constant(factor):
         return Spring(factor.value[0] * spring.stiffness, spring.damping, spring.free)
-    return Spring(spring.stiffness, spring.damping, spring.free, factor=partial(load_factor, factor))
+    return Spring(spring.stiffness, spring.damping, spring.free, factor=factor_law(factor))
 
 
 def without_stiffness(link: Link, turned: bool = False) -> Link:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,7 @@ from kedfem.scene.records.curves import Curve
 Values = Float[np.ndarray, " t"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
     """A curve as cubics: piece k from at[k] on, the last one beyond; held before the first, or repeated.
 
@@ -21,20 +21,19 @@ class Pieces:
     period : after which the curve repeats itself; 0: not
     """
 
-    at: tuple[float, ...] = ()
-    coefficients: tuple[tuple[float, float, float, float], ...] = ()
+    at: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
+    coefficients: Float[np.ndarray, "n 4"] = field(default_factory=lambda: np.zeros((0, 4)))
     period: float = 0.0
 
-    def __call__(self, x: float) -> tuple[float, float]:
-        """Value and slope at a place."""
+    def __call__(self, x: Values) -> tuple[Values, Values]:
+        """Values and slopes at places."""
+        held = x <= self.at[0]
         if self.period:
-            x = self.at[0] + (x - self.at[0]) % self.period
-        elif x <= self.at[0]:
-            return self.coefficients[0][0], 0.0
-        k = int(np.searchsorted(self.at, x, side="right")) - 1
-        a, b, c, d = self.coefficients[k]
-        s = x - self.at[k]
-        return a + s * (b + s * (c + s * d)), b + s * (2.0 * c + s * 3.0 * d)
+            x, held = self.at[0] + np.mod(x - self.at[0], self.period), np.zeros_like(held)
+        k = np.maximum(np.searchsorted(self.at, x, side="right") - 1, 0)
+        a, b, c, d = np.moveaxis(self.coefficients[k], -1, 0)
+        s = np.where(held, 0.0, x - self.at[k])
+        return a + s * (b + s * (c + s * d)), np.where(held, 0.0, b + s * (2.0 * c + s * 3.0 * d))
 
 
 def pieces(curve: Curve) -> Pieces:
@@ -50,7 +49,7 @@ def pieces(curve: Curve) -> Pieces:
     c[wide, 1] = np.diff(heights)[wide] / np.diff(ends)[wide]
     if curve.interpolation == "smooth" and len(at) > 1:
         c[wide] = _smooth(ends, heights, period)[wide]
-    return Pieces(tuple(at.tolist()), tuple((a, b, c2, d) for a, b, c2, d in c.tolist()), period)
+    return Pieces(at, c, period)
 
 
 def _smooth(at: Values, value: Values, period: float) -> Float[np.ndarray, "n 4"]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
-from kedfem.scene.questions.curves import pieces
+from kedfem.scene.questions.curves import Pieces, pieces
 from kedfem.scene.records.curves import Curve, Factor
 from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp, Table
 from kedfem.scene.records.scene import Scene
@@ -178,15 +179,22 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
     )
 
 
+FactorLaw = Callable[[Times, Times], Times]
+"""Times [s] and places of the drive [rad or m], each (t,), to what something is multiplied by."""
+
+
+def factor_law(factor: Factor) -> FactorLaw:
+    """A factor as a function, its curve worked out once."""
+    return partial(_factor_there, pieces(factor), factor.over == "time")
+
+
+def _factor_there(curve: Pieces, timed: bool, t: Times, phi: Times) -> Times:
+    return curve(np.asarray(t if timed else phi, dtype=float))[0]
+
+
 def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
     """A factor at times t (t,) [s] and angles or travels phi (t,) of the drive [rad or m]."""
-    x = np.asarray(t if factor.over == "time" or phi is None else phi, dtype=float)
-    of = pieces(factor)
-    at, c = np.array(of.at), np.array(of.coefficients)
-    x = at[0] + np.mod(x - at[0], of.period) if of.period else np.maximum(x, at[0])
-    k = np.searchsorted(at, x, side="right") - 1
-    s = x - at[k]
-    return np.asarray(c[k, 0] + s * (c[k, 1] + s * (c[k, 2] + s * c[k, 3])))
+    return factor_law(factor)(t, t if phi is None else phi)
 
 
 def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:

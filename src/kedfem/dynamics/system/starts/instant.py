@@ -158,7 +158,7 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
             return -k * (e - free) - c * rate, k, c
         case Curve(over=over, force=force_at):
             x = {TIME: t, RATE: rate, COORDINATE: e}[over]
-            value, slope = force_at(x)
+            value, slope = (float(found[0]) for found in force_at(np.array([x])))
             falls = {TIME: (0.0, 0.0), RATE: (0.0, -slope), COORDINATE: (-slope, 0.0)}[over]
             return value, *falls
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
