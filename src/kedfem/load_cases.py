@@ -122,8 +122,8 @@ def _refuse(scene: Scene, name: str) -> None:
         known = ", ".join(repr(each) for each in scene.links)
         raise SceneError(f"--link: must be a link of the scene ({known}), got '{name}'")
     link, where = scene.links[name], f"links.{name}"
-    if link.model == "rigid" or link.family != "solid":
-        got = "a rigid one" if link.model == "rigid" else f"a {link.family}"
+    if link.category != "solid":
+        got = "a rigid one" if link.category == "rigid" else f"a {link.category}"
         raise SceneError(
             f'{where}: must be an elastic solid for load cases, got {got}: take `model = "solid"`'
         )

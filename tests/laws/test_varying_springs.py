@@ -126,22 +126,24 @@ def test_the_multiplier_of_one_level_is_of_second_order(form: str) -> None:
 RISES = {"over": "time", "at": [0.0, 0.05, 0.1, 0.2], "value": [1.0, 0.0, 3.0, 1.0]}
 
 
+def hinged_rod(n: np.ndarray) -> Raw:
+    """A rigid rod on a hinge J about an axis through the origin."""
+    along = np.cross(n, [0.3, 0.5, 0.9])
+    along /= np.linalg.norm(along)
+    joint = {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}
+    return {"links": {"rod": bar("rigid", [0, 0, 0], (0.2 * along).tolist())}, "joints": {"J": joint}}
+
+
 @pytest.mark.parametrize("axis", list(AXES))
 def test_a_rod_on_a_torsion_spring_that_varies_swings_as_its_equation_says(axis: str) -> None:
     """J φ'' = −k f(t) (φ − φ0), by a solver of ordinary differential equations of order eight."""
     n = AXES[axis]
-    along = np.cross(n, [0.3, 0.5, 0.9])
-    along /= np.linalg.norm(along)
     k, free = 200.0, 0.3
-    joint = {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}
     spring = {"kind": "torsion", "joint": "J", "stiffness": k, "free_angle": free, "stiffness_factor": RISES}
-    rod = bar("rigid", [0, 0, 0], (0.2 * along).tolist())
     errors = []
     for count in (1000, 2000):
         analysis = {"end_time": 0.2, "step": 0.2 / count, "accuracy": "quick"}
-        ready, blocks = ran(
-            {"links": {"rod": rod}, "joints": {"J": joint}, "springs": {"s": spring}, "analysis": analysis}
-        )
+        ready, blocks = ran({**hinged_rod(n), "springs": {"s": spring}, "analysis": analysis})
         t = np.concatenate([block.motion.t for block in blocks])
         exact = swung(k / moment_of_inertia(ready.model.links[0], n), free, t)
         found = channels(ready, blocks)

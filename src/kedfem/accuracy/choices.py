@@ -72,7 +72,7 @@ def open_beams(scene: Scene) -> list[str]:
 
 def beams_only(scene: Scene) -> bool:
     """Whether all links with a shape are beams or rigid."""
-    return all(link.family == "beam" or link.model == "rigid" for link in scene.links.values() if link.shape)
+    return all(link.category in {"beam", "rigid"} for link in scene.links.values() if link.shape)
 
 
 def elastic(link: LinkScene, family: str) -> bool:

@@ -215,9 +215,7 @@ def _beside(scene: Scene, factor: float, steps: int) -> Scene:
 
 def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
     """The scene with twice the elements in all elastic beams; None without any."""
-    beams = {
-        name: link for name, link in scene.links.items() if link.family == "beam" and link.model != "rigid"
-    }
+    beams = {name: link for name, link in scene.links.items() if link.category == "beam"}
     beams = {name: link for name, link in beams.items() if link.shape is not None}
     return with_links(scene, {name: refined(link, factor) for name, link in beams.items()}) if beams else None
 

@@ -12,7 +12,17 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.scene.records.base import Fault, FileName, Record, refuse
 from kedfem.scene.records.damping import Frequency
-from kedfem.scene.records.units import Angle, Duration, Length, Number, PositiveTime, Quantity, Time
+from kedfem.scene.records.units import (
+    Angle,
+    Duration,
+    Length,
+    Number,
+    PositiveRotationalStiffness,
+    PositiveTime,
+    Quantity,
+    RotationalDamper,
+    Time,
+)
 
 TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
 
@@ -175,10 +185,6 @@ MotionLaw = Annotated[
 ]
 
 
-ShaftStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]
-ShaftDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
-
-
 class Drive(Record):
     """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
 
@@ -186,10 +192,10 @@ class Drive(Record):
     """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
     """how it turns or slides, from the reference position"""
-    shaft_stiffness: ShaftStiffness | None = None
+    shaft_stiffness: PositiveRotationalStiffness | None = None
     """of a hinge: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
     given"""
-    shaft_damping: ShaftDamper = 0.0
+    shaft_damping: RotationalDamper = 0.0
     """of a hinge: torsional damping of that shaft"""
 
     @model_validator(mode="after")

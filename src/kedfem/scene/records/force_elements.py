@@ -19,7 +19,15 @@ from kedfem.scene.records.curves import (
     TorqueOver,
 )
 from kedfem.scene.records.points import Point
-from kedfem.scene.records.units import Angle, Length, Quantity
+from kedfem.scene.records.units import (
+    Angle,
+    Damper,
+    Length,
+    PositiveRotationalStiffness,
+    PositiveStiffness,
+    Quantity,
+    RotationalDamper,
+)
 
 
 class Motor(Record):
@@ -53,9 +61,7 @@ class Motor(Record):
 
 
 Stiffness = Annotated[float, Quantity("N/m", least=0.0)]
-Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
 TorsionStiffness = Annotated[float, Quantity("N*m/rad", least=0.0)]
-TorsionDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
 FreeLength = Annotated[float, Quantity("m", least=0.0)]
 
 
@@ -163,7 +169,7 @@ class TorsionSpring(_Elastic):
     """the hinge, cylindrical joint or screw"""
     stiffness: TorsionStiffness = 0.0
     """k"""
-    damping: TorsionDamper = 0.0
+    damping: RotationalDamper = 0.0
     """c"""
     free_angle: Angle | None = None
     """φ0, at which it does not turn, from the reference position; 0 if not given: the rotation of the joint's first link
@@ -180,10 +186,6 @@ class TorsionSpring(_Elastic):
 
 
 Spring = Annotated[LineSpring | TorsionSpring, Field(discriminator="kind")]
-
-
-StopStiffness = Annotated[float, Quantity("N/m", above=0.0)]
-TorsionStopStiffness = Annotated[float, Quantity("N*m/rad", above=0.0)]
 
 
 class _Range(Record):
@@ -227,7 +229,7 @@ class TravelLimit(_Range):
     """least travel that is free; no stop there if not given"""
     upper: Length | None = None
     """largest travel that is free; no stop there if not given"""
-    stiffness: StopStiffness
+    stiffness: PositiveStiffness
     """k of the stops"""
     damping: Damper = 0.0
     """c of the stops"""
@@ -247,9 +249,9 @@ class AngleLimit(_Range):
     """least angle that is free; no stop there if not given"""
     upper: Angle | None = None
     """largest angle that is free; no stop there if not given"""
-    stiffness: TorsionStopStiffness
+    stiffness: PositiveRotationalStiffness
     """k of the stops"""
-    damping: TorsionDamper = 0.0
+    damping: RotationalDamper = 0.0
     """c of the stops"""
 
 

@@ -10,7 +10,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.faces import ChosenFace, Faces
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, apart
-from kedfem.scene.records.units import Quantity, fault
+from kedfem.scene.records.units import Damper, Quantity, RotationalDamper, fault
+from kedfem.scene.records.units import PositiveRotationalStiffness as TurningRate
+from kedfem.scene.records.units import PositiveStiffness as Rate
 from kedfem.scene.records.wording import one_of, shown, unknown_name
 
 JointKind = Literal[
@@ -30,14 +32,15 @@ def three(value: object) -> Any:
     return value if value is None or isinstance(value, (list, tuple)) else (value, value, value)
 
 
-Rate = Annotated[float, Quantity("N/m", above=0.0)]
-Damper = Annotated[float, Quantity("N*s/m", least=0.0)]
-TurningRate = Annotated[float, Quantity("N*m/rad", above=0.0)]
-TurningDamper = Annotated[float, Quantity("N*m*s/rad", least=0.0)]
 Rates = Annotated[tuple[Rate, Rate, Rate], BeforeValidator(three)]
 Dampers = Annotated[tuple[Damper, Damper, Damper], BeforeValidator(three)]
-TurningRates = Annotated[tuple[TurningRate, TurningRate, TurningRate], BeforeValidator(three)]
-TurningDampers = Annotated[tuple[TurningDamper, TurningDamper, TurningDamper], BeforeValidator(three)]
+TurningRates = Annotated[
+    tuple[TurningRate, TurningRate, TurningRate],
+    BeforeValidator(three),
+]
+TurningDampers = Annotated[
+    tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)
+]
 
 
 class Bushing(Record):
