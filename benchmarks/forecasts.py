@@ -1,14 +1,10 @@
 """What `kedfem check` forecasts of a run, beside the run: seconds to factor and to step, memory; in a process each."""
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.pages import ROOT, script, table, write_page
+from benchmarks.pages import ROOT, apart, script, table, write_page
 from benchmarks.scenes import mechanisms, with_reduced_links
-from kedfem.errors import SolveError
 from kedfem.processes import memory_held, most_memory
 from kedfem.scene import Scene, read_scene, scene_from
 
@@ -24,7 +20,7 @@ def bench_forecasts(folder: Path, quick: bool) -> None:
     names = [*_cases(), *EXAMPLES]
     rows = []
     for name in names[:2] if quick else names:
-        told, run = _apart("told", name), _apart("run", name)
+        told, run = apart("benchmarks.forecasts", "told", name), apart("benchmarks.forecasts", "run", name)
         cells = [name, f"{run['unknowns']:,.0f}", f"{run['steps']:,.0f}"]
         for key, unit, form in (("factor", 1.0, ".2f"), ("stepping", 1.0, ".2f"), ("memory", 1e6, ".0f")):
             cells += [
@@ -45,15 +41,6 @@ def _cases() -> dict[str, dict[str, object]]:
     for name, raw in mechanisms().items():
         out |= {f"{name}, full": raw, f"{name}, reduced": with_reduced_links(raw)}
     return out
-
-
-def _apart(what: str, name: str) -> dict[str, float]:
-    code = f"import json; from benchmarks.forecasts import {what}; print(json.dumps({what}({name!r})))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    if done.returncode != 0:
-        raise SolveError(f"bench forecasts: {name}: {done.stderr.strip().splitlines()[-1:]}")
-    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
-    return found
 
 
 def _scene(name: str) -> Scene:

@@ -1,15 +1,11 @@
 """One link growing to half a million unknowns: assembling, factoring, solving, memory. Each size in its own process."""
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.pages import ROOT, script, seconds, table, write_loglog, write_page
-from kedfem.errors import SolveError
+from benchmarks.pages import apart, script, seconds, table, write_loglog, write_page
 from kedfem.mesh.memory_forecast import least_bytes
 from kedfem.processes import most_memory
 
@@ -19,17 +15,7 @@ SIZES = ((40, 8, 2), (64, 14, 2), (110, 24, 2), (200, 44, 2))  # a plate, 1 m x 
 def bench_growth(folder: Path, quick: bool) -> None:
     """Time and memory against unknowns; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
-    found = []
-    for size in sizes:
-        code = f"import json; from benchmarks.growth import one_size; print(json.dumps(one_size({size})))"
-        command = [sys.executable, "-c", code]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
-        if done.returncode != 0:
-            what = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}: out of memory?"]
-            raise SolveError(
-                f"bench growth: must fit in this machine's memory, got at {size} elements: {what[0]}"
-            )
-        found.append(json.loads(done.stdout))
+    found = [apart("benchmarks.growth", "one_size", size) for size in sizes]
     rows = [
         (f"{f['unknowns']:,}", f"{f['assemble']:.2f}", f"{f['factor']:.2f}", f"{1e3 * f['solve']:.1f}",
          f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}", f"{told(f) / 1e9:.2f}",

@@ -1,15 +1,11 @@
 """Runs of up to a million steps: seconds, and memory as they step and at their end. Each in its own process."""
 
-import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.pages import ROOT, script, table, write_page
+from benchmarks.pages import ROOT, apart, script, table, write_page
 from kedfem.analysis import analyse
-from kedfem.errors import SolveError
-from kedfem.processes import most_memory
+from kedfem.processes import memory_held, most_memory
 from kedfem.scene import read_keys, scene_from
 
 COUNTS = (10_000, 100_000, 1_000_000)
@@ -21,13 +17,7 @@ def bench_long_runs(folder: Path, quick: bool) -> None:
     """Seconds and memory of the four-bar of beams by its number of steps."""
     rows = []
     for count in COUNTS[:1] if quick else COUNTS:
-        code = f"import json; from benchmarks.long_runs import one; print(json.dumps(one({count})))"
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
-        )
-        if done.returncode != 0:
-            raise SolveError(f"bench long runs: {count} steps must run, got {done.stderr.strip()[-200:]}")
-        found = json.loads(done.stdout)
+        found = apart("benchmarks.long_runs", "one", count)
         rows.append(
             (f"{count:,}", f"{found['seconds']:.1f}", f"{1e6 * found['steps'] / count:.0f}",
              *(f"{found[key] / 1e6:.0f}" for key in ("before", "stepped", "peak", "rows")))
@@ -46,7 +36,7 @@ def one(count: int) -> dict[str, float]:
 
     def watch(stage: str, done: int, total: int) -> None:
         if stage == "steps":
-            held.append(resident())
+            held.append(memory_held())
 
     with tempfile.TemporaryDirectory() as place:
         raw["output"] = {
@@ -58,12 +48,6 @@ def one(count: int) -> dict[str, float]:
         "seconds": sum(run.seconds.values()), "steps": run.seconds["steps"], "before": held[0], "stepped": held[-1],
         "peak": most_memory(), "rows": float(size),
     }  # fmt: skip
-
-
-def resident() -> float:
-    """What this process holds now [bytes], by Linux."""
-    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
-    return 4096.0 * int(pages)
 
 
 if __name__ == "__main__":

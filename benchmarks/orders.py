@@ -36,12 +36,24 @@ Tableau = tuple[Float[np.ndarray, "s s"], Float[np.ndarray, " s"], Float[np.ndar
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme: the tableau of its stages (none: generalised-α), levels that are extrapolated, solves of a step."""
+    """A scheme: the tableau of its stages (none: generalised-α), levels that are extrapolated."""
 
     name: str
     tableau: Tableau | None = None
     levels: int = 1
-    solves: int = 1
+
+    @property
+    def solves(self) -> int:
+        """Of a step: one a stage, twice that where stages are coupled; of all levels together."""
+        stages = 1 if self.tableau is None else len(self.tableau[1])
+        coupled = self.tableau is not None and _coupled(self.tableau)
+        levels: int = 2**self.levels - 1
+        return stages * (2 if coupled else 1) * levels
+
+
+def _coupled(tableau: Tableau) -> bool:
+    """Whether stages depend on later ones."""
+    return bool(np.triu(tableau[0], 1).any())
 
 
 def _diagonal(A: list[list[float]], b: list[float]) -> Tableau:
@@ -67,24 +79,22 @@ SCHEMES = (
     Scheme("two levels", levels=2),
     Scheme("three levels", levels=3),
     Scheme("SDIRK of order 2, L-stable", _diagonal([[1 - np.sqrt(0.5)], [np.sqrt(0.5), 1 - np.sqrt(0.5)]],
-           [np.sqrt(0.5), 1 - np.sqrt(0.5)]), solves=2),
+           [np.sqrt(0.5), 1 - np.sqrt(0.5)])),
     Scheme("SDIRK of order 3, L-stable (Alexander)", _diagonal(
         [[ALEXANDER], [(1 - ALEXANDER) / 2, ALEXANDER],
          [-(6 * ALEXANDER**2 - 16 * ALEXANDER + 1) / 4, (6 * ALEXANDER**2 - 20 * ALEXANDER + 5) / 4, ALEXANDER]],
-        [-(6 * ALEXANDER**2 - 16 * ALEXANDER + 1) / 4, (6 * ALEXANDER**2 - 20 * ALEXANDER + 5) / 4, ALEXANDER]),
-        solves=3),
+        [-(6 * ALEXANDER**2 - 16 * ALEXANDER + 1) / 4, (6 * ALEXANDER**2 - 20 * ALEXANDER + 5) / 4, ALEXANDER])),
     Scheme("SDIRK of order 4, A-stable (Crouzeix)", _diagonal(
         [[CROUZEIX], [0.5 - CROUZEIX, CROUZEIX], [2 * CROUZEIX, 1 - 4 * CROUZEIX, CROUZEIX]],
-        [1 / (6 * (1 - 2 * CROUZEIX) ** 2), 1 - 1 / (3 * (1 - 2 * CROUZEIX) ** 2), 1 / (6 * (1 - 2 * CROUZEIX) ** 2)]),
-        solves=3),
+        [1 / (6 * (1 - 2 * CROUZEIX) ** 2), 1 - 1 / (3 * (1 - 2 * CROUZEIX) ** 2), 1 / (6 * (1 - 2 * CROUZEIX) ** 2)])),
     Scheme("SDIRK of order 4, L-stable (Hairer and Wanner)", _diagonal(
         [[1 / 4], [1 / 2, 1 / 4], [17 / 50, -1 / 25, 1 / 4], [371 / 1360, -137 / 2720, 15 / 544, 1 / 4],
-         [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4]], [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4]), solves=5),
-    Scheme("composition of five midpoint steps (Suzuki)", _suzuki(), solves=5),
+         [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4]], [25 / 24, -49 / 48, 125 / 16, -85 / 12, 1 / 4])),
+    Scheme("composition of five midpoint steps (Suzuki)", _suzuki()),
     Scheme("Gauss, two stages, order 4", (np.array([[1 / 4, 1 / 4 - SQ3 / 6], [1 / 4 + SQ3 / 6, 1 / 4]]),
-           np.array([0.5, 0.5]), np.array([0.5 - SQ3 / 6, 0.5 + SQ3 / 6])), solves=4),
+           np.array([0.5, 0.5]), np.array([0.5 - SQ3 / 6, 0.5 + SQ3 / 6]))),
     Scheme("Radau IIA, two stages, order 3", (np.array([[5 / 12, -1 / 12], [3 / 4, 1 / 4]]),
-           np.array([0.75, 0.25]), np.array([1 / 3, 1.0])), solves=4),
+           np.array([0.75, 0.25]), np.array([1 / 3, 1.0]))),
 )  # fmt: skip
 
 
@@ -214,12 +224,11 @@ def _stages(of: Equation, tableau: Tableau, steps: int) -> Float[np.ndarray, "S 
     h, count = TURN * TURNS / steps, len(b)
     times = (np.arange(steps)[:, None] + c) * h
     along, N = of.along(np.clip(times.ravel(), 0.0, None)), len(of.M)
-    coupled = bool(np.triu(A, 1).any())
     q, v = of.start
     out = []
     for k in range(steps):
         V, a = np.zeros((count, N)), np.zeros((count, N))
-        if coupled:
+        if _coupled(tableau):
             A2, big, right = A @ A, np.zeros((count * N, count * N)), np.zeros(count * N)
             for i in range(count):
                 K, C = along.matrices(k * count + i)
@@ -294,9 +303,8 @@ def bench_orders(folder: Path, quick: bool) -> None:
         rows = []
         for scheme in SCHEMES:
             work, errors, steps = [], [], 2 * SEEN
-            solves = scheme.solves * (2**scheme.levels - 1)
-            while steps * solves <= most // 2:
-                work.append(steps * solves / TURNS)
+            while steps * scheme.solves <= most // 2:
+                work.append(steps * scheme.solves / TURNS)
                 errors.append(error(of, marched(of, scheme, steps), truth))
                 steps *= 2
             rows.append((scheme.name, *(_needed(work, errors, asked) for asked in ASKED)))

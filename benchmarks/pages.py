@@ -1,12 +1,16 @@
 """What all benchmarks share: medians, plots, and the tables of pages in docs whose words are written by hand."""
 
 import argparse
+import json
+import subprocess
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
+from kedfem.errors import SolveError
 from kedfem.processes import machine
 
 ROOT = Path(__file__).parents[1]
@@ -33,6 +37,23 @@ def seconds(work: Callable[[], object], repeats: int) -> float:
         work()
         times.append(perf_counter() - since)
     return median(times)
+
+
+def apart(module: str, function: str, argument: object) -> dict[str, float]:
+    """What a benchmark's function measures in a process of its own, so that its memory is that of nothing else.
+
+    Raises
+    ------
+    SolveError
+        It failed; with the last line of what it said.
+    """
+    code = f"import json; from {module} import {function}; print(json.dumps({function}({argument!r})))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    if done.returncode != 0:
+        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}: out of memory?"]
+        raise SolveError(f"{module}: {function}({argument!r}) must run, got {said[0]}")
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
