@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
@@ -37,6 +37,7 @@ def curves(draw: st.DrawFn) -> Factor:
     return Factor(at=tuple(at), value=tuple(value), period=period, interpolation=way)
 
 
+@example(Factor(at=(1.0, 2.0, 3.0), value=(0.0, 0.0, 5e-324), interpolation="smooth"))
 @given(curves())
 def test_a_curve_has_its_values_stays_between_them_and_repeats_itself(curve: Factor) -> None:
     at, value = np.array(curve.at), np.array(curve.value)

@@ -54,14 +54,19 @@ def pieces(curve: Curve) -> Pieces:
 
 def _smooth(at: Values, value: Values, period: float) -> Float[np.ndarray, "n 4"]:
     """Coefficients of monotone cubics between points, those of a curve that repeats itself over three periods."""
-    from scipy.interpolate import PchipInterpolator
-
     n = len(at) - 1
     if not period:
-        return np.asarray(PchipInterpolator(at, value).c[::-1].T)
+        return _monotone(at, value)
     x = np.concatenate([at[:-1] - period, at[:-1], at + period])
     y = np.concatenate([value[:-1], value[:-1], value])
     apart = np.append(True, np.diff(x) > 1e-12 * period)
     found = np.zeros((len(x) - 1, 4))
-    found[np.flatnonzero(apart[1:])] = PchipInterpolator(x[apart], y[apart]).c[::-1].T
+    found[np.flatnonzero(apart[1:])] = _monotone(x[apart], y[apart])
     return found[n : 2 * n]
+
+
+def _monotone(at: Values, value: Values) -> Float[np.ndarray, "n 4"]:
+    from scipy.interpolate import PchipInterpolator
+
+    with np.errstate(over="ignore"):  # of 1/slope, where values all but vanish: the slope is zero
+        return np.asarray(PchipInterpolator(at, value).c[::-1].T)
