@@ -30,7 +30,8 @@ from kedfem.scene import (
     scene_from,
     time_grid,
 )
-from kedfem.scene.records.units import si_number
+from kedfem.scene.records.units import KINDS as QUANTITIES
+from kedfem.scene.records.units import USUAL, si_number, unit_registry
 from kedfem.scene.reference import scene_reference
 
 ROOT = Path(__file__).parents[2]
@@ -314,6 +315,22 @@ def test_importing_the_scene_leaves_heavy_libraries_alone():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_usual_units_are_those_of_pint():
+    for name, (unit, factor) in USUAL.items():
+        quantity = unit_registry().Quantity(1.0, name)
+        assert quantity.check(unit_registry().parse_units(unit).dimensionality)
+        assert_allclose(factor, quantity.m_as(unit), rtol=1e-15)
+        assert si_number(f"3.7 {name}", unit) == 3.7 * factor
+    assert {unit for unit, _ in USUAL.values()} <= set(QUANTITIES)
+
+
+def test_a_scene_of_usual_units_is_read_without_a_library_of_units():
+    scene = ROOT / "examples" / "four_bar_beams" / "scene.toml"
+    code = f"import sys, kedfem.scene; kedfem.scene.read_scene({str(scene)!r}); print('pint' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_docs_hold_the_reference_of_keys_as_it_is():
