@@ -3,8 +3,10 @@
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from shutil import copytree
 from tempfile import TemporaryDirectory
 
 from benchmarks.pages import ROOT as CHECKOUT
@@ -18,6 +20,17 @@ from kedfem.analysis import analyse
 from benchmarks.scenes import ten_turns
 analyse(ten_turns(sys.argv[1]))
 """
+EXAMPLES = ("four_bar_beams", "four_bar_corotational", "four_bar_solids")
+ROWS = """
+import gc, sys
+from kedfem.analysis import analyse
+from kedfem.scene import read_scene
+scene = read_scene(sys.argv[1])
+nothing = {"animation": None, "plots": False, "picture": False, "csv": False, "parquet": False, "report": False}
+analyse(scene.model_copy(update={"output": scene.output.model_copy(update=nothing)}))
+gc.freeze()
+"""
+WHOLE = "import sys; from kedfem.cli import main; sys.argv = ['kedfem', 'run', sys.argv[1]]; main()"
 
 
 def bench_start(folder: Path, quick: bool) -> None:
@@ -29,7 +42,8 @@ def bench_start(folder: Path, quick: bool) -> None:
         spent = seconds(partial(subprocess.run, command, capture_output=True, check=True), 3 if quick else 9)
         rows.append((name, f"{spent:.2f}"))
     rows += _ten_turns(1 if quick else 5)
-    write_page(folder, "performance/start", [table(("command", "seconds"), rows)])
+    examples = _examples(EXAMPLES[:1] if quick else EXAMPLES, 1 if quick else 5)
+    write_page(folder, "performance/start", [table(("command", "seconds"), rows), examples])
 
 
 def _ten_turns(repeats: int) -> list[tuple[str, str]]:
@@ -41,6 +55,23 @@ def _ten_turns(repeats: int) -> list[tuple[str, str]]:
         run = partial(subprocess.run, command, capture_output=True, check=True, env=environment, cwd=CHECKOUT)
         cold, warm = seconds(run, 1), seconds(run, repeats)
     return [("ten turns, cold cache", f"{cold:.1f}"), ("ten turns, warm cache", f"{warm:.1f}")]
+
+
+def _examples(names: Sequence[str], repeats: int) -> list[str]:
+    """Examples of users, warm: until the results file is whole, and with frames, plots and picture."""
+    rows = []
+    for name in names:
+        with TemporaryDirectory() as folder:
+            copied = copytree(CHECKOUT / "examples" / name, Path(folder) / name)
+            spent = []
+            for code in (ROWS, WHOLE):
+                command = [sys.executable, "-c", code, str(copied / "scene.toml")]
+                run = partial(subprocess.run, command, capture_output=True, check=True)
+                run()
+                spent.append(seconds(run, repeats))
+        rows.append((name, f"{spent[0]:.1f}", f"{spent[1] - spent[0]:.1f}", f"{spent[1]:.1f}"))
+    header = ("example, warm", "results file [s]", "frames, plots, picture [s]", "whole [s]")
+    return table(header, rows)
 
 
 if __name__ == "__main__":

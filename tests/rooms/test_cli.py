@@ -163,6 +163,22 @@ def test_help_loads_no_heavy_library(tmp_path: Path) -> None:
     assert "loaded []" in out, err
 
 
+def test_importing_the_analysis_leaves_libraries_alone_that_few_runs_need(tmp_path: Path) -> None:
+    few = [
+        "gmsh",
+        "matplotlib",
+        "pint",
+        "pyvista",
+        "scipy.interpolate",
+        "scipy.optimize",
+        "scipy.spatial",
+        "vtkmodules",
+    ]
+    code = f"import sys, kedfem.analysis; print('loaded', [m for m in {few} if m in sys.modules])"
+    out, err = process(code, folder=tmp_path).communicate(timeout=60)
+    assert "loaded []" in out, err
+
+
 def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
     run_kedfem: Command, arm: Path
 ) -> None:

@@ -230,6 +230,36 @@ def test_a_failing_frame_leaves_the_list_as_it_was(tmp_path: Path) -> None:
         remove_animation(tmp_path, "run")
 
 
+def test_a_list_that_cannot_grow_stays_as_it_was(tmp_path: Path) -> None:
+    import resource
+
+    animation = AnimationWriter(tmp_path, "run")
+    while not (listed := tmp_path / "run.pvd").is_file() or listed.stat().st_size < 6000:
+        animation.add(float(animation.count), [rod()])
+    before, limits = listed.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (len(before) + 20, limits[1])
+    )  # holds a frame, not the whole row
+    try:
+        with pytest.raises(OutputError, match=r"run\.pvd: must be a file that can be written"):
+            animation.add(1e3, [rod()])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert listed.read_bytes() == before
+
+
+def test_a_list_that_others_changed_is_written_anew(tmp_path: Path) -> None:
+    animation = AnimationWriter(tmp_path, "run")
+    for time in range(3):
+        animation.add(time, [rod()])
+    (tmp_path / "run.pvd").write_text("")
+    animation.add(3.0, [rod()])
+    assert [time for time, _ in frame_times(tmp_path / "run.pvd")] == [0.0, 1.0, 2.0, 3.0]
+    (tmp_path / "run.pvd").unlink()
+    animation.add(4.0, [rod()])
+    assert len(frame_times(tmp_path / "run.pvd")) == 5
+
+
 @pytest.mark.parametrize("kind", ["animation", "plots", "picture"])
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path, kind: str) -> None:
     (vtu,) = AnimationWriter(tmp_path, "run").add(0.0, [rod()])

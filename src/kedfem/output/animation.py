@@ -1,8 +1,10 @@
 """The ParaView animation: a VTU file per link and frame, and a PVD file that lists them as named blocks."""
 
+import os
 import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -13,6 +15,10 @@ from kedfem.output.fields import Block
 from kedfem.output.vtu import write_blocks
 from kedfem.processes import threads
 from kedfem.results.files import ready_folder, reason, replacing
+
+HEAD = b'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+TAIL = b"  </Collection>\n</VTKFile>\n"
+"""Of a PVD file."""
 
 
 class AnimationWriter:
@@ -41,6 +47,7 @@ class AnimationWriter:
         self.folder, self.stem, self.drive = Path(folder), stem, drive
         self.entries: list[Entry] = []
         self.count = 0
+        self._listed = -1
 
     @property
     def missing(self) -> Path | None:
@@ -65,7 +72,6 @@ class AnimationWriter:
             remove_animation(self.folder, self.stem)
         now = {"TimeValue": float(time)} | ({self.drive: float(angle)} if self.drive else {})
         files = [f"{self.stem}/{name}_{self.count:04d}.vtu" for name in _file_names(fields)]
-        ready_folder(self.folder / self.stem)
 
         def write(k: int) -> None:
             with replacing(self.folder / files[k]) as part:
@@ -74,10 +80,27 @@ class AnimationWriter:
         # most of it is compression, which lets other threads go on
         with ThreadPoolExecutor(threads()) as pool:
             list(pool.map(write, range(len(fields))))
-        self.entries += [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
+        blocks = [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
+        self.entries += blocks
         self.count += 1
-        write_collection(self.folder, self.stem, self.entries)
+        path = self.folder / f"{self.stem}.pvd"
+        if not self._extended(
+            path, _rows(blocks)
+        ):  # a list written anew for each of n frames would take n² rows
+            write_collection(self.folder, self.stem, self.entries)
+        self._listed = path.stat().st_size
         return [self.folder / name for name in files]
+
+    def _extended(self, path: Path, more: bytes) -> bool:
+        """Whether rows could be put before the end of the list that this writer left; else it stays as it is."""
+        with suppress(OSError), path.open("r+b", buffering=0) as file:
+            if file.seek(0, os.SEEK_END) == self._listed:
+                end = file.seek(-len(TAIL), os.SEEK_END)
+                if file.write(more + TAIL) == len(more + TAIL):
+                    return True
+                file.truncate(file.seek(end))  # the disk is full
+                file.write(TAIL)
+        return False
 
 
 Entry = tuple[float, str, str]
@@ -93,7 +116,7 @@ def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:
         The file cannot be written.
     """
     with replacing(folder / f"{stem}.pvd") as part:
-        part.write_text(_collection(entries), encoding="utf-8")
+        part.write_bytes(HEAD + _rows(entries) + TAIL)
 
 
 def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
@@ -151,12 +174,11 @@ def remove_animation(folder: Path, stem: str) -> None:
         raise OutputError(f"{folder}: must be free of the frames of an earlier run, got {got}") from error
 
 
-def _collection(entries: Sequence[Entry]) -> str:
-    """The PVD file; parts are numbered within their time."""
+def _rows(entries: Sequence[Entry]) -> bytes:
+    """Rows of the PVD file; parts are numbered within their time."""
     rows, last, part = [], None, 0
     for time, name, file in entries:
         part, last = (part + 1 if time == last else 0), time
         at = f'timestep="{time!r}" part="{part}" name={quoteattr(name)} file={quoteattr(file)}'
         rows.append(f"    <DataSet {at}/>\n")
-    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-    return head + "".join(rows) + "  </Collection>\n</VTKFile>\n"
+    return "".join(rows).encode()

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.spatial.transform import Rotation
 
 from kedfem.errors import OutputError
 from kedfem.output.motion_file import continuous_quaternions
@@ -79,6 +78,8 @@ def _upwards(gravity: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
     size = np.linalg.norm(gravity)
     if size == 0:
         return np.array([0.0, 0.0, 0.0, 1.0])
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.align_vectors([[0.0, 1.0, 0.0]], [-gravity / size])[0].as_quat())
 
 

@@ -132,9 +132,10 @@ def replacing(path: Path) -> Iterator[Path]:
     OutputError
         The folder or the file cannot be written; the old file is left as it was.
     """
-    ready_folder(path.parent)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with whole(path) as part:
             yield part
     except OSError as error:
+        ready_folder(path.parent)  # or says what is wrong with it
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error

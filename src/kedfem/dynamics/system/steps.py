@@ -3,8 +3,11 @@
 What a force element exerts on its links is part of their forces F there, and forces at ports are those of joints alone.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -25,8 +28,6 @@ from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.exerted import ELEMENTS
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.march import displacements, march, ready
-from kedfem.dynamics.system.oracle.literal import Now
-from kedfem.dynamics.system.oracle.literal_steps import literal_march, oracle
 from kedfem.dynamics.system.period.krylov import Watch
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, Search
@@ -38,6 +39,9 @@ from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
+
+if TYPE_CHECKING:
+    from kedfem.dynamics.system.oracle.literal import Now
 
 Rows = Float[np.ndarray, "T _ _"]
 
@@ -115,7 +119,11 @@ class SystemSteps:
         self.over: PeriodMap | None = None  # whose steady state that is
         self.watch: Watch = lambda marched: None
         self.search = Search()
-        self.oracle = oracle(self.ready) if literal else None
+        self.oracle = None
+        if literal:
+            from kedfem.dynamics.system.oracle.literal_steps import oracle
+
+            self.oracle = oracle(self.ready)
         self.stiffening = system.stiffening
         self.factorisations = len(self.ready.parts)
         self._bearings, self._to_ports = _bearings(model, system.model, linkage(scene).bodies)
@@ -173,6 +181,8 @@ class SystemSteps:
             If the iterations of a step do not converge.
         """
         if self.oracle is not None:
+            from kedfem.dynamics.system.oracle.literal_steps import literal_march
+
             later, found = literal_march(self.ready, self.oracle, state, motion)
             return self.handed_on(found, forcing, motion), later
         if not isinstance(state, State):
