@@ -196,11 +196,6 @@ def geared(raw: Raw, cell: Cell) -> None:
 # -- what becomes of them -----------------------------------------------------------------------------------
 
 
-class _Any(dict[str, str]):
-    def __missing__(self, key: str) -> Any:
-        return _Word()
-
-
 class _Word(str):
     def __new__(cls) -> "_Word":
         return super().__new__(cls, "\0")
@@ -211,13 +206,14 @@ class _Word(str):
 
 def as_said(refusal: Refusal, fault: str) -> bool:
     """Whether a fault is in the words of a line of the table, whatever scene it is about."""
-    text = refusal.said(_Any())
+    texts = "".join((refusal.where, refusal.must, refusal.why, refusal.got, refusal.take))
+    text = str(refusal.fault(("\0",), dict.fromkeys(re.findall(r"\{(\w+)", texts), _Word())))
     return re.fullmatch(".+".join(map(re.escape, text.split("\0"))), fault) is not None
 
 
 def refused_by_the_table(error: KedfemError) -> bool:
     """Whether each fault is in the words of a line."""
-    faults = getattr(error, "faults", None) or [str(error)]
+    faults = [str(fault) for fault in getattr(error, "faults", [error])]
     return all(any(as_said(each, fault) for each in REFUSALS) for fault in faults)
 
 

@@ -1,5 +1,41 @@
 """What goes wrong, and where: the errors that a user of kedfem can meet."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+Where = tuple[str | int, ...]
+"""The keys, and positions in lists, that lead to a place in a scene."""
+
+
+def place(where: Where) -> str:
+    """A place in a scene as text: ``links.crank.shape.between[1]``."""
+    text = ""
+    for part in where:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is wrong in a scene.
+
+    where : its place; empty where it is of no key
+    message : what was wanted, what was got
+    """
+
+    where: Where
+    message: str
+
+    def __str__(self) -> str:
+        """One line for the user."""
+        return f"{place(self.where)}: {self.message}" if self.where else self.message
+
+    def under(self, *above: str | int) -> Fault:
+        """The same of a part of something that stands at a place."""
+        return Fault((*above, *self.where), self.message)
+
 
 class KedfemError(Exception):
     """Base of all errors that kedfem raises on purpose; its text is written for the user."""
@@ -11,12 +47,13 @@ class SceneError(KedfemError):
     Parameters
     ----------
     faults
-        One line per fault: ``where: what was wanted, what was got``.
+        All that is wrong; a text is a fault of no key.
     """
 
-    def __init__(self, faults: list[str] | str) -> None:
-        self.faults = [faults] if isinstance(faults, str) else list(faults)
-        super().__init__("\n".join(self.faults))
+    def __init__(self, faults: Iterable[Fault | str] | str) -> None:
+        given = [faults] if isinstance(faults, str) else faults
+        self.faults = tuple(dict.fromkeys(Fault((), x) if isinstance(x, str) else x for x in given))
+        super().__init__("\n".join(map(str, self.faults)))
 
 
 class MeshError(KedfemError):

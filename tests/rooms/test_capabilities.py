@@ -42,7 +42,7 @@ def faults(raw: Raw) -> list[str]:
     try:
         scene_from(raw)
     except SceneError as error:
-        return error.faults
+        return [str(fault) for fault in error.faults]
     return []
 
 

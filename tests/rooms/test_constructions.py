@@ -107,9 +107,8 @@ def test_a_wrong_construction_is_told_where_it_stands(path: str, value: Any, pla
     table[last] = value
     with pytest.raises(SceneError) as refused:
         scene_from(raw)
-    assert any(line.startswith(place) and phrase in line for line in refused.value.faults), (
-        refused.value.faults
-    )
+    lines = [str(fault) for fault in refused.value.faults]
+    assert any(line.startswith(place) and phrase in line for line in lines), lines
 
 
 def record(P: Any, Q: Any, up: Any, **keys: Any) -> Link:

@@ -23,7 +23,7 @@ CSV = {"drive/motion": {"kind": "table", "file": "motion.csv"}, "analysis": {"en
 def refusal(change: dict[str, Any], base: str = GOOD, folder: Path | str = ".") -> list[str]:
     with pytest.raises(SceneError) as refused:
         scene_from(changed(base, change), folder)
-    return refused.value.faults
+    return [str(fault) for fault in refused.value.faults]
 
 
 HOSTILE = [

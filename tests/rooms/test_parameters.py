@@ -64,7 +64,7 @@ def raw(changes: dict[str, Any] | None = None) -> dict[str, Any]:
 def faults(changes: dict[str, Any]) -> list[str]:
     with pytest.raises(SceneError) as caught:
         scene_from(raw(changes))
-    return caught.value.faults
+    return [str(fault) for fault in caught.value.faults]
 
 
 def test_any_number_of_a_scene_may_be_an_expression() -> None:

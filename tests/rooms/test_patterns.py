@@ -158,7 +158,7 @@ def test_what_a_pattern_cannot_be(pattern: Raw, message: str) -> None:
 
 def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(tmp_path: Path) -> None:
     raw = {"patterns": {"p": {"links": {"a": {"file": "../a.step"}}}}}
-    assert outside(raw, tmp_path) == [
+    assert [str(fault) for fault in outside(raw, tmp_path)] == [
         "patterns.p.links.a.file: must be within the scene's folder (--within), got '../a.step'"
     ]
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from kedfem.cli import KINDS
-from kedfem.errors import SceneError
+from kedfem.errors import Fault, SceneError
 from kedfem.scene import (
     Analysis,
     Bar,
@@ -346,6 +346,20 @@ def test_every_key_has_a_meaning():
 
 
 def test_faults_are_lines_of_one_error():
-    error = SceneError(["a: b", "c: d"])
-    assert error.faults == ["a: b", "c: d"]
-    assert str(error) == "a: b\nc: d"
+    first = Fault(("links", "arm", "shape", "between", 1), "must be another point, got the first")
+    error = SceneError([first, "c: d", first])
+    assert error.faults == (first, Fault((), "c: d"))
+    assert str(error) == "links.arm.shape.between[1]: must be another point, got the first\nc: d"
+
+
+def test_a_fault_says_which_keys_lead_to_it(tmp_path):
+    raw = read_raw()
+    raw["links"]["arm"]["shape"]["width"] = -1
+    raw["joints"]["A"]["links"][1] = "leg"
+    raw["drive"]["motion"] = {"kind": "table", "file": "no.csv"}
+    with pytest.raises(SceneError) as caught:
+        scene_from(raw, tmp_path)
+    places = {fault.where for fault in caught.value.faults}
+    assert places >= {
+        ("links", "arm", "shape", "width"), ("joints", "A", "links", 1), ("drive", "motion", "file"),
+    }  # fmt: skip

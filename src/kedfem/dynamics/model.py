@@ -18,7 +18,7 @@ from kedfem.dynamics.loads import Pattern, patterns, slider_pattern
 from kedfem.dynamics.moving_ground import moving_ground
 from kedfem.dynamics.rigid_links import made_rigid
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.errors import MeshError, SceneError
+from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
 from kedfem.links.record import Link
@@ -163,7 +163,12 @@ def elastic_model(
     )  # fmt: skip
     if not links:
         raise SceneError(
-            "links: must hold a link that the drive does not simply carry along, got rigid ones only"
+            [
+                Fault(
+                    ("links",),
+                    "must hold a link that the drive does not simply carry along, got rigid ones only",
+                )
+            ]
         )
     carried = tuple(
         replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
@@ -388,7 +393,7 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     guide = slider_guide(scene, name)
     for key, joint in joints.items():
         if key != guide and needs_rows(scene, key):
-            raise SceneError(SLIDERS.said({"where": f"joints.{key}", "kind": joint.kind, "name": name}))
+            raise SceneError([SLIDERS.fault(("joints", key), {"kind": joint.kind, "name": name})])
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.errors import SceneError
+from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
@@ -94,15 +94,17 @@ def _with_extent(link: Link) -> None:
     """
     second = _second_moments(link)
     if second[-1] < COMPACT * float(link.m1[:, 0] @ link.one) * reach(link) ** 2:
-        raise SceneError(
-            f"links.{link.name}: a rigid link must have mass in more than one place, got nearly all of it in one (a "
-            "point mass on a link of next to no mass): give the link a denser material, or the body some inertia"
+        wanted = (
+            "a rigid link must have mass in more than one place, got nearly all of it in one (a point mass on a link of "
+            "next to no mass): give the link a denser material, or the body some inertia"
         )
+        raise SceneError([Fault(("links", link.name), wanted)])
     if second[0] < LAMINA * second[-1]:
-        raise SceneError(
-            f"links.{link.name}: a rigid link must have mass along all its directions, got one whose mass lies in a "
-            "plane (such as a body with Ixx + Iyy = Izz on a link of next to no mass): give the body some thickness"
+        wanted = (
+            "a rigid link must have mass along all its directions, got one whose mass lies in a plane (such as a body "
+            "with Ixx + Iyy = Izz on a link of next to no mass): give the body some thickness"
         )
+        raise SceneError([Fault(("links", link.name), wanted)])
 
 
 def _mounts(scene: Scene) -> tuple[float, float]:

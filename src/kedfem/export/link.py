@@ -12,7 +12,7 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.joints.places import seat_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
-from kedfem.errors import MeshError, SceneError
+from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.export.files import read_record, write_record
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
@@ -75,20 +75,19 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
     plan = plan_for(scene, stage)
     scene = plan.scene if plan else scene
     if corotational(scene):
-        raise SceneError(
-            "analysis.frames: must be rigid-body for the matrices of a link, got co-rotational ones, whose stiffness "
-            'goes with many frames: take `frames = "rigid-body"`'
+        wanted = (
+            "must be rigid-body for the matrices of a link, got co-rotational ones, whose stiffness goes with many "
+            'frames: take `frames = "rigid-body"`'
         )
+        raise SceneError([Fault(("analysis", "frames"), wanted)])
     ready, _ = prepared(scene, stage)
     found = segments(ready.model)
     if name not in found:
         raise SceneError(f"--link: must be an elastic link, got '{name}', which moves as a rigid body")
     (link,) = found[name]
     if link.unknowns > MOST:
-        raise SceneError(
-            f"links.{name}: must have {MOST:,} unknowns at most, as its matrices are dense, got {link.unknowns:,}: take "
-            '`reduction = "modal"`'
-        )
+        wanted = f"must have {MOST:,} unknowns at most, as its matrices are dense, got {link.unknowns:,}"
+        raise SceneError([Fault(("links", name), f'{wanted}: take `reduction = "modal"`')])
     return _exported(scene, name, link)
 
 

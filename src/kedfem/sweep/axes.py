@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.errors import SceneError
-from kedfem.scene.checks.faults import place
-from kedfem.scene.checks.hints import Where
+from kedfem.errors import SceneError, Where, place
 from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, unit_registry
 from kedfem.scene.records.wording import shown
 from kedfem.sweep.keys import located

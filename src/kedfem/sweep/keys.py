@@ -4,10 +4,9 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from typing import Any
 
-from kedfem.errors import SceneError
+from kedfem.errors import SceneError, Where, place
 from kedfem.scene import Scene
-from kedfem.scene.checks.faults import place
-from kedfem.scene.checks.hints import Where, below, known_keys
+from kedfem.scene.checks.hints import below, known_keys
 from kedfem.scene.records.wording import nearest
 
 PARAMETERS = "parameters"

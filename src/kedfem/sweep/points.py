@@ -16,12 +16,10 @@ from kedfem.accuracy.shared_modes import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
 from kedfem.dynamics.system.period.map import Carried
-from kedfem.errors import KedfemError, SceneError
+from kedfem.errors import KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled
 from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
-from kedfem.scene.checks.faults import place
-from kedfem.scene.checks.hints import Where
 from kedfem.sweep.axes import Value
 from kedfem.sweep.extremes import Extreme, change, extremes
 from kedfem.sweep.keys import with_values

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from kedfem.accuracy.shared_modes import alike
-from kedfem.errors import SceneError
-from kedfem.scene.checks.hints import Where
+from kedfem.errors import SceneError, Where
 from kedfem.scene.questions.timing import scene_speed
 from kedfem.sweep.axes import Value
 from kedfem.sweep.points import Job

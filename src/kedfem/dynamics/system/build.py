@@ -130,7 +130,7 @@ class _Builder:
         elif kind in ELEMENTS:
             self.element(joint, getattr(scene, kind)[name])
         elif scene.joints[joint.name].kind == "slot" and set(joint.bodies) & self.own:
-            raise SceneError(SLOTS.said({"where": f"joints.{joint.name}"}))
+            raise SceneError([SLOTS.fault(("joints", joint.name), {})])
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)

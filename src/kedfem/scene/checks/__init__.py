@@ -5,6 +5,7 @@ The checks look at what was given, not only at good records, so that a fault in 
 
 from __future__ import annotations
 
+from kedfem.errors import Fault
 from kedfem.scene.checks.analysis import analysis_faults
 from kedfem.scene.checks.combinations import combination_faults
 from kedfem.scene.checks.drives import drive_faults, gear_faults
@@ -24,7 +25,7 @@ from kedfem.scene.checks.undriven import (
 )
 
 
-def cross_faults(parts: Parts) -> list[str]:
+def cross_faults(parts: Parts) -> list[Fault]:
     """The faults that only show when parts of the scene are seen together."""
     checks = (
         reference_faults,

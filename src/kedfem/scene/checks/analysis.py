@@ -1,9 +1,10 @@
-"""Cross checks of the analysis and its drive; each yields fault lines."""
+"""Cross checks of the analysis and its drive."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts
 from kedfem.scene.questions.laws import table_noise
 from kedfem.scene.questions.timing import cycle, turning_speed
@@ -13,7 +14,7 @@ from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Polynomial, Ra
 ROUGH = 0.05  # share of a table's acceleration that may be noise
 
 
-def analysis_faults(parts: Parts) -> Iterator[str]:
+def analysis_faults(parts: Parts) -> Iterator[Fault]:
     """An analysis whose end or step is missing, given twice or impossible with the drive."""
     analysis = parts.analysis
     if not analysis.raw and analysis.record is None:
@@ -53,14 +54,14 @@ def _repeats(parts: Parts) -> bool:
     return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
 
 
-def open_model_faults(parts: Parts) -> Iterator[str]:
+def open_model_faults(parts: Parts) -> Iterator[Fault]:
     """Models left open without saying for which accuracy."""
     for link in parts.links.values():
         if link.word("model") == "auto" and parts.analysis.word("accuracy") == "quick":
             yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
 
 
-def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[str]:
+def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
     """An analysis that does not suit the law of motion of the only drive."""
     motion, joint = drive.record.motion, parts.joints.get(drive.record.joint)
     if joint is not None and joint.word("kind") == "prismatic":
@@ -73,7 +74,7 @@ def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[str]:
 def steps_faults(
     parts: Parts, got: str, wanted: str = "a drive that goes on turning",
     doing: str = "a drive that does not go on turning",
-) -> Iterator[str]:  # fmt: skip
+) -> Iterator[Fault]:  # fmt: skip
     """Turns that are asked for where there are none, and a step that is not given."""
     analysis = parts.analysis
     for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step")):
@@ -84,7 +85,7 @@ def steps_faults(
         yield analysis.fault("step", f"is required with {doing} [s], got {got}")
 
 
-def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[str]:
+def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
     """A motion table that does not cover the analysis or is too rough for it; a dwell without a return."""
     motion = drive.record.motion
     stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import get_args
 
+from kedfem.errors import Fault, Where, place
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
 from kedfem.scene.records.joints import JointKind
 
@@ -53,10 +54,12 @@ class Refusal:
         """Whether a part of a scene is such a combination."""
         return all(facts.get(factor) in levels for factor, levels in self.when.items())
 
-    def said(self, words: Mapping[str, str]) -> str:
-        """The message."""
-        text = f"{self.where}: must {self.must} ({self.why}), got {self.got}: {self.take}"
-        return text.format_map(words)
+    def fault(self, where: Where, words: Mapping[str, str]) -> Fault:
+        """What is wrong with a part of a scene at a place."""
+        named = {**words, "where": place(where)}
+        keys = (key.format_map(named) for key in self.where.removeprefix("{where}").split(".") if key)
+        text = f"must {self.must} ({self.why}), got {self.got}: {self.take}".format_map(named)
+        return Fault((*(where if self.where.startswith("{where}") else ()), *keys), text)
 
 
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",

@@ -1,11 +1,11 @@
-"""What a scene combines, in the factors of the table of capabilities: its refusals as fault lines, for its validation."""
+"""What a scene combines, in the factors of the table of capabilities: what it refuses of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from kedfem.errors import Fault, Where
 from kedfem.scene.checks.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
-from kedfem.scene.checks.faults import place
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.frames import default_frames
 from kedfem.scene.questions.moving_joints import enforced_by_equations
@@ -14,17 +14,17 @@ from kedfem.scene.records.damping import rayleigh
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.wording import NOUNS, shown
 
-Told = tuple[str, Facts, Mapping[str, str]]
-"""Section, factors and words of a part of a scene."""
+Told = tuple[str, Facts, Where, Mapping[str, str]]
+"""Section, factors, place and words of a part of a scene."""
 
 
-def combination_faults(parts: Parts) -> Iterator[str]:
+def combination_faults(parts: Parts) -> Iterator[Fault]:
     """All combinations of the scene that the table of capabilities refuses."""
     common = common_facts(parts)
     for told in (joints, drives, gears, elements, analysis, fatigue, links, loads):
-        for of, facts, words in told(parts):
+        for of, facts, where, words in told(parts):
             for refusal in refusals(of, {**common, **facts}):
-                yield refusal.said(words)
+                yield refusal.fault(where, words)
 
 
 def frames_of(parts: Parts, link: Entry | None = None) -> str:
@@ -58,9 +58,9 @@ def joints(parts: Parts) -> Iterator[Told]:
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
         facts = {"joint": kind, "partners": partners(parts.good, held, spatial)}
-        words = {"where": place(joint.where), "kind": kind, "key": "kind", "names": named(held)}
+        words = {"kind": kind, "key": "kind", "names": named(held)}
         if joint.record is None:
-            yield "joints", facts, words
+            yield "joints", facts, joint.where, words
             continue
         facts["enforced"] = CONSTRAINED if joint.name in moving else SHARED
         driven = "driven " if joint.name in parts.driven_joints else ""
@@ -69,7 +69,7 @@ def joints(parts: Parts) -> Iterator[Told]:
             words |= {"key": "bushing", "noun": "one"}
             turns = joint.record.bushing.rotational_stiffness is not None
             facts["bushing"] = "against rotations" if turns else "given"
-        yield "joints", facts, words
+        yield "joints", facts, joint.where, words
 
 
 def partners(good: Scene, held: list[Entry], spatial: frozenset[str]) -> str:
@@ -106,7 +106,7 @@ def drives(parts: Parts) -> Iterator[Told]:
     for drive in parts.all_drives:
         facts, words = on_joint(parts, drive.word("joint"))
         shaft = "given" if drive.has("shaft_stiffness") else "none"
-        yield "drives", {**facts, "shaft": shaft}, {**words, "where": place(drive.where)}
+        yield "drives", {**facts, "shaft": shaft}, drive.where, words
 
 
 def driven(parts: Parts) -> dict[str, str]:
@@ -121,15 +121,14 @@ def driven(parts: Parts) -> dict[str, str]:
 def gears(parts: Parts) -> Iterator[Told]:
     """Gears as a whole, and their joints."""
     for gear in parts.gears.values():
-        yield "gears", {}, {"where": place(gear.where)}
+        yield "gears", {}, gear.where, {}
         names = gear.raw.get("joints")
         if not isinstance(names, (list, tuple)) or len(names) != 2:
             continue
         for i, name in enumerate(names):
             facts, words = on_joint(parts, name if isinstance(name, str) else None)
             element = "rack" if gear.has("radius") and i == 1 else "gear"
-            where = place((*gear.where, "joints", i))
-            yield "gears", {**facts, "element": element, "stiffening": ""}, {**words, "where": where}
+            yield "gears", {**facts, "element": element, "stiffening": ""}, (*gear.where, "joints", i), words
 
 
 def elements(parts: Parts) -> Iterator[Told]:
@@ -137,7 +136,7 @@ def elements(parts: Parts) -> Iterator[Told]:
     for motor in parts.motors.values():
         facts, words = on_joint(parts, motor.word("joint"))
         element = next((key for key in ("torque", "force") if motor.has(key)), "")
-        yield "motors", {**facts, "element": element}, {**words, "where": place(motor.where)}
+        yield "motors", {**facts, "element": element}, motor.where, words
     for spring in parts.springs.values():
         facts, words = on_joint(parts, spring.word("joint"))
         element = "torsion" if spring.word("kind") == "torsion" else "along"
@@ -146,76 +145,73 @@ def elements(parts: Parts) -> Iterator[Told]:
             "factor": spring.word("stiffness_factor", "over") or "",
             **driven(parts),
         }
-        yield "springs", facts, {**words, "where": place(spring.where)}
+        yield "springs", facts, spring.where, words
     for limit in parts.limits.values():
         facts, words = on_joint(parts, limit.word("joint"))
         moved = "prescribed" if limit.word("joint") in parts.driven_joints else "free"
         facts |= {"element": f"{limit.word('kind')} limit", "moved": moved}
-        yield "limits", facts, {**words, "where": place(limit.where)}
+        yield "limits", facts, limit.where, words
 
 
 def analysis(parts: Parts) -> Iterator[Told]:
     """The analysis with its start and times, and damping."""
     entry, damping = parts.analysis, parts.damping
-    words = {"where": place(entry.where)}
+    at = entry.where
     if given := [*parts.motors, *parts.springs, *parts.limits]:
-        yield "analysis", {"element": "force element", "frames": ""}, {**words, "elements": shown(given)}
+        yield "analysis", {"element": "force element", "frames": ""}, at, {"elements": shown(given)}
     if parts.limits:
-        yield "analysis", limited(parts), {**words, "elements": shown(list(parts.limits))}
-    yield "analysis", {"drive": ""}, words
-    yield from kinds(parts, words)
+        yield "analysis", limited(parts), at, {"elements": shown(list(parts.limits))}
+    yield "analysis", {"drive": ""}, at, {}
+    yield from kinds(parts)
     if entry.word("frames"):
-        yield "analysis", only(frames=str(entry.word("frames"))), words
+        yield "analysis", only(frames=str(entry.word("frames"))), at, {}
     if entry.word("initial"):
-        yield "analysis", only(start=str(entry.word("initial"))), words
+        yield "analysis", only(start=str(entry.word("initial"))), at, {}
     for key in ("revolutions", "steps_per_revolution"):
         if entry.has(key):
-            yield "analysis", only(time=key), words
+            yield "analysis", only(time=key), at, {}
     for key in ("initial_speeds", "initial_motions"):
         speeds = entry.raw.get(key)
         if isinstance(speeds, Mapping) and speeds and parts.links:
             facts = {"start": key, "stiffening": "", "solver": "", "drive": ""}
-            yield "analysis", facts, {**words, "given": shown(list(speeds))}
+            yield "analysis", facts, at, {"given": shown(list(speeds))}
     forces = entry.raw.get("initial_deflection")
     if isinstance(forces, Mapping) and forces:
         speeds = any(entry.raw.get(key) for key in ("initial_speeds", "initial_motions"))
         for each in (*(["speeds"] if speeds else []), entry.word("initial") or "rest"):
             facts = {"start": "initial_deflection", "beside": each, "frames": "", "solver": ""}
-            yield "analysis", facts, {**words, "given": shown(list(forces))}
+            yield "analysis", facts, at, {"given": shown(list(forces))}
     alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
     if alpha:
-        words = {"where": place(damping.where), "alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
+        words = {"alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
         words["key"] = "ratio" if damping.has("ratio") else "alpha"
-        yield "damping", {"damping": "in proportion to mass"}, words
+        yield "damping", {"damping": "in proportion to mass"}, damping.where, words
 
 
-def kinds(parts: Parts, words: Mapping[str, str]) -> Iterator[Told]:
+def kinds(parts: Parts) -> Iterator[Told]:
     """What a steady motion, and positions without vibration, are combined with."""
     entry = parts.analysis
     kind = entry.word("kind") or "transient"
     if kind == "transient":
         return
-    facts, words = only(kind=kind), {**words, "kind": kind}
-    yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, words
+    facts, words = only(kind=kind), {"kind": kind}
+    yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, entry.where, words
     stiffening = "on" if entry.raw.get("stiffening") is True else "off"
     levels = "one" if entry.record is None or (entry.record.extrapolation_levels or 1) == 1 else "several"
     for more in ({"stiffening": stiffening}, {"levels": levels}):
-        yield "analysis", {**facts, "drive": "", "rho_inf": "", **more}, words
+        yield "analysis", {**facts, "drive": "", "rho_inf": "", **more}, entry.where, words
     for key in ("initial_speeds", "initial_motions", "initial_deflection"):
         given = entry.raw.get(key)
         if isinstance(given, Mapping) and given:
-            yield (
-                "analysis",
-                {**facts, "start": key, "drive": "", "rho_inf": ""},
-                {**words, "given": shown(list(given))},
-            )
+            more = {"start": key, "drive": "", "rho_inf": ""}
+            yield "analysis", {**facts, **more}, entry.where, {**words, "given": shown(list(given))}
 
 
 def fatigue(parts: Parts) -> Iterator[Told]:
     """Damage over a period."""
     if parts.fatigue.where:
         period = "given" if parts.fatigue.has("period") else "none"
-        yield "fatigue", only(period=period), {"where": place(parts.fatigue.where)}
+        yield "fatigue", only(period=period), parts.fatigue.where, {}
 
 
 def limited(parts: Parts) -> dict[str, str]:
@@ -236,7 +232,7 @@ def links(parts: Parts) -> Iterator[Told]:
     """Links with frames of their own."""
     for link in parts.links.values():
         if link.word("frames") and not slider(link):
-            yield "links", {"frames": str(link.word("frames"))}, {"where": place(link.where)}
+            yield "links", {"frames": str(link.word("frames"))}, link.where, {}
 
 
 def loads(parts: Parts) -> Iterator[Told]:
@@ -247,8 +243,9 @@ def loads(parts: Parts) -> Iterator[Told]:
             continue
         kind = "slider" if slider(link) else category(link)
         facts = {"element": str(load.word("kind")), "link": kind}
-        words = {"where": place(load.where), "name": link.name, "noun": category(link)}
-        yield "loads", {**facts, "factor": load.word("factor", "over") or "", **driven(parts)}, words
+        words = {"name": link.name, "noun": category(link)}
+        facts |= {"factor": load.word("factor", "over") or "", **driven(parts)}
+        yield "loads", facts, load.where, words
 
 
 def slider(link: Entry) -> bool:

@@ -1,4 +1,4 @@
-"""Cross checks of drives and gears; each yields fault lines."""
+"""Cross checks of drives and gears."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping
 
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.checks.faults import line, place
+from kedfem.errors import Fault, place
 from kedfem.scene.checks.parts import Entry, Parts
 from kedfem.scene.records.drives import SLIDING, TURNING
 from kedfem.scene.records.wording import unknown_name
 
 
-def drive_faults(parts: Parts) -> Iterator[str]:
+def drive_faults(parts: Parts) -> Iterator[Fault]:
     """Drives on joints that cannot be driven, or twice, or with a law for another kind of joint."""
     if parts.drive.where and parts.drives:
-        yield line(("drives",), "cannot be combined with drive, got both")
+        yield Fault(("drives",), "cannot be combined with drive, got both")
     met: dict[str, Entry] = {}
     for drive in parts.all_drives:
         joint = parts.joints.get(drive.word("joint") or "")
@@ -30,7 +30,7 @@ def drive_faults(parts: Parts) -> Iterator[str]:
             yield from law_faults(drive, str(kind))
 
 
-def law_faults(drive: Entry, kind: str) -> Iterator[str]:
+def law_faults(drive: Entry, kind: str) -> Iterator[Fault]:
     """A law of motion that is one of angles on a slide, or of travel on a hinge."""
     motion = drive.raw.get("motion")
     if not isinstance(motion, Mapping):
@@ -48,7 +48,7 @@ def law_faults(drive: Entry, kind: str) -> Iterator[str]:
             yield drive.fault("motion", reason.message(), "speed")
 
 
-def gear_faults(parts: Parts) -> Iterator[str]:
+def gear_faults(parts: Parts) -> Iterator[Fault]:
     """Gears on joints that do not exist."""
     for gear in parts.gears.values():
         names = gear.raw.get("joints")

@@ -1,4 +1,4 @@
-"""Faults of a scene as lines for the user: ``where: what was wanted, what was got``."""
+"""What pydantic found wrong, as faults of a scene: what was wanted, what was got."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from kedfem.errors import Fault, Where
 from kedfem.scene.checks.hints import (
-    Where,
     kind_of,
     known_keys,
     length_of,
@@ -33,21 +33,8 @@ WANTED = {
 }
 
 
-def place(where: Where) -> str:
-    """A place in the scene as text: ``links.crank.shape.between[1]``."""
-    text = ""
-    for part in where:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text
-
-
-def line(where: Where, message: str) -> str:
-    """One fault as a line."""
-    return f"{place(where)}: {message}" if where else message
-
-
-def fault_lines(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[str]:
-    """The faults that pydantic found in raw input for a record, one line each.
+def record_faults(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[Fault]:
+    """The faults that pydantic found in raw input for a record.
 
     Parameters
     ----------
@@ -56,31 +43,29 @@ def fault_lines(error: ValidationError, hint: Any, raw: Any, prefix: Where = ())
     raw : what it was validated from
     prefix : where it stands in the scene
     """
-    lines: dict[str, None] = {}  # a set in order: missing values of one list are one fault
-    for detail in error.errors(include_url=False):
-        where, message = described(detail, hint, raw)
-        lines[line((*prefix, *where), message)] = None
-    return list(lines)
+    found = (described(detail, hint, raw).under(*prefix) for detail in error.errors(include_url=False))
+    return list(dict.fromkeys(found))  # missing values of one list are one fault
 
 
-def described(detail: ErrorDetails, hint: Any, raw: Any) -> tuple[Where, str]:
-    """Place and message of one of pydantic's errors."""
+def described(detail: ErrorDetails, hint: Any, raw: Any) -> Fault:
+    """One of pydantic's errors."""
     where, here, _ = walked(detail["loc"], hint, raw)
     _, _, holder = walked(detail["loc"][:-1], hint, raw)
     if where and isinstance(where[-1], int) and isinstance(holder, (str, int, float)):
         where = where[:-1]  # one number given for each of several
     if where and detail["type"] == "missing" and isinstance(where[-1], int):
         _, above, _ = walked(detail["loc"][:-1], hint, raw)
-        return where[:-1], f"must hold {length_of(above)} values, got {len(detail['input'])}"
+        return Fault(where[:-1], f"must hold {length_of(above)} values, got {len(detail['input'])}")
     if detail["type"] in {"union_tag_not_found", "union_tag_invalid"}:
-        return (*where, "kind"), kind_message(here, detail["input"])
+        return Fault((*where, "kind"), kind_message(here, detail["input"]))
     if detail["type"] == "extra_forbidden":
         _, above, inside = walked(detail["loc"][:-1], hint, raw)
         known = known_keys(above, inside)
         if len(where) > 1 and where[-1] in known_keys(hint, raw) and where[-1] not in known:
-            return where, f"unknown key, {where[-1]!r} belongs to the scene itself, before its first table"
-        return where, unknown_key(str(where[-1]), known)
-    return where, message(detail, here)
+            wanted = f"unknown key, {where[-1]!r} belongs to the scene itself, before its first table"
+            return Fault(where, wanted)
+        return Fault(where, unknown_key(str(where[-1]), known))
+    return Fault(where, message(detail, here))
 
 
 def message(detail: ErrorDetails, hint: Any) -> str:

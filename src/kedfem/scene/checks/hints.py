@@ -9,10 +9,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from kedfem.errors import Where
 from kedfem.scene.records.points import AxisPoints, construction_of, is_construction
 from kedfem.scene.records.units import Quantity
-
-Where = tuple[str | int, ...]
 
 
 def members(hint: Any) -> Iterator[Any]:

@@ -1,18 +1,18 @@
-"""Cross checks of joints; each yields fault lines."""
+"""Cross checks of joints."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 
-from kedfem.scene.checks.faults import line
+from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.records.joints import DIRECTED, SQUARE
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.wording import NOUNS, unknown_name
 
 
-def joint_faults(parts: Parts) -> Iterator[str]:
+def joint_faults(parts: Parts) -> Iterator[Fault]:
     """Joints that join nothing, and links that nothing joins."""
     for joint in parts.joints.values():
         names = link_names(joint)
@@ -28,12 +28,12 @@ def joint_faults(parts: Parts) -> Iterator[str]:
     reached = connected(GROUND, pairs)
     for link in parts.links.values() if pairs else ():
         if not any(link.name in pair for pair in pairs):
-            yield line(link.where, "must be held by a joint, got none")
+            yield Fault(link.where, "must be held by a joint, got none")
         elif link.name not in reached:
-            yield line(link.where, "must be connected with the ground through joints, got no way there")
+            yield Fault(link.where, "must be connected with the ground through joints, got no way there")
 
 
-def direction_faults(joint: Entry) -> Iterator[str]:
+def direction_faults(joint: Entry) -> Iterator[Fault]:
     """Joints without the directions or the lead that they need, or with those of other kinds."""
     kind = joint.word("kind")
     if kind in DIRECTED and not joint.has("axis"):
@@ -60,7 +60,7 @@ def direction_faults(joint: Entry) -> Iterator[str]:
         yield joint.fault("lead", "must not be zero [m] (a screw without lead is a revolute joint), got 0")
 
 
-def seat_faults(joint: Entry, parts: Parts) -> Iterator[str]:
+def seat_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
     """Ports and faces of links that the joint does not join, and faces of links that have none."""
     names = link_names(joint)
     for key in ("coupling", "faces"):

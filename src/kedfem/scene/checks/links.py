@@ -1,4 +1,4 @@
-"""Cross checks of links: keys that must suit each other. Each check yields fault lines.
+"""Cross checks of links: keys that must suit each other.
 
 They look at what was given, not only at good records, so that a fault in one key hides no fault in another.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from kedfem.scene.checks.faults import line
+from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.moving_joints import moving_grounds
 from kedfem.scene.records.links import GROUND
@@ -25,11 +25,11 @@ ELEMENTS = {
 }
 
 
-def link_faults(parts: Parts) -> Iterator[str]:
+def link_faults(parts: Parts) -> Iterator[Fault]:
     """Links whose keys do not suit their model."""
     for link in parts.links.values():
         if link.name == GROUND:
-            yield line(link.where, "must have another name, got that of the frame")
+            yield Fault(link.where, "must have another name, got that of the frame")
         if category(link) == "rigid":
             yield from rigid_faults(link, parts)
             yield from meshing_faults(link)
@@ -38,7 +38,7 @@ def link_faults(parts: Parts) -> Iterator[str]:
             yield from meshing_faults(link)
 
 
-def rigid_faults(link: Entry, parts: Parts) -> Iterator[str]:
+def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     """A rigid link without a shape that is not a slider, or keys of an elastic one."""
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
@@ -78,7 +78,7 @@ def is_slide(joint: Entry) -> bool:
     return joint.word("kind") == "prismatic" and GROUND in link_names(joint)
 
 
-def elastic_faults(link: Entry, sketch: bool) -> Iterator[str]:
+def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
     """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = category(link), link.word("shape", "kind"), link.word("element")
     noun = NOUNS[kind]
@@ -97,7 +97,7 @@ def elastic_faults(link: Entry, sketch: bool) -> Iterator[str]:
         )
 
 
-def meshing_faults(link: Entry) -> Iterator[str]:
+def meshing_faults(link: Entry) -> Iterator[Fault]:
     """Keys of `mesh` that do not suit the shape."""
     shape, mesh = link.word("shape", "kind"), link.raw.get("mesh")
     if not isinstance(mesh, Mapping):
@@ -134,7 +134,7 @@ def meshing_faults(link: Entry) -> Iterator[str]:
                 yield link.fault("mesh", f"cannot be combined with {other}, got both", key)
 
 
-def count_faults(link: Entry, counted: str) -> Iterator[str]:
+def count_faults(link: Entry, counted: str) -> Iterator[Fault]:
     """Numbers of elements that are not as many as needed."""
     elements = link.record.mesh.elements if link.record is not None else None
     if counted == "beam" and isinstance(elements, tuple):

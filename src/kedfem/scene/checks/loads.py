@@ -1,17 +1,18 @@
-"""Cross checks of loads, bodies and probes, and of all names; each yields fault lines."""
+"""Cross checks of loads, bodies and probes, and of all names."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
+from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.records.analysis import ELASTIC
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.wording import unknown_name
 
 
-def reference_faults(parts: Parts) -> Iterator[str]:
+def reference_faults(parts: Parts) -> Iterator[Fault]:
     """Names of materials, links and joints that do not exist."""
     for link in parts.links.values():
         material = link.word("material")
@@ -31,7 +32,7 @@ def reference_faults(parts: Parts) -> Iterator[str]:
             yield drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
 
 
-def load_faults(parts: Parts) -> Iterator[str]:
+def load_faults(parts: Parts) -> Iterator[Fault]:
     """Loads, bodies and probes that do not suit their link."""
     for load in parts.loads.values():
         link = parts.links.get(load.word("link") or "")
@@ -53,14 +54,14 @@ def load_faults(parts: Parts) -> Iterator[str]:
         yield from flywheel_faults(body, parts)
 
 
-def torque_joint_faults(load: Entry, parts: Parts) -> Iterator[str]:
+def torque_joint_faults(load: Entry, parts: Parts) -> Iterator[Fault]:
     """A torque at a joint that is not one of its link."""
     here = [joint.name for joint in parts.joints.values() if load.word("link") in link_names(joint)]
     if load.word("joint") not in here:
         yield load.fault("joint", unknown_name("a joint of the link", str(load.word("joint")), here))
 
 
-def flywheel_faults(body: Entry, parts: Parts) -> Iterator[str]:
+def flywheel_faults(body: Entry, parts: Parts) -> Iterator[Fault]:
     """A flywheel away from the hinges of its link."""
     link_name = body.word("link")
     if body.record is None or body.word("kind") != "flywheel" or link_name not in parts.links:

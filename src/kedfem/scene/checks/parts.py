@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from kedfem.scene.checks.faults import line
+from kedfem.errors import Fault
 from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
 from kedfem.scene.records.damping import Damping
 from kedfem.scene.records.drives import Drive, Gear
@@ -84,9 +84,9 @@ class Entry:
             value = value.get(key) if isinstance(value, Mapping) else None
         return value is not None
 
-    def fault(self, key: str, message: str, *inner: str | int) -> str:
-        """A fault line about one of its keys."""
-        return line((*self.where, key, *inner), message)
+    def fault(self, key: str, message: str, *inner: str | int) -> Fault:
+        """A fault of one of its keys."""
+        return Fault((*self.where, key, *inner), message)
 
 
 NONE = Entry((), {}, None)

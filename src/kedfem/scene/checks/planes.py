@@ -1,11 +1,11 @@
-"""Cross checks of plane links, planar beams and their plane; each yields fault lines."""
+"""Cross checks of plane links, planar beams and their plane."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from kedfem.scene.checks.faults import line
+from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Parts, category
 from kedfem.scene.questions.planes import (
     FLAT,
@@ -19,17 +19,15 @@ from kedfem.scene.questions.planes import (
     vector,
     welded,
 )
-from kedfem.scene.records.base import Fault
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.shapes import Bar
 from kedfem.scene.records.wording import NOUNS
 
 
-def planar_faults(parts: Parts) -> Iterator[str]:
+def planar_faults(parts: Parts) -> Iterator[Fault]:
     """What leaves the plane of a scene with plane links."""
     if any(category(link) == "plane" for link in parts.links.values()):
-        for where, message in _leaving_plane(parts.good, f"a scene of {NOUNS['plane']}s"):
-            yield line(where, message)
+        yield from _leaving_plane(parts.good, f"a scene of {NOUNS['plane']}s")
 
 
 def _leaving_plane(scene: Scene, here: str) -> Iterator[Fault]:
@@ -39,14 +37,16 @@ def _leaving_plane(scene: Scene, here: str) -> Iterator[Fault]:
         if axis is None:
             continue
         if joint.kind == "revolute" and max(abs(axis[0]), abs(axis[1])) > FLAT:
-            yield where, f"must be along z in {here}, got {vector(axis)}"
+            yield Fault(where, f"must be along z in {here}, got {vector(axis)}")
         if joint.kind in {"prismatic", "slot"} and abs(axis[2]) > FLAT:
-            yield where, f"must lie in the xy plane in {here}, got {vector(axis)}"
+            yield Fault(where, f"must lie in the xy plane in {here}, got {vector(axis)}")
     yield from leaving(scene, f"in {here}")
     for name, link in scene.links.items():
         shape = link.shape
         if link.category == "plane" and isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
-            yield ("links", name, "shape", "up"), f"must be along z in {here}, got {vector(shape.upward)}"
+            yield Fault(
+                ("links", name, "shape", "up"), f"must be along z in {here}, got {vector(shape.upward)}"
+            )
     yield from off_plane(_beside_plane(scene), f"the other points of {here}")
 
 
@@ -62,7 +62,7 @@ def _beside_plane(scene: Scene) -> Iterator[Placed]:
     yield from ((where, record) for where, record in [*on_links(scene), *ends] if record.link not in others)
 
 
-def beam_faults(parts: Parts) -> Iterator[str]:
+def beam_faults(parts: Parts) -> Iterator[Fault]:
     """What leaves the plane of beams that are said to be planar."""
     spatial = spatial_beams(parts.good)
     for link in parts.links.values():
@@ -70,8 +70,7 @@ def beam_faults(parts: Parts) -> Iterator[str]:
             if link.has("beam"):
                 yield link.fault("beam", f"must be given for a beam only, got a {category(link)}")
         elif link.word("beam") == "planar" and link.record is not None:
-            for where, message in obstacles(parts.good, link.name):
-                yield line(where, message)
+            yield from obstacles(parts.good, link.name)
             for other in sorted(welded(parts.good, link.name) & spatial):
                 wanted = "must not be 'planar' beside the spatial beam welded to it"
                 yield link.fault("beam", f"{wanted}, got {other!r}")

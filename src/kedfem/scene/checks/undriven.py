@@ -1,4 +1,4 @@
-"""Cross checks of segments, force elements, initial velocities, and of scenes without a drive; each yields fault lines.
+"""Cross checks of segments, force elements, initial velocities, and of scenes without a drive.
 
 Which combinations are refused the table of capabilities says.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from kedfem.errors import Fault
 from kedfem.scene.checks.combinations import frames_of, slider
 from kedfem.scene.checks.parts import Entry, Parts, category
 from kedfem.scene.records.drives import SLIDING, TURNING
@@ -18,7 +19,7 @@ from kedfem.scene.records.wording import shown, unknown_name
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
 
 
-def frame_faults(parts: Parts) -> Iterator[str]:
+def frame_faults(parts: Parts) -> Iterator[Fault]:
     """Frames and segments that do not suit a link."""
     for link in parts.links.values():
         if slider(link):
@@ -30,7 +31,7 @@ def frame_faults(parts: Parts) -> Iterator[str]:
             yield from segment_faults(parts, link)
 
 
-def segment_faults(parts: Parts, link: Entry) -> Iterator[str]:
+def segment_faults(parts: Parts, link: Entry) -> Iterator[Fault]:
     """A number of segments where there is nothing to cut."""
     if not link.has("segments"):
         return
@@ -45,20 +46,20 @@ def segment_faults(parts: Parts, link: Entry) -> Iterator[str]:
         )
 
 
-def motor_faults(parts: Parts) -> Iterator[str]:
+def motor_faults(parts: Parts) -> Iterator[Fault]:
     """Motors on joints that do not exist."""
     for motor in parts.motors.values():
         yield from unknown_joint(parts, motor)
 
 
-def unknown_joint(parts: Parts, entry: Entry) -> Iterator[str]:
+def unknown_joint(parts: Parts, entry: Entry) -> Iterator[Fault]:
     """A name of a joint that there is not."""
     name = entry.word("joint")
     if name and parts.joints and name not in parts.joints:
         yield entry.fault("joint", unknown_name("a joint", name, parts.joints))
 
 
-def spring_faults(parts: Parts) -> Iterator[str]:
+def spring_faults(parts: Parts) -> Iterator[Fault]:
     """Springs on links or joints that do not exist."""
     for spring in parts.springs.values():
         if spring.word("kind") == "torsion" or spring.has("joint"):
@@ -73,7 +74,7 @@ def spring_faults(parts: Parts) -> Iterator[str]:
             yield spring.fault("between", "must hold a link, got the ground twice")
 
 
-def limit_faults(parts: Parts) -> Iterator[str]:
+def limit_faults(parts: Parts) -> Iterator[Fault]:
     """Limits of joints that do not exist."""
     for limit in parts.limits.values():
         yield from unknown_joint(parts, limit)
@@ -87,7 +88,7 @@ def end_links(spring: Entry) -> list[str | None]:
     return [word if isinstance(word, str) else None for word in words]
 
 
-def initial_faults(parts: Parts) -> Iterator[str]:
+def initial_faults(parts: Parts) -> Iterator[Fault]:
     """Velocities at the start of what has none of its own, and forces on links that are not there."""
     forces = parts.analysis.raw.get("initial_deflection")
     for name, force in forces.items() if isinstance(forces, Mapping) and parts.links else ():
@@ -109,7 +110,7 @@ def initial_faults(parts: Parts) -> Iterator[str]:
                 yield from speed_faults(parts, parts.joints[name], given[name])
 
 
-def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[str]:
+def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
     """A speed of a joint that has none, that the drive moves, or in a unit of another kind."""
     kind = joint.word("kind")
     if kind in {"spherical", "weld"}:
@@ -139,7 +140,7 @@ def readable(text: str, quantity: Quantity) -> bool:
     return True
 
 
-def undriven_faults(parts: Parts) -> Iterator[str]:
+def undriven_faults(parts: Parts) -> Iterator[Fault]:
     """What only makes sense with a drive, in a scene without one."""
     if parts.driven:
         return

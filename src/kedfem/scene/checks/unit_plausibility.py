@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kedfem.scene.checks.faults import place
-from kedfem.scene.checks.hints import Where, below, quantities
+from kedfem.errors import Where, place
+from kedfem.scene.checks.hints import below, quantities
 from kedfem.scene.records.units import RPM
 
 TURN = 2.0 * math.pi

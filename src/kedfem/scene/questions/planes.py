@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from kedfem.errors import Fault, Where
 from kedfem.scene.questions.moving_joints import enforced_by_equations
-from kedfem.scene.records.base import Fault
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.points import XYZ, Apart
 from kedfem.scene.records.scene import Scene
@@ -18,7 +18,6 @@ from kedfem.scene.records.shapes import Bar, Polyline
 from kedfem.scene.records.wording import NOUNS
 
 FLAT = 1e-9  # how far from the plane, relative to the size of the scene
-Where = tuple[str | int, ...]
 Placed = tuple[Where, Any]
 """A record and its place in the scene."""
 
@@ -78,35 +77,35 @@ def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterato
     if isinstance(shape, Polyline):
         for key in ("smooth", "up"):
             if getattr(shape, key):
-                yield (*place, key), "must be left out for a planar beam, got one"
+                yield Fault((*place, key), "must be left out for a planar beam, got one")
     if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
-        yield (*place, "up"), f"must be along z {whose}, got {vector(shape.upward)}"
+        yield Fault((*place, "up"), f"must be along z {whose}, got {vector(shape.upward)}")
     for where, record in around:
         others = [x for x in getattr(record, "links", ()) if x in scene.links and x != name]
         if getattr(record, "kind", None) == "weld" and others:
             other = scene.links[others[0]].category
             if other not in {"beam", "plane", "rigid"} or rigid_in_space(scene, others[0]):
                 noun = NOUNS.get(other, "rigid link")
-                yield (*where, "kind"), f"must be a hinge {whose}, got a weld to a {noun}"
+                yield Fault((*where, "kind"), f"must be a hinge {whose}, got a weld to a {noun}")
         centre = getattr(record, "centre", None)
         if centre is not None and math.dist(centre, record.at) > FLAT:
             at = f"must be its point {vector(record.at)} {whose} [m], got {vector(centre)}"
-            yield (*where, "centre"), at
+            yield Fault((*where, "centre"), at)
     yield from off_plane(around, f"the planar beam {name!r}")
 
 
 def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
     """Gravity and forces out of the xy plane, and torques in it."""
     if scene.gravity[2] != 0.0:
-        yield ("gravity",), f"must lie in the xy plane {whose} [m/s^2], got {vector(scene.gravity)}"
+        yield Fault(("gravity",), f"must lie in the xy plane {whose} [m/s^2], got {vector(scene.gravity)}")
     for name, load in scene.loads.items():
         given = getattr(load, "vector", None)
         if given is None:
             continue
         if load.kind == "torque" and any(given[:2]):
-            yield ("loads", name, "vector"), f"must be along z {whose}, got {vector(given)}"
+            yield Fault(("loads", name, "vector"), f"must be along z {whose}, got {vector(given)}")
         elif load.kind != "torque" and given[2] != 0.0:
-            yield ("loads", name, "vector"), f"must lie in the xy plane {whose}, got {vector(given)}"
+            yield Fault(("loads", name, "vector"), f"must lie in the xy plane {whose}, got {vector(given)}")
 
 
 def _joint_obstacles(where: Where, joint: Joint, whose: str) -> Iterator[Fault]:
@@ -114,11 +113,11 @@ def _joint_obstacles(where: Where, joint: Joint, whose: str) -> Iterator[Fault]:
     axis, kind = joint.axis, joint.kind
     upright = kind in {"revolute", "cylindrical", "screw", "planar"}
     if upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
-        yield (*where, "axis"), f"must be along z {whose}, got {vector(axis)}"
+        yield Fault((*where, "axis"), f"must be along z {whose}, got {vector(axis)}")
     if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
-        yield (*where, "axis"), f"must lie in the xy plane {whose}, got {vector(axis)}"
+        yield Fault((*where, "axis"), f"must lie in the xy plane {whose}, got {vector(axis)}")
     if kind == "universal":
-        yield (*where, "kind"), f"must be one that turns about z only {whose}, got a universal joint"
+        yield Fault((*where, "kind"), f"must be one that turns about z only {whose}, got a universal joint")
 
 
 def vector(parts: tuple[float, ...]) -> str:
@@ -141,7 +140,7 @@ def off_plane(records: Iterable[Placed], of: str) -> Iterator[Fault]:
     for where, point in placed:
         if abs(point[2] - first[2]) > FLAT * size:
             wanted = f"must lie in the plane z = {first[2]:.6g} of {of} [m]"
-            yield where, f"{wanted}, got z = {point[2]:.6g}"
+            yield Fault(where, f"{wanted}, got z = {point[2]:.6g}")
 
 
 def _by_link(scene: Scene) -> dict[str, list[Placed]]:

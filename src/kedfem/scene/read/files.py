@@ -12,9 +12,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from kedfem.errors import SceneError
-from kedfem.scene.checks.faults import fault_lines, place
-from kedfem.scene.checks.hints import Where
+from kedfem.errors import Fault, SceneError, Where
+from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.parts import Parts
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.records.points import known_points
@@ -54,17 +53,17 @@ def file_text(path: Path) -> str:
         raise SceneError(f"{path}: must be a readable file, got: {reason.strerror}") from None
 
 
-def outside(raw: Any, folder: Path) -> list[str]:
+def outside(raw: Any, folder: Path) -> list[Fault]:
     """Faults of all names of files and folders in a raw scene that lead out of its own folder, links followed."""
-    names: list[tuple[str, str]] = []
+    names: list[tuple[Where, str]] = []
 
     def noted(where: Where, name: str) -> str:
-        names.append((place(where), name))
+        names.append((where, name))
         return name
 
     _with_names(raw, (), noted)
     wanted = "must be within the scene's folder (--within)"
-    return [f"{where}: {wanted}, got {name!r}" for where, name in names if not inside(folder, name)]
+    return [Fault(where, f"{wanted}, got {name!r}") for where, name in names if not inside(folder, name)]
 
 
 def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
@@ -135,13 +134,13 @@ def part_geometry(path: Path) -> PartGeometry:
         with known_points(placement):
             part = PartGeometry.model_validate(shape)
     except ValidationError as error:
-        faults = faults + fault_lines(error, PartGeometry, shape)
+        faults = faults + record_faults(error, PartGeometry, shape)
     if faults:
-        raise SceneError([f"{path.name}: {fault}" for fault in faults])
+        raise SceneError(Fault((), f"{path.name}: {fault}") for fault in faults)
     return part
 
 
-def file_faults(parts: Parts) -> Iterator[str]:
+def file_faults(parts: Parts) -> Iterator[Fault]:
     """Files of shapes that are missing, and parts that do not fit between their points."""
     for link in parts.links.values():
         shape = link.record.shape if link.record is not None else None
@@ -155,7 +154,7 @@ def file_faults(parts: Parts) -> Iterator[str]:
             try:
                 part = part_geometry(parts.folder / shape.file)
             except SceneError as error:
-                yield from (link.fault("shape", fault, "file") for fault in error.faults)
+                yield from (link.fault("shape", str(fault), "file") for fault in error.faults)
                 continue
             wanted, got = math.dist(*shape.between), math.dist(part.origin, part.x_point)
             if abs(wanted - got) > 1e-6 * got:

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from kedfem.errors import SceneError
-from kedfem.scene.checks.faults import fault_lines
+from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.read.files import renamed, toml_table
 from kedfem.scene.records.base import FileName
 from kedfem.scene.records.wording import shown
@@ -92,7 +92,7 @@ def named_files(given: object) -> list[str]:
     try:
         return FILES.validate_python(listed)
     except ValidationError as error:
-        raise SceneError(fault_lines(error, list[FileName], listed, (KEY,))) from None
+        raise SceneError(record_faults(error, list[FileName], listed, (KEY,))) from None
 
 
 def joined(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

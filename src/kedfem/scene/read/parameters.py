@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kedfem.scene.checks.faults import line
-from kedfem.scene.checks.hints import Where, below, members
+from kedfem.errors import Fault, Where
+from kedfem.scene.checks.hints import below, members
 from kedfem.scene.records.expressions import evaluated, plain_number
 from kedfem.scene.records.units import NUMBER, OVERFLOW, UNIT, Evaluated, unit_registry
 from kedfem.scene.records.wording import shown
@@ -60,14 +60,14 @@ class Parameters(Mapping[str, Any]):
                 self._pending.pop()
         return self._found[name]
 
-    def faults(self) -> list[str]:
+    def faults(self) -> list[Fault]:
         """The faults of all parameters."""
         for name in self:
             try:
                 self[name]
             except ValueError:
                 continue
-        return [line(("parameters", str(name)), message) for name, message in self._failed.items()]
+        return [Fault(("parameters", str(name)), message) for name, message in self._failed.items()]
 
     def _quantity(self, value: object) -> Any:
         if isinstance(value, str):
@@ -83,7 +83,7 @@ class Parameters(Mapping[str, Any]):
 WANTED = "a number, a text of a number and a unit, or an expression"
 
 
-def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[str]]:
+def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[Fault]]:
     """A raw scene with its expressions worked out, and faults.
 
     Parameters
@@ -104,7 +104,7 @@ def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any],
             try:
                 quantity = evaluated(value.removeprefix(SIGN), known)
             except ValueError as reason:
-                faults.append(line(where, f"must be an expression, got {shown(value)}: {reason}"))
+                faults.append(Fault(where, f"must be an expression, got {shown(value)}: {reason}"))
                 return value
             number = plain_number(quantity)
             return carrying(value, quantity) if number is None else number

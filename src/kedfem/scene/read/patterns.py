@@ -12,8 +12,9 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.checks.faults import fault_lines, line
-from kedfem.scene.checks.hints import Where, below, members, quantities
+from kedfem.errors import Fault, Where
+from kedfem.scene.checks.faults import record_faults
+from kedfem.scene.checks.hints import below, members, quantities
 from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.links import spelt_out
 from kedfem.scene.records.patterns import SECTIONS, Pattern
@@ -149,7 +150,7 @@ def _triple(hint: Any) -> str | None:
     return None
 
 
-def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[str], dict[str, str]]:
+def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[Fault], dict[Where, Where]]:
     """A raw scene with its patterns written out.
 
     Parameters
@@ -165,15 +166,15 @@ def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[str],
         return dict(raw), [], {}
     out, faults, origins = (
         {key: x for key, x in raw.items() if key != "patterns"},
-        list[str](),
-        dict[str, str](),
+        list[Fault](),
+        dict[Where, Where](),
     )
     for name, each in given.items():
         where: Where = ("patterns", str(name))
         try:
             pattern = Pattern.model_validate(each)
         except ValidationError as error:
-            faults += fault_lines(error, Pattern, each, where)
+            faults += record_faults(error, Pattern, each, where)
             continue
         for section in SECTIONS:
             for entry, value in getattr(pattern, section).items():
@@ -182,8 +183,8 @@ def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[str],
 
 
 def _repeated(
-    out: Tables, origins: dict[str, str], pattern: Pattern, where: Where, value: Any, hint: Any
-) -> list[str]:
+    out: Tables, origins: dict[Where, Where], pattern: Pattern, where: Where, value: Any, hint: Any
+) -> list[Fault]:
     """All copies of one entry, into a scene's tables; faults."""
     section, entry = str(where[-2]), str(where[-1])
     above = ("output", "probes") if section == "probes" else (section,)
@@ -198,27 +199,27 @@ def _repeated(
     for number in range(pattern.count):
         copy, made = _Copy(pattern, number), f"{entry}_{number + 1}"
         if made in tables:
-            return [line(where, f"must have a name that is free with its number, got {made!r} twice")]
+            return [Fault(where, f"must have a name that is free with its number, got {made!r} twice")]
         try:
             tables[made] = copy.completed(
                 section, value, copy.of(value, kind, "at" if section == "points" else "")
             )
         except (ValueError, PydanticCustomError) as reason:
             text = reason.message() if isinstance(reason, PydanticCustomError) else str(reason)
-            return [line(where, text)]
-        origins[".".join((*above, made))] = line(where, "")[:-2]
+            return [Fault(where, text)]
+        origins[*above, made] = where
     return []
 
 
-def in_patterns(fault: str, origins: Mapping[str, str]) -> str:
-    """A fault's line, its place in the pattern that its table was made from, if it was."""
+def in_pattern(fault: Fault, origins: Mapping[Where, Where]) -> Fault:
+    """A fault, at the place in the pattern that its table was made from, if it was."""
     for made, origin in origins.items():
-        if fault.startswith((f"{made}.", f"{made}:", f"{made}[")):
-            return origin + fault[len(made) :]
+        if fault.where[: len(made)] == made:
+            return Fault((*origin, *fault.where[len(made) :]), fault.message)
     return fault
 
 
-def steep_faults(links: Mapping[str, Any], given: object) -> list[str]:
+def steep_faults(links: Mapping[str, Any], given: object) -> list[Fault]:
     """Lines whose section does not turn with the copies of a pattern: steep ones, on which x is up unless given."""
     found = []
     for name, each in given.items() if isinstance(given, Mapping) else ():
@@ -232,7 +233,7 @@ def steep_faults(links: Mapping[str, Any], given: object) -> list[str]:
                 and _steep(shape)
             ):
                 wanted = "must have a shape with `up` where it is steep in a pattern that turns, got none"
-                found.append(line(("patterns", str(name), "links", link), wanted))
+                found.append(Fault(("patterns", str(name), "links", link), wanted))
     return found
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.checks.faults import fault_lines, line
-from kedfem.scene.checks.hints import Where
+from kedfem.errors import Fault, Where
+from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.records.points import UNPLACED, XYZ, Point, construction_of, is_construction, known_points
 from kedfem.scene.records.units import fault
 
@@ -34,7 +34,7 @@ class Placement(Mapping[str, XYZ]):
             self._raw[f"joints.{name}"] = (("joints", str(name)), value)
         self._placed: dict[str, XYZ] = {}
         self._pending: list[str] = []
-        self.faults: list[str] = []
+        self.faults: list[Fault] = []
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._raw)
@@ -74,9 +74,9 @@ class Placement(Mapping[str, XYZ]):
                 return POINT.validate_python(value)
         except ValidationError as error:
             meant = construction_of(value) if isinstance(value, Mapping) else Point
-            self.faults += fault_lines(error, meant, value, where)
+            self.faults += record_faults(error, meant, value, where)
         except PydanticCustomError as reason:
-            self.faults.append(line(where, reason.message()))
+            self.faults.append(Fault(where, reason.message()))
         return UNPLACED
 
     def _joint(self, value: Any) -> XYZ:

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from kedfem.errors import SceneError
-from kedfem.scene.checks.faults import fault_lines
+from kedfem.errors import Fault, SceneError
+from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.links import ELEMENTS, meshing_faults
 from kedfem.scene.checks.parts import Entry
 from kedfem.scene.read.files import inside, outside, toml_table
@@ -77,12 +77,12 @@ def link_from(raw: Mapping[str, Any]) -> LinkScene:
     try:
         link, faults = LinkScene.model_validate(raw), []
     except ValidationError as error:
-        link, faults = None, fault_lines(error, LinkScene, raw)
+        link, faults = None, record_faults(error, LinkScene, raw)
     faults += meshing_faults(Entry((), raw, link))
     if link is not None and link.element not in ELEMENTS["solid"]:
-        faults.append(f"element: {one_of(ELEMENTS['solid'], link.element)}")
+        faults.append(Fault(("element",), one_of(ELEMENTS["solid"], link.element)))
     if link is None or faults:
-        raise SceneError(list(dict.fromkeys(faults)))
+        raise SceneError(faults)
     return link
 
 
@@ -159,4 +159,4 @@ def _record(where: str, text: str, kind: type[T]) -> T:
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
-        raise SceneError([f"{where}.{fault}" for fault in fault_lines(error, kind, raw)]) from None
+        raise SceneError(record_faults(error, kind, raw, (where,))) from None

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from kedfem.errors import SceneError
+from kedfem.errors import Fault, SceneError, Where
 from kedfem.scene.read.files import file_text
 from kedfem.scene.records.curves import Curve, Factor, ForceCurve, TorqueCurve
 from kedfem.scene.records.units import si_number
@@ -82,22 +82,22 @@ def _heading_factors(
     return one, other
 
 
-def with_motion_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+def with_motion_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Fault]]:
     """A raw scene with the motion tables of its drives read from the files that they name; and faults."""
     read: dict[str, Any] = dict(raw)
-    faults: list[str] = []
+    faults: list[Fault] = []
     if isinstance(raw.get("drive"), Mapping):
-        read["drive"], faults = _with_motion_table("drive", raw["drive"], folder)
+        read["drive"], faults = _with_motion_table(("drive",), raw["drive"], folder)
     if isinstance(raw.get("drives"), Mapping):
         tables = {
-            name: _with_motion_table(f"drives.{name}", each, folder) for name, each in raw["drives"].items()
+            name: _with_motion_table(("drives", name), each, folder) for name, each in raw["drives"].items()
         }
         read["drives"] = {name: drive for name, (drive, _) in tables.items()}
         faults = faults + [fault for _, found in tables.values() for fault in found]
     return read, faults
 
 
-def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[str]]:
+def _with_motion_table(where: Where, drive: Any, folder: Path) -> tuple[Any, list[Fault]]:
     motion = drive.get("motion") if isinstance(drive, Mapping) else None
     if not isinstance(motion, Mapping):
         return drive, []
@@ -107,7 +107,7 @@ def _with_motion_table(where: str, drive: Any, folder: Path) -> tuple[Any, list[
     try:
         time, key, values = motion_table(folder / motion["file"])
     except SceneError as error:
-        return drive, [f"{where}.motion.file: {fault}" for fault in error.faults]
+        return drive, [fault.under(*where, "motion", "file") for fault in error.faults]
     others = {name: value for name, value in motion.items() if name != "file"}
     return {**drive, "motion": {**others, "time": time, key: values}}, []
 
@@ -121,23 +121,23 @@ CURVES: dict[tuple[str, str], type[Curve]] = {
 """Keys of a section's tables that hold curves."""
 
 
-def with_curve_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+def with_curve_tables(raw: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Fault]]:
     """A raw scene with its curves read from the files that they name; and faults."""
-    read, faults = dict(raw), list[str]()
+    read, faults = dict(raw), list[Fault]()
     for (section, key), curve in CURVES.items():
         every = read.get(section)
         for name, each in every.items() if isinstance(every, Mapping) else ():
             given = each.get(key) if isinstance(each, Mapping) else None
             if isinstance(given, Mapping) and isinstance(given.get("file"), str):
                 made, more = _with_curve(given, curve, folder)
-                faults += [f"{section}.{name}.{key}.file: {fault}" for fault in more]
+                faults += [fault.under(section, name, key, "file") for fault in more]
                 read[section] = {**read[section], name: {**each, key: made}}
     return read, faults
 
 
 def _with_curve(
     given: Mapping[str, Any], curve: type[Curve], folder: Path
-) -> tuple[Mapping[str, Any], list[str]]:
+) -> tuple[Mapping[str, Any], list[Fault]]:
     """A raw curve with the columns of its file, if it is one that its record can read; and faults."""
     over = given.get("over", "time")
     if over not in curve.units or given.keys() & {"time", "at", "value"}:

@@ -8,16 +8,16 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from kedfem.errors import SceneError
+from kedfem.errors import Fault, SceneError
 from kedfem.scene.checks import cross_faults
-from kedfem.scene.checks.faults import fault_lines
+from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.parts import scene_parts
 from kedfem.scene.checks.unit_plausibility import bare_numbers
 from kedfem.scene.questions.frames import default_frames
 from kedfem.scene.questions.timing import time_grid
 from kedfem.scene.read.files import file_faults
 from kedfem.scene.read.parameters import with_expressions
-from kedfem.scene.read.patterns import in_patterns, steep_faults, with_patterns
+from kedfem.scene.read.patterns import in_pattern, steep_faults, with_patterns
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.read.rigid_links import with_rigid_bodies
 from kedfem.scene.read.tables import with_curve_tables, with_motion_tables
@@ -56,23 +56,23 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     raw, faults = _with_files(_spelt_out(raw), folder)
     faults = placement.faults + faults
     if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
-        faults.append("joints: is required with a drive, got nothing")
+        faults.append(Fault(("joints",), "is required with a drive, got nothing"))
     with known_points(placement):
         raw = with_rigid_bodies(raw)
         try:
             scene = Scene.model_validate(_prepared(raw, points))
         except ValidationError as error:
-            scene, faults = None, faults + fault_lines(error, Scene, raw)
+            scene, faults = None, faults + record_faults(error, Scene, raw)
         parts = scene_parts(raw, _gravity(raw), folder, sketch)
     faults += [*cross_faults(parts), *file_faults(parts)]
     if scene is not None and not wrong + faults:
         faults = steep_faults(scene.links, repeated)
     if scene is None or wrong + faults:
-        places = {each.partition(": ")[0] for each in wrong}
-        rest = [each for each in faults if each.partition(": ")[0] not in places]
-        raise SceneError(list(dict.fromkeys(in_patterns(each, origins) for each in [*wrong, *rest])))
+        places = {each.where for each in wrong}
+        rest = [each for each in faults if each.where not in places]
+        raise SceneError(in_pattern(each, origins) for each in [*wrong, *rest])
     if (steps := time_grid(scene).steps) > MOST_STEPS:
-        raise SceneError(f"analysis: must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")
+        raise SceneError([Fault(("analysis",), f"must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")])
     scene._doubts, scene._as_given, scene._checked = tuple(bare_numbers(bare, Scene)), written, True
     if scene.analysis.frames is None:
         scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))
@@ -98,7 +98,7 @@ def _left_open(link: Any) -> Any:
     return {**link, "model": "auto"}
 
 
-def _with_files(raw: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[str]]:
+def _with_files(raw: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Fault]]:
     """A raw scene with the tables of numbers that it names files of; and faults."""
     raw, faults = with_motion_tables(raw, folder)
     raw, more = with_curve_tables(raw, folder)

@@ -16,7 +16,8 @@ from pydantic import (
     model_validator,
 )
 
-from kedfem.scene.records.base import Fault, FileName, Name, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import FileName, Name, Record, refuse
 from kedfem.scene.records.initial import InitialForce, InitialMotion, JointSpeed
 from kedfem.scene.records.links import Count, Frames
 from kedfem.scene.records.points import Point
@@ -136,12 +137,14 @@ class Probe(Record):
         wanted = "link" if self.quantity == "stress" else "world" if self.quantity in TOTAL else None
         if wanted and self.frame not in {None, wanted}:
             got = f"got {self.frame!r}"
-            faults.append((("frame",), f"must be {wanted!r} for a {self.quantity.replace('_', ' ')}, {got}"))
+            faults.append(
+                Fault(("frame",), f"must be {wanted!r} for a {self.quantity.replace('_', ' ')}, {got}")
+            )
         if self.chord is not None and self.quantity != "deflection":
             got = f"got one for a {self.quantity.replace('_', ' ')}"
-            faults.append((("chord",), f"must be given for a deflection only, {got}"))
+            faults.append(Fault(("chord",), f"must be given for a deflection only, {got}"))
         if self.chord is not None and math.dist(*self.chord) == 0.0:
-            faults.append((("chord",), "must be two different points, got one twice"))
+            faults.append(Fault(("chord",), "must be two different points, got one twice"))
         refuse(faults)
         return self.fill(frame=self.frame or wanted or "link")
 

@@ -10,11 +10,9 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, ValidationError
 from pydantic_core import InitErrorDetails
 
+from kedfem.errors import Fault
 from kedfem.scene.records.units import fault
 from kedfem.scene.records.wording import shown
-
-Fault = tuple[tuple[str | int, ...], str]
-"""Place in a record, and message."""
 
 LONGEST, LONGEST_FILE = 100, 255  # names become parts of file names
 NAME = re.compile(r"[^\W_](?:[\w \-]*\w)?")
@@ -83,5 +81,5 @@ def plain(value: Any) -> Any:
 def refuse(faults: list[Fault]) -> None:
     """Raise all faults of a record under validation at once, each at its place in it; none: no error."""
     if faults:
-        details = [InitErrorDetails(type=fault(message), loc=where, input=None) for where, message in faults]
+        details = [InitErrorDetails(type=fault(x.message), loc=x.where, input=None) for x in faults]
         raise ValidationError.from_exception_data("scene", details)

@@ -9,7 +9,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import FileName, Record, refuse
 from kedfem.scene.records.units import Number, Quantity, Time
 
 Abscissa = Annotated[Any, Field()]
@@ -45,7 +46,7 @@ class Curve(Record):
     def _one_value_per_place(self) -> Self:
         if self.file is not None:
             given = self.at or self.value or self.time
-            refuse([(("file",), "cannot be combined with at and value, got both")] if given else [])
+            refuse([Fault(("file",), "cannot be combined with at and value, got both")] if given else [])
             return self
         if self.time:
             refuse(self._time_faults())
@@ -58,9 +59,9 @@ class Curve(Record):
     def _time_faults(self) -> list[Fault]:
         if self.over != "time":
             article = "an" if self.over == "angle" else "a"
-            return [(("time",), f"must be left out over {article} {self.over} (it has at), got times")]
+            return [Fault(("time",), f"must be left out over {article} {self.over} (it has at), got times")]
         if self.at and self.at != self.time:
-            return [(("at",), "cannot be combined with time, got both")]
+            return [Fault(("at",), "cannot be combined with time, got both")]
         return []
 
 
@@ -69,7 +70,7 @@ def _period(quantity: Quantity, given: Any, at: Sequence[float]) -> float:
     number, span = _number(quantity, ("period",), given), at[-1] - at[0]
     if not number > 0.0 or number < span * (1.0 - 1e-12):
         wanted = f"must be positive, and no shorter than the table, {span:.6g}{quantity.bracket}"
-        refuse([(("period",), f"{wanted}, got {number:.6g}")])
+        refuse([Fault(("period",), f"{wanted}, got {number:.6g}")])
     return number
 
 
@@ -78,7 +79,7 @@ def _number(quantity: Quantity, where: tuple[str | int, ...], given: Any) -> flo
     try:
         return quantity.number(given)
     except PydanticCustomError as reason:
-        refuse([(where, reason.message())])
+        refuse([Fault(where, reason.message())])
         raise
 
 
@@ -87,16 +88,16 @@ def curve_faults(
 ) -> list[Fault]:
     """What is wrong with a curve: places and messages."""
     if not at:
-        return [((key,), f"must hold at least one value{quantity.bracket}, got none")]
+        return [Fault((key,), f"must hold at least one value{quantity.bracket}, got none")]
     faults: list[Fault] = []
     for i, (before, after) in enumerate(pairwise(at), start=1):
         if after <= before:
             message = f"must be above the one before, {before:.6g}{quantity.bracket}, got {after:.6g}"
-            faults.append(((key, i), message))
+            faults.append(Fault((key, i), message))
             break
     if len(value) != len(at):
         faults.append(
-            (("value",), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}")
+            Fault(("value",), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}")
         )
     return faults
 

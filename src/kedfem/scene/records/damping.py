@@ -7,7 +7,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, model_validator
 
-from kedfem.scene.records.base import Fault, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.units import Quantity
 
 Ratio = Annotated[float, Quantity("1", least=0.0, below=1.0)]
@@ -46,19 +47,21 @@ def damping_faults(damping: Damping) -> list[Fault]:
     """What is contradictory in a damping: places and messages."""
     if damping.ratio is None:
         return (
-            [] if damping.frequencies is None else [(("ratio",), "is required with frequencies, got nothing")]
+            []
+            if damping.frequencies is None
+            else [Fault(("ratio",), "is required with frequencies, got nothing")]
         )
     if damping.alpha or damping.beta:
-        return [(("ratio",), "cannot be combined with alpha and beta, got both")]
+        return [Fault(("ratio",), "cannot be combined with alpha and beta, got both")]
     if damping.frequencies is None:
-        return [(("frequencies",), "is required with ratio [Hz], got nothing")]
+        return [Fault(("frequencies",), "is required with ratio [Hz], got nothing")]
     first, second = damping.frequencies
     if first == second:
-        return [(("frequencies",), f"must be two different frequencies [Hz], got {first:.6g} twice")]
+        return [Fault(("frequencies",), f"must be two different frequencies [Hz], got {first:.6g} twice")]
     alpha, beta = rayleigh(damping)
     if min(alpha, beta) < 0.0:
         got = f"got alpha = {alpha:.6g} 1/s, beta = {beta:.6g} s"
-        return [(("ratio",), f"must give alpha and beta that are zero or positive, {got}")]
+        return [Fault(("ratio",), f"must give alpha and beta that are zero or positive, {got}")]
     return []
 
 

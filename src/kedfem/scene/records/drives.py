@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictBool, StrictInt, model_validator
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import FileName, Record, refuse
 from kedfem.scene.records.damping import Frequency
 from kedfem.scene.records.units import (
     Angle,
@@ -91,15 +92,15 @@ class Table(Record):
         if self.file is None:
             refuse(table_faults(self.time, key, self.values, at_least=2))
         elif self.time or self.values:
-            refuse([(("file",), f"cannot be combined with time and {key}, got both")])
+            refuse([Fault(("file",), f"cannot be combined with time and {key}, got both")])
         if self.travel and self.angle:
-            refuse([(("travel",), "cannot be combined with angle, got both")])
+            refuse([Fault(("travel",), "cannot be combined with angle, got both")])
         if self.smooth is None:
             return self
         try:
             return self.fill(smooth=Quantity("m" if self.travel else "rad", above=0.0).number(self.smooth))
         except PydanticCustomError as reason:
-            refuse([(("smooth",), reason.message())])
+            refuse([Fault(("smooth",), reason.message())])
         return self
 
     @property
@@ -117,9 +118,9 @@ class _Rise(Record):
     @model_validator(mode="after")
     def _one_rise(self) -> _Rise:
         if self.angle is None and self.travel is None:
-            refuse([(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
+            refuse([Fault(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
         if self.angle is not None and self.travel is not None:
-            refuse([(("travel",), "cannot be combined with angle, got both")])
+            refuse([Fault(("travel",), "cannot be combined with angle, got both")])
         return self
 
     @property
@@ -201,7 +202,7 @@ class Drive(Record):
     @model_validator(mode="after")
     def _damped_shaft(self) -> Drive:
         if self.shaft_damping and self.shaft_stiffness is None:
-            refuse([(("shaft_damping",), "must be combined with shaft_stiffness, got it alone")])
+            refuse([Fault(("shaft_damping",), "must be combined with shaft_stiffness, got it alone")])
         return self
 
 
@@ -226,14 +227,14 @@ class Gear(Record):
     def _one_of_three(self) -> Gear:
         given = [key for key in ("ratio", "teeth", "radius") if getattr(self, key) is not None]
         if not given:
-            refuse([(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
+            refuse([Fault(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
         if len(given) > 1:
-            refuse([((given[1],), f"cannot be combined with {given[0]}, got both")])
+            refuse([Fault((given[1],), f"cannot be combined with {given[0]}, got both")])
         if self.internal and self.teeth is None:
-            refuse([(("internal",), "must be given with teeth only, got it without")])
+            refuse([Fault(("internal",), "must be given with teeth only, got it without")])
         for key in given:
             if getattr(self, key) == 0.0:
-                refuse([((key,), "must not be zero, got 0")])
+                refuse([Fault((key,), "must not be zero, got 0")])
         return self
 
     @property
@@ -249,14 +250,16 @@ def table_faults(
 ) -> list[Fault]:
     """What is wrong with a table over time: places and messages."""
     if len(time) < at_least:
-        return [(("time",), f"must hold at least {at_least} times [s], got {len(time)}")]
+        return [Fault(("time",), f"must hold at least {at_least} times [s], got {len(time)}")]
     faults: list[Fault] = []
     for i, (before, after) in enumerate(pairwise(time), start=1):
         if after <= before:
             faults.append(
-                (("time", i), f"must be later than the time before, {before:.6g} [s], got {after:.6g}")
+                Fault(("time", i), f"must be later than the time before, {before:.6g} [s], got {after:.6g}")
             )
             break
     if len(values) != len(time):
-        faults.append(((key,), f"must hold one value for each of the {len(time)} times, got {len(values)}"))
+        faults.append(
+            Fault((key,), f"must hold one value for each of the {len(time)} times, got {len(values)}")
+        )
     return faults

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.points import Axis, Point
 from kedfem.scene.records.units import PositiveLength, fault
@@ -35,9 +36,9 @@ class ChosenFace(Record):
         given = [form for form in FORMS if getattr(self, form) is not None]
         if len(given) != 1:
             got = " and ".join(given) or "none of them"
-            refuse([((), f"must say what the face is by one of {', '.join(FORMS)}, got {got}")])
+            refuse([Fault((), f"must say what the face is by one of {', '.join(FORMS)}, got {got}")])
         if self.axis is not None and self.cylinder is None:
-            refuse([(("axis",), f"must be combined with cylinder, got it with {given[0]}")])
+            refuse([Fault(("axis",), f"must be combined with cylinder, got it with {given[0]}")])
         return self
 
     @property

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictBool, TypeAdapter, model_validator
 
-from kedfem.scene.records.base import Fault, Name, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import Name, Record, refuse
 from kedfem.scene.records.units import PositivePressure, PositiveTime, Quantity
 
 STRENGTHS = {"steel": (300e6, 2000e6), "aluminium": (80e6, 800e6)}
@@ -69,7 +70,7 @@ class FatigueData(Record):
         given = [key for key in kinds if getattr(self, key) is not None]
         if len(given) != 1:
             got = " and ".join(given) or "none of them"
-            refuse([((), f"must have one of group, endurance_stress, strain_life, got {got}")])
+            refuse([Fault((), f"must have one of group, endurance_stress, strain_life, got {got}")])
         faults = [*self._missing(given[0]), *self._impossible()]
         refuse(faults)
         return self
@@ -88,11 +89,11 @@ class FatigueData(Record):
         }
         for key in required[kind]:
             if getattr(self, key) is None:
-                yield (key,), f"is required with {kind}, got nothing"
+                yield Fault((key,), f"is required with {kind}, got nothing")
         for key in foreign[kind]:
             # what has its default value may be written: a stored scene has every key
             if getattr(self, key) != type(self).model_fields[key].default:
-                yield (key,), f"must be left out with {kind}, got one"
+                yield Fault((key,), f"must be left out with {kind}, got one")
 
     def _impossible(self) -> Iterator[Fault]:
         """Numbers that no material has together."""
@@ -101,19 +102,23 @@ class FatigueData(Record):
             least, most = STRENGTHS["aluminium" if "aluminium" in self.group else "steel"]
             if not least <= Rm <= most:
                 wanted = f"must be between {least:.4g} and {most:.4g} [Pa] for {self.group}"
-                yield ("tensile_strength",), f"{wanted}, where the guideline's formulas hold, got {Rm:.6g}"
+                yield Fault(
+                    ("tensile_strength",), f"{wanted}, where the guideline's formulas hold, got {Rm:.6g}"
+                )
         strength = self.endurance_stress
         if Rm is not None and strength is not None and strength >= Rm:
             wanted = f"must be below the tensile strength, {Rm:.6g} [Pa]"
-            yield ("endurance_stress",), f"{wanted}, got {strength:.6g}"
+            yield Fault(("endurance_stress",), f"{wanted}, got {strength:.6g}")
         if isinstance(self.slope_beyond, float) and self.slope is not None and self.slope_beyond < self.slope:
             wanted = f"must be at least the slope above, {self.slope:g}"
-            yield ("slope_beyond",), f"{wanted}, got {self.slope_beyond:g}: smaller amplitudes last longer"
+            yield Fault(
+                ("slope_beyond",), f"{wanted}, got {self.slope_beyond:g}: smaller amplitudes last longer"
+            )
         data = self.strain_life
         if data is not None and data.ductility_exponent >= data.strength_exponent:
             wanted = f"must be below strength_exponent, {data.strength_exponent:g}"
             got = f"got {data.ductility_exponent:g}: plastic strains fall faster with life"
-            yield ("strain_life", "ductility_exponent"), f"{wanted}, {got}"
+            yield Fault(("strain_life", "ductility_exponent"), f"{wanted}, {got}")
 
 
 class Fatigue(Record):
@@ -144,5 +149,7 @@ class Fatigue(Record):
     @model_validator(mode="after")
     def _some_data(self) -> Self:
         if not self.materials and not self.links:
-            refuse([(("materials",), "is required, or links: data of at least one of them, got nothing")])
+            refuse(
+                [Fault(("materials",), "is required, or links: data of at least one of them, got nothing")]
+            )
         return self

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from kedfem.scene.records.base import Fault, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.curves import (
     ONE,
     FactorOver,
@@ -46,9 +47,9 @@ class Motor(Record):
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if self.torque is None and self.force is None:
-            refuse([(("torque",), "is required [N*m], or force [N] of a slider, got neither")])
+            refuse([Fault(("torque",), "is required [N*m], or force [N] of a slider, got neither")])
         if self.torque is not None and self.force is not None:
-            refuse([(("torque",), "cannot be combined with force, got both")])
+            refuse([Fault(("torque",), "cannot be combined with force, got both")])
         return self
 
     @property
@@ -86,15 +87,15 @@ class _Elastic(Record):
         least = min(self.stiffness_factor.value, default=1.0)
         if least < 0.0:
             wanted = "must hold values of at least 0 (a spring of negative stiffness would push apart)"
-            refuse([(("stiffness_factor", "value"), f"{wanted}, got {least:.6g}")])
+            refuse([Fault(("stiffness_factor", "value"), f"{wanted}, got {least:.6g}")])
         if self.stiffness_factor != ONE and not getattr(self, "stiffness", 1.0):
-            refuse([(("stiffness_factor",), "must be combined with a stiffness, got none")])
+            refuse([Fault(("stiffness_factor",), "must be combined with a stiffness, got none")])
         return self
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if not (getattr(self, "stiffness", 1.0) or getattr(self, "damping", 1.0)):
-            refuse([(("stiffness",), "must be positive, or damping, got neither")])
+            refuse([Fault(("stiffness",), "must be positive, or damping, got neither")])
         return self
 
     @model_validator(mode="after")
@@ -103,9 +104,9 @@ class _Elastic(Record):
             return self
         for key in ("free_length", "free_travel", "free_angle"):
             if getattr(self, key, None) is not None:
-                refuse([(("preload",), f"cannot be combined with {key}, got both")])
+                refuse([Fault(("preload",), f"cannot be combined with {key}, got both")])
         if not getattr(self, "stiffness", 1.0):
-            refuse([(("preload",), "must be combined with a stiffness, got none")])
+            refuse([Fault(("preload",), "must be combined with a stiffness, got none")])
         return self
 
 
@@ -136,18 +137,23 @@ class LineSpring(_Elastic):
     def _has_a_direction(self) -> Self:
         if self.between is None:
             if self.joint is None:
-                refuse([(("between",), "is required, or a joint, got neither")])
+                refuse([Fault(("between",), "is required, or a joint, got neither")])
             if self.free_length is not None:
-                refuse([(("free_length",), "must be free_travel [m] along a joint, got a length")])
+                refuse([Fault(("free_length",), "must be free_travel [m] along a joint, got a length")])
             return self
         if self.joint is not None:
-            refuse([(("between",), "cannot be combined with joint, got both")])
+            refuse([Fault(("between",), "cannot be combined with joint, got both")])
         if self.free_travel is not None:
-            refuse([(("free_travel",), "must be free_length [m] between two points, got a travel")])
+            refuse([Fault(("free_travel",), "must be free_length [m] between two points, got a travel")])
         a, b = self.between
         if a.at == b.at and (self.free_length != 0.0 or self.preload):
             refuse(
-                [(("between",), "must be two different points unless free_length = 0, got the same twice")]
+                [
+                    Fault(
+                        ("between",),
+                        "must be two different points unless free_length = 0, got the same twice",
+                    )
+                ]
             )
         return self
 
@@ -197,15 +203,15 @@ class _Range(Record):
         unit = "rad" if self.__class__ is AngleLimit else "m"
         faults: list[Fault] = []
         if lower is None and upper is None:
-            faults.append((("lower",), f"is required, or upper [{unit}], got neither"))
+            faults.append(Fault(("lower",), f"is required, or upper [{unit}], got neither"))
         elif lower is not None and upper is not None and lower >= upper:
-            faults.append((("lower",), f"must be below upper {upper:.6g} [{unit}], got {lower:.6g}"))
+            faults.append(Fault(("lower",), f"must be below upper {upper:.6g} [{unit}], got {lower:.6g}"))
         else:
             drawn = f"0 [{unit}], the reference position, which must be within the limits"
             if lower is not None and lower > 0.0:
-                faults.append((("lower",), f"must be at most {drawn}, got {lower:.6g}"))
+                faults.append(Fault(("lower",), f"must be at most {drawn}, got {lower:.6g}"))
             if upper is not None and upper < 0.0:
-                faults.append((("upper",), f"must be at least {drawn}, got {upper:.6g}"))
+                faults.append(Fault(("upper",), f"must be at least {drawn}, got {upper:.6g}"))
         refuse(faults)
         return self
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.scene.records.base import Fault
+from kedfem.errors import Fault
 from kedfem.scene.records.units import Quantity
 
 Inertia = Annotated[float, Quantity("kg*m^2")]
@@ -33,4 +33,4 @@ def inertia_faults(inertia: Sequence[float]) -> list[Fault]:
         "must have principal moments that are positive, none larger than the sum of the others [kg*m^2], "
         f"got {a:.6g}, {b:.6g} and {c:.6g}"
     )
-    return [(("inertia",), message)]
+    return [Fault(("inertia",), message)]

@@ -7,6 +7,7 @@ from typing import Annotated, Self
 from pydantic import BeforeValidator, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.drives import EitherSpeed
 from kedfem.scene.records.loads import ForceVector
@@ -55,5 +56,5 @@ class InitialMotion(Record):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         given = self.velocity is not None or self.angular_velocity is not None
-        refuse([] if given else [(("velocity",), "is required [m/s], or spin [rad/s], got neither")])
+        refuse([] if given else [Fault(("velocity",), "is required [m/s], or spin [rad/s], got neither")])
         return self

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.faces import ChosenFace, Faces
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, apart
@@ -64,10 +65,12 @@ class Bushing(Record):
     @model_validator(mode="after")
     def _springs(self) -> Self:
         if self.stiffness is None and self.rotational_stiffness is None:
-            refuse([(("stiffness",), "is required [N/m], or rotational_stiffness [N m/rad], got neither")])
+            refuse(
+                [Fault(("stiffness",), "is required [N/m], or rotational_stiffness [N m/rad], got neither")]
+            )
         for stiffness, damping in (("stiffness", "damping"), ("rotational_stiffness", "rotational_damping")):
             if getattr(self, stiffness) is None and any(getattr(self, damping)):
-                refuse([((damping,), f"must be combined with {stiffness}, got it alone")])
+                refuse([Fault((damping,), f"must be combined with {stiffness}, got it alone")])
         return self
 
 
@@ -156,11 +159,11 @@ class Joint(Record):
             return self
         given, names = self.at.points, list(self.links)
         wrong = [
-            (("at", name), unknown_name("a link of the joint", name, names))
+            Fault(("at", name), unknown_name("a link of the joint", name, names))
             for name in given
             if name not in names
         ]
-        lacking = [(("at", name), "is required [m], got nothing") for name in names if name not in given]
+        lacking = [Fault(("at", name), "is required [m], got nothing") for name in names if name not in given]
         refuse([*wrong, *lacking])
         return self.fill(at=apart({name: given[name] for name in names}))
 

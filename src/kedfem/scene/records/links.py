@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from kedfem.errors import SceneError
-from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.errors import Fault, SceneError
+from kedfem.scene.records.base import FileName, Record, refuse
 from kedfem.scene.records.inertia import Inertia, inertia_faults
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
@@ -130,7 +130,7 @@ class LinkScene(Record):
     def _defaults(self) -> Self:
         own = isinstance(self.shape, (Cad, MeshFile)) and self.shape.file == self.file
         if self.file is not None and not own:
-            refuse([(("file",), "cannot be combined with shape, got both")])
+            refuse([Fault(("file",), "cannot be combined with shape, got both")])
         self.fill(model=self.model or self.family)
         refuse(self._body_faults())
         element = self.element or self._usual_element()
@@ -143,14 +143,17 @@ class LinkScene(Record):
         if self.model != "rigid":
             keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
             return [
-                ((key,), f"must be given for a rigid link only, got model {self.model!r}") for key in keys
+                Fault((key,), f"must be given for a rigid link only, got model {self.model!r}")
+                for key in keys
             ]
         present = [key for key in ("shape", "material") if getattr(self, key) is not None]
         if present:
             together = " and ".join(present)
-            return [((present[0],), f"cannot be combined with centre and inertia, got {together}")]
+            return [Fault((present[0],), f"cannot be combined with centre and inertia, got {together}")]
         lacking = [
-            ((key,), f"is required for a rigid link given by mass, centre and inertia [{unit}], got {got}")
+            Fault(
+                (key,), f"is required for a rigid link given by mass, centre and inertia [{unit}], got {got}"
+            )
             for key, unit, got in (
                 ("mass", "kg", "0"),
                 ("centre", "m", "nothing"),

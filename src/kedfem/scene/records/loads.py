@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.inertia import Inertia, inertia_faults
@@ -101,9 +102,9 @@ class TorqueLoad(Record):
     @model_validator(mode="after")
     def _one_place(self) -> Self:
         if self.at is None and self.joint is None:
-            refuse([(("at",), "is required [m], or a joint of the link, got neither")])
+            refuse([Fault(("at",), "is required [m], or a joint of the link, got neither")])
         if self.at is not None and self.joint is not None:
-            refuse([(("at",), "cannot be combined with joint, got both")])
+            refuse([Fault(("at",), "cannot be combined with joint, got both")])
         return self
 
 

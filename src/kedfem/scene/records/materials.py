@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.units import PositivePressure, Quantity, fault
 
@@ -34,7 +35,7 @@ class Material(Record):
         if ratio >= 0.5:
             least = self.youngs_modulus / 3.0
             wanted = f"must be above a third of Young's modulus, {least:.6g} [Pa]"
-            refuse([(("shear_modulus",), f"{wanted}, got {self.shear_modulus:.6g}")])
+            refuse([Fault(("shear_modulus",), f"{wanted}, got {self.shear_modulus:.6g}")])
         return self.fill(poisson_ratio=ratio)
 
     @model_serializer(mode="wrap")

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, field_validator, model_validator
 
-from kedfem.scene.records.base import Fault, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.points import XYZ, Point, is_construction
 from kedfem.scene.records.units import PositiveLength, fault
 
@@ -86,15 +87,15 @@ def profile_faults(profile: Profile) -> list[Fault]:
     heights = [point[2] for group in ends for point in group]
     if max(heights) - min(heights) > NEAR * max(1.0, abs(heights[0])):
         got = f"got z from {min(heights):.6g} to {max(heights):.6g}"
-        return [(("outline",), f"must lie in one z plane [m], {got}")]
+        return [Fault(("outline",), f"must lie in one z plane [m], {got}")]
     try:
         polygon, straight = outline_polygon(profile.outline)
     except ValueError as reason:
-        return [(("outline",), str(reason))]
+        return [Fault(("outline",), str(reason))]
     crossing = crossing_at(polygon)
     if crossing is not None:
         near = f"near ({crossing[0]:.6g}, {crossing[1]:.6g}) [m]"
-        return [(("outline",), f"must not cross or touch itself, got that {near}")]
+        return [Fault(("outline",), f"must not cross or touch itself, got that {near}")]
     return hole_faults(profile.holes, polygon, straight)
 
 
@@ -108,12 +109,12 @@ def hole_faults(
         wall = edge_distance(centre, polygon, straight) if inside(centre, polygon) else 0.0
         if wall <= radius:
             got = f"got radius {radius:.6g} with {wall:.6g} to the edge"
-            faults.append((("holes", i), f"must lie inside the outline [m], {got}"))
+            faults.append(Fault(("holes", i), f"must lie inside the outline [m], {got}"))
         for j, other in enumerate(holes[:i]):
             between = float(np.linalg.norm(centre - other.at[:2])) - radius - 0.5 * other.diameter
             if between <= 0.0:
                 got = f"got an overlap of {-between:.6g}"
-                faults.append((("holes", i), f"must not meet holes[{j}] [m], {got}"))
+                faults.append(Fault(("holes", i), f"must not meet holes[{j}] [m], {got}"))
     return faults
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.links import Count
 from kedfem.scene.records.points import Axis, Point, as_vector
@@ -68,7 +69,12 @@ class Pattern(Record):
     def _goes_on(self) -> Pattern:
         if self.count > 1 and not self.turn and not any(self.shift):
             refuse(
-                [(("turn",), "is required, or a shift [m], so that copies are not in one place, got neither")]
+                [
+                    Fault(
+                        ("turn",),
+                        "is required, or a shift [m], so that copies are not in one place, got neither",
+                    )
+                ]
             )
         return self
 

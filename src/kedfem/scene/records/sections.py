@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.units import PositiveLength, Quantity
 
@@ -45,7 +46,7 @@ class TubeSection(Record):
     def _hollow(self) -> Self:
         half = self.diameter / 2
         message = f"must be less than half the diameter {half:.6g} [m], got {self.wall:.6g}"
-        refuse([(("wall",), message)] if self.wall >= half else [])
+        refuse([Fault(("wall",), message)] if self.wall >= half else [])
         return self
 
 

@@ -8,7 +8,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, StrictBool, model_validator
 
-from kedfem.scene.records.base import Fault, FileName, Record, refuse
+from kedfem.errors import Fault
+from kedfem.scene.records.base import FileName, Record, refuse
 from kedfem.scene.records.outlines import Profile
 from kedfem.scene.records.points import XYZ, Axis, Point
 from kedfem.scene.records.sections import RectangleSection, SectionShape
@@ -43,7 +44,7 @@ def along_up(pairs: list[tuple[XYZ, XYZ]], up: XYZ | None) -> list[Fault]:
         length = math.dist(P, Q)
         along = sum((q - p) * u for p, q, u in zip(P, Q, up or (), strict=True)) / length
         if abs(along) > UPRIGHT:
-            return [(("up",), f"must not be along the line, got that of points[{i}] to points[{i + 1}]")]
+            return [Fault(("up",), f"must not be along the line, got that of points[{i}] to points[{i + 1}]")]
     return []
 
 
@@ -115,14 +116,14 @@ class PlateLink(Record):
         faults: list[Fault] = []
         if eye < self.width:
             faults.append(
-                (("eye_diameter",), f"must be at least the width {self.width:.6g} [m], got {eye:.6g}")
+                Fault(("eye_diameter",), f"must be at least the width {self.width:.6g} [m], got {eye:.6g}")
             )
         if self.bore_diameter >= eye:
             message = f"must be smaller than the eye {eye:.6g} [m], got {self.bore_diameter:.6g}"
-            faults.append((("bore_diameter",), message))
+            faults.append(Fault(("bore_diameter",), message))
         elif self.bore_diameter >= length:
             message = f"must be smaller than their distance {length:.6g} [m], got {self.bore_diameter:.6g}"
-            faults.append((("bore_diameter",), message))
+            faults.append(Fault(("bore_diameter",), message))
         refuse(faults)
         return self.fill(eye_diameter=eye)
 
@@ -168,11 +169,11 @@ class Polyline(Record):
         given = [key for key in ("width", "thickness") if getattr(self, key) is not None]
         faults: list[Fault] = []
         if self.section is not None and given:
-            faults.append((("section",), f"cannot be combined with {' and '.join(given)}, got both"))
+            faults.append(Fault(("section",), f"cannot be combined with {' and '.join(given)}, got both"))
         elif self.section is None:
             other = "a section instead of width and thickness"
             faults += [
-                ((key,), f"is required [m], or {other}, got nothing")
+                Fault((key,), f"is required [m], or {other}, got nothing")
                 for key in ("width", "thickness")
                 if key not in given
             ]
@@ -237,5 +238,5 @@ class PartGeometry(Profile):
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
         same = math.dist(self.origin, self.x_point) == 0.0
-        refuse([(("x_point",), "must differ from the origin, got the same point")] if same else [])
+        refuse([Fault(("x_point",), "must differ from the origin, got the same point")] if same else [])
         return self
