@@ -17,8 +17,9 @@ from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import effective_matrix
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.build import link_axes
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link, mass_times
-from kedfem.links.recovery import point_rows, von_mises
+from kedfem.links.recovery import von_mises
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
 from kedfem.mesh import SolidMesh, link_mesh

@@ -10,8 +10,8 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import on_segment
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import in_space, mass_times
-from kedfem.links.recovery import point_rows
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
 

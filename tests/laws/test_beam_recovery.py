@@ -8,8 +8,8 @@ import scipy.sparse.linalg as spla
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_recovery import straight_run
 from kedfem.links.beams.section import rectangle
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from tests.laws.strategies import MATERIAL
 
 LENGTH, HEIGHT, THICKNESS = 2.0, 0.05, 0.02

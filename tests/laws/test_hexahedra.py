@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import nodal_stress, point_rows, stress_of_gradient, stress_recovery
+from kedfem.links.recovery import nodal_stress, stress_of_gradient, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
 from kedfem.links.surfaces.surface import surface
 from kedfem.mesh import SolidMesh

@@ -11,8 +11,9 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
+from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
 from kedfem.links.surfaces.coupling_surfaces import (
     face_seat,

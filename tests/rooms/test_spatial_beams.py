@@ -16,7 +16,8 @@ from kedfem.dynamics.stepping.transient import Snapshot
 from kedfem.links.beams.beam_axis import smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle, tube
 from kedfem.links.beams.spatial_beam import spatial_beam_link
-from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
+from kedfem.links.point_rows import point_rows
+from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.scene import Material, scene_from, spatial_beams
 from tests.linkages import joint, moved_scene, rssr
 from tests.runs import quick

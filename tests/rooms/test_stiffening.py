@@ -23,7 +23,7 @@ from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.errors import SceneError, SolveError
-from kedfem.links.recovery import point_rows
+from kedfem.links.point_rows import point_rows
 from kedfem.links.reduced import rigid_modes
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import face_seat
 from kedfem.links.surfaces.surface import surface
 from kedfem.scene import Material, scene_from

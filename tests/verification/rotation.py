@@ -8,8 +8,8 @@ from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import face_seat
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path

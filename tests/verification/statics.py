@@ -4,8 +4,9 @@ import numpy as np
 
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.section import rectangle
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import nodal_stress, point_rows, stress_recovery
+from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.links.surfaces.coupling_surfaces import face_seat, surface_weights
 from kedfem.scene import Material
 

@@ -16,8 +16,8 @@ from kedfem.links.beams.beam_axis import straight_axis
 from kedfem.links.beams.section import Section, rectangle, tube
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.bodies import flywheel_tensor, with_body
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
 from kedfem.links.surfaces.coupling_surfaces import joint_seat
 from kedfem.scene import Material, Scene, scene_from, time_grid

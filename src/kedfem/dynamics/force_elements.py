@@ -23,8 +23,8 @@ from kedfem.dynamics.force_element import (
 from kedfem.dynamics.joints.places import seat_of, slider_axis
 from kedfem.dynamics.model import Model, Slider, on_segment
 from kedfem.errors import MeshError, SceneError
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis

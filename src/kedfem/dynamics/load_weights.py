@@ -7,8 +7,8 @@ from jaxtyping import Float
 
 from kedfem.dynamics.joints.places import on_part
 from kedfem.errors import SceneError
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
     face_seat,

@@ -21,8 +21,8 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
+from kedfem.links.point_rows import PointRows, point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import PointRows, point_rows
 from kedfem.links.reduced import on_functions, reduced, rigid
 from kedfem.links.segments import Segments
 from kedfem.links.stored import can_be_stored, restored, stored

@@ -10,8 +10,9 @@ from jaxtyping import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link, in_space
-from kedfem.links.recovery import point_rows, von_mises
+from kedfem.links.recovery import von_mises
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.results.recorded import Recorded, Rows

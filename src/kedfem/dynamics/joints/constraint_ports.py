@@ -20,8 +20,8 @@ from kedfem.dynamics.joints.constraint_joints import (
 )
 from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis
 from kedfem.errors import SceneError
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import point_rows
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_seat
 from kedfem.motion.joint_equations import joint_axis

@@ -9,8 +9,9 @@ from jaxtyping import Float
 from kedfem.dynamics.joints.places import on_part, part_seat
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.errors import KedfemError
+from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import StressRecovery, point_rows
+from kedfem.links.recovery import StressRecovery
 from kedfem.links.singular_stress import around, re_entrant
 from kedfem.scene import ForceLoad, Scene
 
