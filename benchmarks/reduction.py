@@ -13,8 +13,9 @@ from benchmarks.varied import varied_scenes
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import static_parts
+from kedfem.dynamics.reduced_model import reduced_model
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
 from kedfem.scene import scene_from
 

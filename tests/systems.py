@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, moving
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.frames import frames_of
-from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.arrays import History, State

@@ -11,8 +11,9 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.joints.ports import port_values, port_vectors
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import reduced, rigid, rigid_functions, rigid_modes

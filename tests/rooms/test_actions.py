@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.force_element import (
     ANGLE,
     DISTANCE,
@@ -26,7 +27,7 @@ from kedfem.dynamics.force_element import (
 from kedfem.dynamics.force_elements import actions, hinges
 from kedfem.dynamics.force_elements_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage

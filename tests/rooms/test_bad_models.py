@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.model import elastic_model
 from kedfem.errors import KedfemError, SceneError, SolveError
 from kedfem.motion.linkage import linkage
 from kedfem.results.recording import recording

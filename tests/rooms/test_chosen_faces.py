@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.joints.places import part_seat, seat_of
-from kedfem.dynamics.model import elastic_model
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_links
 from kedfem.links.record import Link

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.joints.ports import port_values, port_vectors
 from kedfem.dynamics.matrices import substructure
 from kedfem.dynamics.matrices.substructure import mass_substructure
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.solvers import Steps, steps_of

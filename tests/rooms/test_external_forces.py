@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.loads import amounts, patterns
-from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SceneError

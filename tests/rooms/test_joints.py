@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient

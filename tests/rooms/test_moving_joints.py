@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.first_rows import interface_values
-from kedfem.dynamics.model import elastic_model
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import MeshError, SceneError

@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.analysis import analyse
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
 from kedfem.links.surfaces.coupling_surfaces import joint_seat

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from numpy.testing import assert_allclose
 
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_link, bare_links
 from kedfem.links.record import Link

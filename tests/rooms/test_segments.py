@@ -14,10 +14,11 @@ from kedfem.accuracy.plan import SEGMENTS, planned
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import _training, prepared
 from kedfem.analysis import analyse
-from kedfem.dynamics.model import Model, restored_model, segments, stored_model
+from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.nominal import instants
+from kedfem.dynamics.reduced_model import restored_model, stored_model
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.errors import MeshError, SceneError

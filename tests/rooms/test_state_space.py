@@ -10,7 +10,7 @@ from scipy.signal import lsim
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import meshed, moving
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import OutputError, SceneError

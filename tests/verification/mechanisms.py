@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient

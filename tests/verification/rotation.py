@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from kedfem.dynamics.model import elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots

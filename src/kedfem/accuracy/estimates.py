@@ -27,9 +27,10 @@ from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
 from kedfem.accuracy.variants import refined, with_analysis, with_links
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator

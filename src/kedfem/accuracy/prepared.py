@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from hashlib import sha256
 
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import drive_range
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage

@@ -26,11 +26,12 @@ from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.matrices.substructure import Substructure
-from kedfem.dynamics.model import Model, reduced_model, restored_model, stored_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.nominal import instants
+from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_model
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage

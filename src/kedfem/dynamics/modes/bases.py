@@ -3,10 +3,11 @@
 from collections.abc import Callable, Collection, Sequence
 
 from kedfem.dynamics.matrices.substructure import Substructure
-from kedfem.dynamics.model import Model, reduced_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.modes.segment_modes import segment_basis
 from kedfem.dynamics.nominal import instants
+from kedfem.dynamics.reduced_model import reduced_model
 from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link

@@ -12,11 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
+from kedfem.dynamics.elastic_model import with_scene_body
 from kedfem.dynamics.joints.places import seat_of
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import mass_matrix
-from kedfem.dynamics.model import with_scene_body
 from kedfem.dynamics.modes.frozen import FIRST, NEAR, RIGID_MOTIONS, Modes
 from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.links.build import bare_link

@@ -12,8 +12,9 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.matrices.substructure import mass_matrix
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.nominal import forcings
 from kedfem.dynamics.stiffening import stiffening

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.joints.constraint_joints import (
     ConstraintJoint,
     bore_axis,
@@ -18,7 +19,7 @@ from kedfem.dynamics.joints.constraint_joints import (
     joint_frame,
     ordered,
 )
-from kedfem.dynamics.model import Model, elastic_model
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (
     ANGLE,

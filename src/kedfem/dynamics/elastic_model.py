@@ -1,0 +1,244 @@
+"""The elastic model of a scene: its links meshed and assembled, with loads, bodies and sliders, tied together."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.attachments import SharedCut
+from kedfem.dynamics.joints.constraint_joints import needs_rows
+from kedfem.dynamics.joints.constraint_ports import Ways
+from kedfem.dynamics.joints.coupling import joined
+from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis, slider_guide
+from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
+from kedfem.dynamics.joints.slots import slot_ways
+from kedfem.dynamics.loads import patterns, slider_pattern
+from kedfem.dynamics.model import Model, PrescribedBody, Slider
+from kedfem.dynamics.moving_ground import moving_ground
+from kedfem.dynamics.reduced_model import slider_on
+from kedfem.dynamics.rigid_links import made_rigid
+from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.errors import Fault, MeshError, SceneError
+from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
+from kedfem.links.build import bare_links, parted
+from kedfem.links.point_rows import PointRows, point_rows
+from kedfem.links.record import Link
+from kedfem.links.reduced import rigid
+from kedfem.links.segments import Segments
+from kedfem.links.surfaces.coupling_surfaces import (
+    CouplingSurface,
+    holds,
+    is_flat,
+    joint_seat,
+    port_weights,
+    rigid_seat,
+)
+from kedfem.motion.joint_equations import joint_axis, unit
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.scene import (
+    Body,
+    Flywheel,
+    ForceLoad,
+    PointMass,
+    RigidBody,
+    Scene,
+    inertia_tensor,
+    moving_grounds,
+    rayleigh,
+)
+from kedfem.scene.checks.capabilities import SLIDERS
+
+
+def elastic_model(
+    scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None, along: Path | None = None,
+    elements: bool = False,
+) -> Model:  # fmt: skip
+    """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
+
+    Parameters
+    ----------
+    bare : `bare_links` of the scene, if they are there already
+    along : the linkage's path over the drive's range, needed with slots
+    elements : whether springs, motors and rigid links get interface points, as a system has them
+
+    Raises
+    ------
+    MeshError
+        If a link cannot be meshed, or a joint or body finds no coupling surface on its link.
+    SceneError
+        If a load or body does not fit its link.
+    """
+    cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
+    links = {
+        key: part
+        for name, link in cut.items()
+        for key, part in zip(keys(name, link), link.parts, strict=True)
+    }
+    links = with_stiff_ports(scene, links)
+    ground = moving_grounds(scene)
+    links |= {name: moving_ground(scene, name, hub) for name, hub in ground.items()}
+    for key, body in scene.bodies.items():
+        if body.link in cut or body.link in ground:
+            on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
+            links[on] = carrier
+    carried = tuple(
+        PrescribedBody(_prescribed(links.pop(name)), linkage.bodies.index(name), hub, ())
+        for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
+    )  # fmt: skip
+    if not links:
+        raise SceneError(
+            [
+                Fault(
+                    ("links",),
+                    "must hold a link that the drive does not simply carry along, got rigid ones only",
+                )
+            ]
+        )
+    carried = tuple(
+        replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
+        for x in carried
+    )
+    numbers = {key: k for k, key in enumerate(links)}
+    sliders = tuple(
+        _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None
+    )
+    for slider in sliders:
+        key = list(links)[slider.carrier]
+        links[key] = with_point_mass(links[key], slider.weights, slider.mass)
+    links = made_rigid(scene, links, thicken=elements)
+    sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
+    cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
+    ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
+    held = joined(scene, links, cuts, ways, elements, bars=elements)
+    loads = patterns(scene, links)
+    for slider in sliders:
+        loads[list(links)[slider.carrier]] += slider.loads
+    return Model(
+        links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
+        joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
+        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
+        rows=held.rows, cuts=tuple(cuts),
+    )  # fmt: skip
+
+
+def keys(name: str, link: Segments) -> list[str]:
+    """A key for each segment of a link; of a whole link its name."""
+    return [name] if len(link.parts) == 1 else [f"{name}/{k + 1}" for k in range(len(link.parts))]
+
+
+def _shared(name: str, link: Segments) -> list[SharedCut]:
+    key = keys(name, link)
+    return [
+        SharedCut((key[a], key[b]), cut.points, cut.weights, () if cut.even else cut.facets)
+        for cut in link.cuts
+        for a, b in [cut.segments]
+    ]
+
+
+def _prescribed(link: Link) -> Link:
+    """A rigid link, or a moving part of the ground, which is one already."""
+    return link if link.rigid else rigid(link)
+
+
+def hub_of(scene: Scene, name: str) -> str | None:
+    """The driven joint by which a link, if it is rigid, turns on the ground with a drive; that of a moving ground."""
+    if scene.links[name].model != "rigid":
+        return None
+    if name in (ground := moving_grounds(scene)):
+        return ground[name]
+    driven = (x for x in scene.driven_joints if name in scene.joints[x].links and not needs_rows(scene, x))
+    return next(driven, None)
+
+
+def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Link]) -> tuple[str, Link]:
+    """The link or segment that carries a body, and it with the body."""
+    at = np.asarray(body.at)
+    near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)
+    here = [
+        j
+        for j in scene.joints.values()
+        if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
+    ]
+    axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
+    faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
+    if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
+        return body.link, _carrying(links[body.link], rigid_seat(links[body.link], at), where, body, axis)
+    try:
+        key, seat = on_part(
+            links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis, faces)
+        )
+    except MeshError:
+        if not isinstance(body, PointMass):
+            raise
+        key, point = on_part(links, body.link, at, lambda link: point_rows(link, f"{where}.at", at))
+        return key, with_point_mass(links[key], _on_axis(links[key], where, point, at), body.mass)
+    return key, _carrying(links[key], seat, where, body, axis)
+
+
+def _on_axis(link: Link, where: str, point: PointRows, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, " n"]:
+    """Weights of a point of a link that carries a mass: of a planar beam on its axis."""
+    beside = float(np.linalg.norm(point.X - at))
+    if link.kind == "beam" and beside > 1e-6 * link.size:
+        raise SceneError(
+            f"{where}.at: must lie on the axis of planar beam '{link.name}', got {beside:.3g} m beside it"
+        )
+    return point.value
+
+
+def _carrying(
+    link: Link, seat: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None
+) -> Link:
+    at = np.asarray(body.at)
+    match body:
+        case Flywheel(mass=mass, inertia=inertia):
+            spin = unit((0, 0, 1)) if axis is None else axis
+            if not link.planar and not holds(seat, spin):
+                raise MeshError(f"{where}.at: a flywheel must sit on {_wide_seat(link)}")
+            return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
+        case PointMass(mass=mass):
+            return with_body(link, seat, mass, at, np.zeros((3, 3)))
+        case RigidBody(mass=mass, inertia=inertia, centre=centre):
+            if is_flat(seat):
+                wanted, got = (
+                    ("an end or a corner", "another node")
+                    if link.kind == "spatial_beam"
+                    else ("a bore", "a flat face")
+                )
+                raise MeshError(
+                    f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
+                )
+            return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+
+
+def _wide_seat(link: Link) -> str:
+    if link.kind == "spatial_beam":
+        return "an end or a corner of the beam, or have its axis across the beam"
+    return "a bore, or on a flat face that contains its axis"
+
+
+def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
+    joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
+    guide = slider_guide(scene, name)
+    for key, joint in joints.items():
+        if key != guide and needs_rows(scene, key):
+            raise SceneError([SLIDERS.fault(("joints", key), {"kind": joint.kind, "name": name})])
+    elastic = {link.name for link in links.values()}
+    held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
+    if not held:
+        raise MeshError(
+            f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape"
+        )
+    key, other = held[0]
+    carrier, seat = part_seat(scene, key, links, other)
+    weights = port_weights(seat, np.array([joints[key].at]))[0]
+    extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
+    loads = tuple(
+        slider_pattern(links[carrier], load, x, weights)
+        for load, x in scene.loads.items()
+        if x.link == name and isinstance(x, ForceLoad)
+    )
+    mass = scene.links[name].mass + extra
+    axis = joint_axis(joints[guide])
+    return Slider(name, mass, guide, key, numbers[carrier], axis, weights, loads)

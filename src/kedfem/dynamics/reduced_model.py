@@ -1,0 +1,74 @@
+"""A model whose links are reduced, and one as it is kept in a file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.joints.attachments import Attachment, SharedCut
+from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.model import Model, Slider, link_keys
+from kedfem.links.record import Link
+from kedfem.links.reduced import on_functions, reduced
+from kedfem.links.stored import can_be_stored, restored, stored
+
+
+def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
+    """The changed copy of a model whose links move in the span of given functions; None leaves a link as it is."""
+    links, joints, loads = list(model.links), list(model.joints), list(model.loads)
+    sliders, cuts, names = list(model.sliders), model.cuts, link_keys(model)
+    for k, Q in enumerate(functions):
+        if Q is not None:
+            links[k] = link = reduced(model.links[k], Q)
+            cuts = tuple(_cut_on(cut, names[k], link) for cut in cuts)
+            joints[k] = _joint_on(model.joints[k], link)
+            loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
+            sliders = [slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
+    return replace(
+        model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders), cuts=cuts
+    )
+
+
+def stored_model(model: Model) -> Model | None:
+    """A copy of a model that can be pickled, of links that are small; None if one is not."""
+    if not all(can_be_stored(link) for link in model.links):
+        return None
+    return _with_links(model, stored)
+
+
+def restored_model(model: Model) -> Model:
+    """The model that `stored_model` was given; full links come without their matrices."""
+    return _with_links(model, restored)
+
+
+def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
+    carried = tuple(replace(x, link=changed(x.link)) for x in model.carried)
+    return replace(model, links=tuple(map(changed, model.links)), carried=carried)
+
+
+def _joint_on(joint: Attachment, link: Link) -> Attachment:
+    """A joint of the full link on the functions of the reduced one."""
+    return replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on_functions(link)[joint.nodes])
+
+
+def _load_on(load: Pattern, link: Link) -> Pattern:
+    return replace(load, forces=on_functions(link).T @ load.forces)
+
+
+def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
+    """A cut, its weights on the functions of a link that has become a reduced one."""
+    if key not in cut.keys:
+        return cut
+    one, other = (
+        x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True)
+    )
+    return replace(cut, weights=(one, other))
+
+
+def slider_on(slider: Slider, link: Link) -> Slider:
+    if link.Q is None:
+        return slider
+    return replace(
+        slider, weights=slider.weights @ link.Q, loads=tuple(_load_on(load, link) for load in slider.loads)
+    )
