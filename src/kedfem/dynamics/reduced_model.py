@@ -67,6 +67,7 @@ def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
 
 
 def slider_on(slider: Slider, link: Link) -> Slider:
+    """A slider on the reduced copy of its carrier."""
     if link.Q is None:
         return slider
     return replace(

@@ -9,8 +9,10 @@ from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.forces.constraint_forces import ConstraintForces
+from kedfem.results.forces.drive_forces import drive_channels, gear_channel
 from kedfem.results.forces.force_elements import acting, measured_actions
-from kedfem.results.forces.joint_forces import Forces, drive_channels, gear_channel, joint_channels
+from kedfem.results.forces.joint_forces import joint_channels
+from kedfem.results.forces.port_forces import Forces
 from kedfem.results.forces.rigid import rigid_forces
 from kedfem.results.probes import probe_channels
 from kedfem.results.recorded import Recorded, Rows

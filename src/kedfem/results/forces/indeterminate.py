@@ -6,7 +6,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.results.forces.constraint_forces import shared_rows
-from kedfem.results.forces.joint_forces import INDETERMINATE, rows_of_joint
+from kedfem.results.forces.port_forces import INDETERMINATE, rows_of_joint
 from kedfem.results.recorded import drive_prefix
 from kedfem.scene import GROUND, Scene
 

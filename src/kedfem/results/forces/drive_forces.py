@@ -1,0 +1,90 @@
+"""Channels of what drives and gears exert."""
+
+import numpy as np
+
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import ordered
+from kedfem.dynamics.model import Model, PrescribedBody
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.results.forces.constraint_forces import of_joint
+from kedfem.results.forces.hub_forces import hub_wrench, partner
+from kedfem.results.forces.port_forces import (
+    Forces,
+    holder,
+    loose,
+    negligible,
+    port_wrench,
+)
+from kedfem.results.recorded import Recorded, Rows, drive_prefix
+from kedfem.results.records import Channel
+from kedfem.scene import GROUND, Scene
+
+
+def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> list[Recorded]:
+    """Torque of the drive on its link, about the driven joint's axis."""
+    if any(row.name == driven for row in model.rows):
+        return [_row_drive(scene, model, driven, forces)]
+    joint = scene.joints[driven]
+    carried = next((x for x in model.carried if x.hub == driven), None)
+    if carried is not None:
+        return _hub_drive(scene, model, carried, forces)
+    name = next(link for link in joint.links if link != "ground")
+    axis, at = joint_axis(joint), np.asarray(joint.at)
+    wrench = port_wrench(model, holder(model, name, driven), driven, at, forces)
+    channel = _drive_channel(scene, driven, name)
+    return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
+
+
+def _hub_drive(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) -> list[Recorded]:
+    """Torque, of a slide force, of the drive that moves a prescribed body, on the joint's first link, along its axis."""
+    joint, first = scene.joints[carried.hub], partner(scene, carried)
+    axis, which = joint_axis(joint), 0 if joint.kind == "prismatic" else 1
+    wrench, others = hub_wrench(scene, model, carried, forces)
+    if not all(negligible(loose(model, *each)[which] @ axis) for each in others):
+        return []
+    on = next(link for link in joint.links if link != GROUND)
+    sign = 1.0 if on == carried.link.name else -1.0
+    bodies = {x.link.name: x.body for x in model.carried}
+
+    def along(block: Block) -> Rows:
+        direction = block.motion.R[:, bodies.get(first, 0)] @ axis
+        return np.asarray(sign * (wrench(block)[which] * direction).sum(axis=1, keepdims=True))
+
+    return [Recorded(_drive_channel(scene, carried.hub, on), along)]
+
+
+def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
+    """What the drive of a joint exerts on its first link."""
+    slide = scene.joints[driven].kind == "prismatic"
+    quantity, unit = ("force", "N") if slide else ("torque", "N m")
+    text = f"{quantity} of the drive on link {on}"
+    return Channel(f"{drive_prefix(scene, driven)}{quantity}", (quantity,), unit, "world", text)
+
+
+def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:
+    """What gears exert on the first joint's link."""
+    row, _ = of_joint(model.rows, f"gears.{name}")
+    share = row.plus[0][0]
+    text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
+    return Recorded(
+        Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
+        lambda block: share * forces.rows.between_gears(name, block)[:, None],
+    )
+
+
+def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recorded:
+    """Torque, of a slide force, of a drive enforced by constraint equations, along its axis in the second link."""
+    joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
+    on = next(link for link in joint.links if link != GROUND)
+    sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
+    number = [each.name for each in model.rows].index(driven)
+    channel = _drive_channel(scene, driven, on)
+
+    def along(block: Block) -> Rows:
+        if block.exerted is not None:
+            return np.asarray(sign * block.exerted.effort[:, [number]])
+        axis = block.motion.R[:, row.bodies[1]] @ row.axis
+        effort = forces.rows.wrench(driven, block)[0 if slide else 1]
+        return np.asarray(sign * (effort * axis).sum(axis=1, keepdims=True))
+
+    return Recorded(channel, along)

@@ -1,0 +1,103 @@
+"""What a rigid link that a drive carries exerts on its hub."""
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import ordered
+from kedfem.dynamics.loads import applied
+from kedfem.dynamics.model import Model, PrescribedBody
+from kedfem.links.record import in_space
+from kedfem.motion.constraints import cross
+from kedfem.results.forces.port_forces import (
+    Forces,
+    Wrench,
+    holder,
+    port_wrench,
+    resultant,
+)
+from kedfem.results.recorded import Rows
+from kedfem.scene import Scene
+
+
+def partner(scene: Scene, carried: PrescribedBody) -> str:
+    """What a prescribed body's driven joint holds it on: the ground, or a moving part of it."""
+    first, second = scene.joints[carried.hub].links
+    return second if first == carried.link.name else first
+
+
+Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
+
+
+def constrained_joints(scene: Scene, model: Model, carried: PrescribedBody) -> list[str]:
+    """Joints of a carried link enforced by constraint equations."""
+    joints = scene.joints
+    return [x.name for x in model.rows if x.name in joints and carried.link.name in joints[x.name].links]
+
+
+def hub_wrench(
+    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces
+) -> tuple[Wrench, list[Held]]:
+    """What holds a carried link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
+    link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
+    held: list[Held] = []
+    sliding = constrained_joints(scene, model, carried)
+    for name, joint in scene.joints.items():
+        elastic = [x.name for x in model.links if x.name in joint.links]
+        if link.name in joint.links and elastic and name not in sliding:
+            held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
+    others = [(port_wrench(model, *each, forces), each[2]) for each in held]
+    riders = [
+        (x, *hub_wrench(scene, model, x, forces)) for x in model.carried if partner(scene, x) == link.name
+    ]
+    held += [each for _, _, below in riders for each in below]
+
+    def wrench(block: Block) -> tuple[Rows, Rows]:
+        F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
+        arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
+        centre = block.motion.p[:, carried.body] + R @ hub
+        force, moment = forces.actions.on(link.name, block, centre)
+        force = -force - in_space(link, np.tensordot(F, link.one, (1, 0)))
+        moment = -moment - resultant(link, arms, F)[1]
+        for other, at in others:
+            f, m = other(block)
+            force = force + f
+            moment = moment + m + cross((R @ (at - hub)), f)
+        for rider, on_rider, _ in riders:
+            f, m = on_rider(block)
+            place = block.motion.p[:, rider.body] + block.motion.R[:, rider.body] @ scene.joints[rider.hub].at
+            force, moment = force + f, moment + m + cross(place - centre, f)
+        for name in sliding:
+            f, m, point = forces.rows.wrench(name, block)
+            sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
+            force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
+        f, m = _geared(scene, model, carried, forces, block, centre)
+        return force - f, moment - m
+
+    return wrench, held
+
+
+def _geared(
+    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces, block: Block, about: Rows
+) -> tuple[Rows, Rows]:
+    """Force and moment about points that gears exert on a carried link: along the coordinates of their joints."""
+    force, moment = np.zeros((2, len(block), 3))
+    rows = {row.name: row for row in model.rows}
+    for gears in scene.gears:
+        row = rows[f"gears.{gears}"]
+        effort = forces.rows.between_gears(gears, block)[:, None]
+        for share, joint in ((1.0, row), *row.plus):
+            i, j = joint.bodies
+            sign = share * ((carried.body == i) - (carried.body == j))
+            along = sign * effort * (block.motion.R[:, j] @ joint.axis)
+            if joint.gap.any():  # a rack's push goes through the point of link i
+                place = block.motion.p[:, i] + block.motion.R[:, i] @ joint.at
+                force, moment = force + along, moment + cross(place - about, along)
+            else:
+                moment = moment + along
+    return force, moment
+
+
+def _on_carried(carried: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:
+    """P − M R0'' of a carried link."""
+    return applied(carried.link, carried.loads, block.motion, carried.body)

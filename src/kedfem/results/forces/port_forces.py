@@ -1,0 +1,142 @@
+"""Forces and moments that the ports of a joint exert on a link, block by block."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.attachments import Attachment
+from kedfem.dynamics.joints.ports import turned_ports
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link, in_space
+from kedfem.motion.constraints import cross
+from kedfem.results.forces.constraint_forces import ConstraintForces
+from kedfem.results.forces.force_elements import Measured
+from kedfem.results.recorded import Rows
+
+XYZ = ("x", "y", "z")
+INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
+
+
+@dataclass(frozen=True, slots=True)
+class Forces:
+    """What acts beside port forces: forces of constraint equations, and of motors and springs."""
+
+    rows: ConstraintForces
+    actions: Measured
+
+
+Wrench = Callable[[Block], tuple[Rows, Rows]]
+
+
+def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: Forces) -> Wrench:
+    """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
+    attachment, link = model.joints[k], model.links[k]
+    rows = rows_of_joint(attachment, joint)
+    arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
+    shares = [(j, attachment.shares[j][rows]) for j in _sharing(attachment, rows)]
+    from_rows = attachment.from_rows[rows]
+
+    def wrench(block: Block) -> tuple[Rows, Rows]:
+        f = np.zeros((len(block), len(rows)))
+        for j, share in shares:
+            history = block.links[j]
+            f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
+        if from_rows.any():
+            f += forces.rows.on_ports(block) @ from_rows.T
+        return resultant(link, placed(block), f.reshape(len(f), len(arms), link.d))
+
+    return wrench
+
+
+def _sharing(attachment: Attachment, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " l"]:
+    """Links whose port forces tell some of a link's."""
+    if not attachment.shares:
+        return np.zeros(0, int)
+    ends = np.cumsum([share.shape[1] for share in attachment.shares])
+    told = np.concatenate(attachment.shares, axis=1)[rows].any(axis=0)
+    return np.unique(np.searchsorted(ends, np.flatnonzero(told), side="right"))
+
+
+def _arms_over_time(
+    model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]
+) -> Callable[[Block], Float[np.ndarray, "T p 3"]]:
+    """From a joint's point on link k to its ports, world components.
+
+    Of rigid-body frames as these turn. Co-rotational frames know where the ports are: displaced from the rigid-body
+    motion, the joint's point as it lies among them. So force and moment do the work that the ports' displacements say.
+    """
+    attachment, link, body = model.joints[k], model.links[k], model.bodies[k]
+    here = np.array([name == joint for name in attachment.joints], bool)
+    drawn, weights = attachment.points[here], attachment.weights[here]
+    among = np.linalg.lstsq(
+        np.vstack([np.ones(len(drawn)), (drawn - at).T]), np.array([1.0, 0, 0, 0]), rcond=1e-9
+    )[0]
+    beside = at - among @ drawn
+
+    def nominal(block: Block) -> Float[np.ndarray, "T p 3"]:
+        return np.asarray((drawn - at) @ _turned(block, k, link).transpose(0, 2, 1))
+
+    def displaced(block: Block) -> Float[np.ndarray, "T p 3"]:
+        u = np.asarray(weights @ block.links[k].u[:, attachment.nodes])
+        x = drawn @ block.motion.R[:, body].transpose(0, 2, 1) + in_space(link, u)
+        centre = among @ x + _turned(block, k, link) @ beside
+        return np.asarray(x - centre[:, None])
+
+    return nominal if link.fit is None else displaced
+
+
+def _turned(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]:
+    """Orientation of a link's frame, in space."""
+    R = np.tile(np.eye(3), (len(block), 1, 1))
+    R[:, : link.d, : link.d] = block.links[k].R
+    return R
+
+
+def determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
+    """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
+    force, moment = loose(model, k, joint, at)
+    return negligible(force), negligible(force) and negligible(moment)
+
+
+def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
+    """Forces and moments of a joint that statics leave open, as drawn."""
+    attachment = model.joints[k]
+    arms, link = _arms(attachment, joint, at), model.links[k]
+    loose = attachment.loose[rows_of_joint(attachment, joint)].T
+    return resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
+
+
+def negligible(indeterminate: Float[np.ndarray, "..."]) -> bool:
+    """Whether what a joint leaves open of a port force is nothing beside what it would carry."""
+    return bool(np.abs(indeterminate).max(initial=0.0) < INDETERMINATE)
+
+
+def rows_of_joint(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
+    """All components of all ports of a joint."""
+    here = np.flatnonzero([name == joint for name in attachment.joints])
+    return (attachment.components * here[:, None] + np.arange(attachment.components)).ravel()
+
+
+def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "p 3"]:
+    """From a point to the ports of a joint, as drawn."""
+    return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
+
+
+def resultant(
+    link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray, "T p d"]
+) -> tuple[Rows, Rows]:
+    """Force and moment of port forces, all in one frame."""
+    if link.kind == "beam":  # third component is a moment
+        return in_space(link, f).sum(axis=1), f.sum(axis=1) * [0, 0, 1]
+    force = in_space(link, f)
+    return force.sum(axis=1), cross(arms, force).sum(axis=1)
+
+
+def holder(model: Model, name: str, joint: str) -> int:
+    """The link of a name, or its segment, that a joint holds."""
+    return next(
+        k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints
+    )
