@@ -13,10 +13,11 @@ from scipy.spatial.transform import Rotation
 from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_axis import straight_axis
+from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.links.segments import Segments, beam_segments, segmented, space_segments
+from kedfem.links.segments import Segments, segmented
 from kedfem.scene import Material
 from tests.laws.strategies import examples
 from tests.runs import Ran, ran

@@ -12,9 +12,9 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.frames import Followed, deformation, frames_of, rotation
 from kedfem.dynamics.segment import internal_force, position
 from kedfem.links.beams.beam import beam_link
+from kedfem.links.beams.beam_segments import beam_segments
 from kedfem.links.beams.section import Section, rectangle
 from kedfem.links.record import Link
-from kedfem.links.segments import beam_segments
 from kedfem.scene import Material, Scene, scene_from
 from tests.scenes import example
 

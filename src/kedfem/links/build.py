@@ -9,19 +9,11 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.links.beams.beam import line_axes
 from kedfem.links.beams.beam_axis import directions
+from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.of_scene import scene_axis, scene_beam
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.segments import (
-    Interval,
-    Segments,
-    along,
-    beam_segments,
-    corotational,
-    most_slices,
-    segmented,
-    space_segments,
-)
+from kedfem.links.segments import Interval, Segments, along, corotational, most_slices, segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.choosing import with_chosen_faces
 from kedfem.links.surfaces.coupling_surfaces import joint_seat

@@ -1,0 +1,99 @@
+"""Beams element by element, each with frames of its own."""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+
+from kedfem.links.beams.beam import beam_link, shape_functions, strain_rows, tangent_fit
+from kedfem.links.beams.beam_axis import Axis
+from kedfem.links.beams.metric import beam_element
+from kedfem.links.beams.spatial_beam import rigidities, spatial_beam_link
+from kedfem.links.record import BeamPoint, Frame, Link
+from kedfem.links.segments import Cut, Segments, corotational
+from kedfem.links.surfaces.coupling_surfaces import joint_seat, port_weights
+from kedfem.scene import Material
+
+
+def beam_segments(link: Link, material: Material) -> Segments:
+    """A planar beam element by element; a frame follows the tangent at each Gauss point, [KED, eqs. (21)(22)].
+
+    There the strains are exact, however much the element bends: ε = |x'| − 1, γ, ψ' along the turned axis.
+    """
+    nodes = link.cells.shape[1]
+    parts = []
+    for cell in link.cells:
+        section = link.section
+        if section is None:
+            raise TypeError(f"links.{link.name}: has no section")  # a beam has
+        part = beam_link(link.name, link.X[cell[:2]], section, material, 1, nodes)
+        parts.append(replace(corotational(part), axes=link.axes, frames=_gauss_frames(part, material)))
+    cuts = [
+        Cut((k, k + 1), link.X[link.cells[k][1:2]], (_unit(parts[k], -1), _unit(parts[k + 1], 0)))
+        for k in range(len(parts) - 1)
+    ]
+    return Segments(tuple(parts), tuple(cuts))
+
+
+def _unit(part: Link, node: int) -> Float[np.ndarray, "1 n"]:
+    """Weights of one end of an element: nodes are in order along it."""
+    return np.eye(part.n)[[node]]
+
+
+def _gauss_frames(part: Link, material: Material) -> tuple[Frame, ...]:
+    section, x = part.section, part.X[part.cells[0]][:, :2]
+    if section is None:
+        raise TypeError(f"links.{part.name}: has no section")  # a beam has
+    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
+    rigidity = np.array([E * A, section.shear_coefficient * G * A, E * section.second_moment])
+    place = np.argsort(part.cells[0])
+    rows, rigidities, fits, tangents = [], [], [], []
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) - 1), strict=True):
+        B, det_J = strain_rows(x, float(r))
+        rows.append(B.reshape(3, -1, 3)[:, place].reshape(3, -1))
+        rigidities.append(w * det_J * rigidity)
+        fits.append(tangent_fit(x, float(r))[place])
+        tangents.append(shape_functions(float(r), len(x))[1] @ x / det_J)
+    shares = np.split(np.linalg.pinv(np.concatenate(rows)), len(rows), axis=1)
+    return tuple(
+        Frame(fit, (B.T * c) @ B, BeamPoint(t, B, c, share))
+        for fit, t, c, B, share in zip(fits, tangents, rigidities, rows, shares, strict=True)
+    )
+
+
+def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
+    """A beam in space element by element; a cut shares the whole field of its node.
+
+    Parameters
+    ----------
+    axis : of the link
+    """
+    parts = [_space_part(link, axis, cell, material) for cell in axis.cells]
+    cuts = [
+        _node_cut(parts[k], parts[k + 1], k, axis.frame[axis.cells[k][1], 0]) for k in range(len(parts) - 1)
+    ]
+    return Segments(tuple(parts), tuple(cuts))
+
+
+def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: Material) -> Link:
+    stations = np.sort(cell)
+    node = axis.node[stations] - axis.node[stations[0]]
+    hub = axis.hub[axis.node[stations]]
+    section = link.section
+    if section is None:
+        raise TypeError(f"links.{link.name}: has no section")  # a beam has
+    own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
+    part = spatial_beam_link(link.name, own, section, material)
+    x, order = own.frame[own.cells[0]][:, [0, 2, 3]], own.node[own.cells[0]]
+    element = beam_element(x, part.X, part.one, order, rigidities(section, material))
+    K0 = sp.csr_array((element.rows.T * element.stiffness) @ element.rows)
+    return replace(corotational(part), axes=link.axes, K0=K0, element=element)
+
+
+def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:
+    seats = [joint_seat(part, f"links.{a.name}", point, None) for part in (a, b)]
+    known = [d for d, spread in zip(seats[0].directions, seats[0].spread, strict=True) if spread > 0]
+    off = seats[0].spread[0] * np.array(known)
+    points = np.concatenate([point[None], point + off])
+    return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))
