@@ -16,9 +16,9 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.stepping.first_state import coarse_map, started
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import block_length
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, periodic
+from kedfem.dynamics.system.state import State
 from kedfem.motion.period import over_one_period
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from, time_grid

@@ -11,7 +11,6 @@ from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.start import initial_rates
-from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.layout import groups, near_diagonal
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
@@ -19,6 +18,7 @@ from kedfem.dynamics.system.oracle.literal import Literal, Now
 from kedfem.dynamics.system.oracle.literal_steps import nodal_forces
 from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.state import History, State
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 

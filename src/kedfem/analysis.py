@@ -56,8 +56,9 @@ from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import measured_actions
 from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
-from kedfem.results.stresses.envelope import Envelope, highest, peaks
+from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.hot_spots import hot_spots
+from kedfem.results.stresses.peaks import highest, peaks
 from kedfem.results.stresses.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state

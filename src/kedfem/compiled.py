@@ -23,7 +23,7 @@ from kedfem.digests import drop_changed, note
 from kedfem.folders import KERNELS, compiled_folder
 
 ROOT = Path(__file__).parent
-RECORDS = ("dynamics/system/arrays.py", "dynamics/metric.py")
+RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
 """Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
 
 

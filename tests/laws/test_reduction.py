@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.accuracy.reduction import _training, reduced
+from kedfem.accuracy.reduction import reduced
+from kedfem.accuracy.training import _training
 from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from kedfem.accuracy.study import Seconds, Study, pareto_front, studied
-from kedfem.accuracy.study_files import read_study, study_rows, write_study, write_study_plot
-from kedfem.accuracy.study_variants import fidelities
+from kedfem.accuracy.study.files import read_study, study_rows, write_study, write_study_plot
+from kedfem.accuracy.study.measuring import Seconds, Study, pareto_front, studied
+from kedfem.accuracy.study.variants import fidelities
 from kedfem.cli import INTERRUPTED, USER_ERROR
 from kedfem.scene import read_scene
 from kedfem.tables import study_tables
@@ -144,7 +144,9 @@ def test_no_figure_of_the_table_is_cut_off_at_80_columns(study: Study, slower: f
 
 def test_what_does_not_fit_the_budget_is_named(whip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     looks = itertools.count()
-    monkeypatch.setattr("kedfem.accuracy.study.perf_counter", lambda: float(next(looks)))  # a second a look
+    monkeypatch.setattr(
+        "kedfem.accuracy.study.measuring.perf_counter", lambda: float(next(looks))
+    )  # a second a look
     bound = studied(read_scene(whip), most=25.0, repeats=1)
     left = [row.note for row in bound.rows if row.seconds is None]
     assert left
@@ -205,7 +207,7 @@ def test_ctrl_c_is_said(run_kedfem: Command, whip: Path, monkeypatch: pytest.Mon
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kedfem.accuracy.study.studied", interrupted)
+    monkeypatch.setattr("kedfem.accuracy.study.measuring.studied", interrupted)
     said = run_kedfem("accuracy", whip)
     assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, "interrupted; nothing was written")
     assert not list(Path().glob("*-accuracy/*"))

@@ -24,8 +24,8 @@ from kedfem.output.plots.abscissa import abscissa
 from kedfem.output.plots.drawing import drawn_over, envelope
 from kedfem.output.plots.groups import pictures
 from kedfem.output.plots.overview import shown
-from kedfem.output.rendering import sight, view
 from kedfem.output.units import prefixed
+from kedfem.output.views import sight, view
 from kedfem.output.vtu import write_frame
 from kedfem.results import Channel, Results
 from tests.moving import ran

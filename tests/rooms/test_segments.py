@@ -12,7 +12,8 @@ from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.plan import SEGMENTS, planned
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.accuracy.reduction import _training, prepared
+from kedfem.accuracy.reduction import prepared
+from kedfem.accuracy.training import _training
 from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases

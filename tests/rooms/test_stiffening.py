@@ -19,8 +19,8 @@ from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.point_rows import point_rows

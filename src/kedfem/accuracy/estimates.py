@@ -19,34 +19,29 @@ import numpy as np
 
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, geometric_warning
-from kedfem.accuracy.histories import Histories, counted, extent, histories, relative_errors
+from kedfem.accuracy.histories import Histories, counted, extent, histories
+from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
 from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
-from kedfem.accuracy.variants import refined, with_analysis, with_links
-from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
-from kedfem.links.record import Link
 from kedfem.results.recording import recording
 from kedfem.scene import ForceLoad, Scene, time_grid, without_vibration
 
 LARGE = (
     100_000  # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
 )
-FUNCTIONS = 1e-3  # tolerance of the companion's modes: differences of runs need no better ones
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 SLOW = 1000  # the same where no compiled loop runs them
-REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
-SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
-LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
 
 
 @dataclass
@@ -136,7 +131,7 @@ def budget(
     ]  # fmt: skip
     if small is None:
         marched = _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step)
-        shares += [marched if seen.steps else None, _plain_mesh(eta, kinds)]
+        shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
     small = replace(small, scene=spanned(small.scene, small.model))
@@ -149,7 +144,7 @@ def budget(
         if seen.steps:
             known = known or step_errors(small, base)
             shares.append(_step_share({n: error for n, error in known.items() if n in counted(base)}))
-        shares.append(_mesh_share(small, base, eta))
+        shares.append(mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
     return Budget(joined(shares), tuple(limits), eta, known)
@@ -214,62 +209,6 @@ def _beside(scene: Scene, factor: float, steps: int) -> Scene:
     )
 
 
-def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
-    """The scene with twice the elements in all elastic beams; None without any."""
-    beams = {name: link for name, link in scene.links.items() if link.category == "beam"}
-    beams = {name: link for name, link in beams.items() if link.shape is not None}
-    return with_links(scene, {name: refined(link, factor) for name, link in beams.items()}) if beams else None
-
-
-def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> dict[str, float]:
-    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η²."""
-    scene = finer_beams(small.scene)
-    model = small.model
-    if scene is not None:
-        links = {link.name: link.full or link for link in model.links}
-        if any(link.meshed for link in links.values()):
-            return _separate(small, base, scene, eta)
-        model = elastic_model(scene, small.linkage, along=small.path)
-        other = histories(replace(small, scene=scene, model=model))
-        return {name: REST * error for name, error in relative_errors(base, other).items()}
-    other = histories(replace(small, model=softened(model, eta)), near=base.begun)
-    return relative_errors(base, other)
-
-
-def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
-    """Of a scene with both beams and meshed links: each by itself, added up."""
-    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
-    if any(link.meshed and link.fit is not None for link in small.model.links):
-        return soft
-    model = elastic_model(finer, small.linkage, along=small.path)
-    whole = first_reduced(replace(small, scene=finer, model=model), FUNCTIONS)
-    other = relative_errors(base, histories(whole))
-    return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
-
-
-def softened(model: Model, eta: Mapping[str, float]) -> Model:
-    """A model whose meshed links give by what their meshes are too stiff: K0 (1 − 2 η²)."""
-    return replace(
-        model,
-        links=tuple(_softer(link, max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2)) for link in model.links),
-    )
-
-
-def _softer(link: Link, factor: float) -> Link:
-    if factor == 1.0 or link.rigid:
-        return link
-    return replace(link, K0=link.K0 * factor, frames=tuple(replace(x, K0=x.K0 * factor) for x in link.frames))
-
-
-def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float]:
-    """Link → η, all its segments together."""
-    sums: dict[str, np.ndarray] = {}
-    for k, each in found.items():
-        name = model.links[k].name
-        sums[name] = sums.get(name, np.zeros(2)) + np.array([each.error, each.error + each.energy])
-    return {name: float(np.sqrt(error / whole)) if whole else 0.0 for name, (error, whole) in sums.items()}
-
-
 def _step_share(errors: Mapping[str, float]) -> Share:
     return Share("step", by_kind(errors), "longer steps, or levels in time")
 
@@ -278,22 +217,6 @@ def _running_share(running: float, kinds: tuple[str, ...]) -> Share:
     return Share(
         "step", dict.fromkeys(kinds, running), "local errors of its steps: no run beside one so large"
     )
-
-
-def _plain_mesh(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:
-    """Of a model without a companion: η² of what moves, η of stress."""
-    if not eta:
-        return None
-    worst = max(eta.values())
-    errors = {kind: SOFT * worst**2 + (LOCAL * worst if kind == "stress" else 0.0) for kind in kinds}
-    return Share("mesh", errors, "recovered stress against that of elements")
-
-
-def _mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
-    errors = by_kind(mesh_errors(small, base, eta))
-    if eta and "stress" in errors:
-        errors["stress"] += LOCAL * max(eta.values())
-    return Share("mesh", errors, "recovered stress against that of elements; beams of twice the elements")
 
 
 def reduction_share(reduction: Reduction | None) -> Share | None:

@@ -6,8 +6,9 @@ import numpy as np
 
 from kedfem.accuracy.choices import elastic, open_step
 from kedfem.accuracy.error_budget import UNKNOWNS
-from kedfem.accuracy.estimates import Strained, link_errors, mesh_errors
+from kedfem.accuracy.estimates import Strained
 from kedfem.accuracy.histories import histories, worst
+from kedfem.accuracy.mesh_estimate import link_errors, mesh_errors
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import filleted, refinable, refined, shortened, with_links

@@ -27,6 +27,7 @@ from kedfem.accuracy.choices import (
 from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_fillets, with_modes
 from kedfem.accuracy.prepared import key
 from kedfem.accuracy.segments import open_segments, with_segments
+from kedfem.accuracy.simpler_models import with_simpler_links
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
@@ -36,7 +37,7 @@ from kedfem.accuracy.variants import (
     with_analysis,
     with_links,
 )
-from kedfem.errors import KedfemError, SceneError
+from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept
 
@@ -174,7 +175,7 @@ def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
         stage("plan: segments")
         scene, segments = with_segments(search, scene, SEGMENTS * loose)
     stage("plan: simpler links")
-    scene, model = _with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
+    scene, model = with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
     scene = with_modes(search, scene, functions)
     if "reduction_tolerance" not in scene.analysis.model_fields_set:
         scene = with_analysis(scene, reduction_tolerance=REDUCTION * asked)
@@ -262,42 +263,3 @@ def _with_mesh(
 
 def _finer(scene: Scene, names: list[str], factor: float) -> Scene:
     return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
-
-
-def _with_simpler_links(
-    search: Trials, scene: Scene, left_open: list[str], allowed: float
-) -> tuple[Scene, float]:
-    """The scene with links made rigid, beams or plane as far as that changes little, and by how much it does.
-
-    Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.
-    """
-    reference, error = scene, 0.0
-    for name in left_open:
-        for simpler in _simpler(scene.links[name], search.asked):
-            trial = with_links(scene, {name: simpler})
-            try:
-                change = search.difference(trial, reference)
-            except SceneError:  # such a model makes no sense, as one without any elastic link
-                continue
-            except KedfemError as fault:
-                search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
-                continue
-            verdict = "taken" if change <= allowed else "left out"
-            search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
-            if change <= allowed:
-                scene, error = trial, change
-                break
-    return scene, error
-
-
-def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
-    """Simpler models of a link, simplest first."""
-    for family in families(link)[:-1]:
-        other = of_family(link, family, reduced=True)
-        if family == "beam":
-            other = refined(other, math.ceil(4 / math.sqrt(asked)))
-        yield other if family in {"rigid", "beam"} else refined(other, 2.0)
-
-
-def _noun(link: LinkScene) -> str:
-    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.category, "a solid")

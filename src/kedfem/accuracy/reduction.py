@@ -17,11 +17,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, key, meshed
 from kedfem.accuracy.shared_modes import as_alike, damped_as, last_of
+from kedfem.accuracy.training import residual_moments, training_motion
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.matrices.dense import SMALL
@@ -36,21 +37,14 @@ from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import (
     Scene,
-    drive_angle,
-    path_parameter,
-    time_grid,
-    turn_steps,
     without_vibration,
 )
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
 
-INSTANTS = 16  # where the linkage is looked at before the first run
-MOMENTS = 16  # of a run where its residual is taken
 ROUNDS = 4  # of enriching
 CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
 ADDED = 8  # modes that a round adds to a link, at most
@@ -156,7 +150,7 @@ def reduced(
     needed &= reducible(full.model)
     if not needed:
         return Reduction(full, {}, tolerance)
-    found = bases(full.model, instants(full.model, _training(full)), parts, needed)
+    found = bases(full.model, instants(full.model, training_motion(full)), parts, needed)
     given = counts or {}
 
     def first(share: float) -> Functions:
@@ -218,7 +212,7 @@ def first_reduced(
     left &= reducible(model)
     if not left:
         return replace(full, model=model)
-    small = reduced_at(model, _training(full), left, lambda link, basis: _count(link, basis, tolerance))
+    small = reduced_at(model, training_motion(full), left, lambda link, basis: _count(link, basis, tolerance))
     return replace(full, model=small)
 
 
@@ -233,7 +227,7 @@ def _settled(
     first : modes to begin with, for a share of the tolerance
     fixed : names of links whose number of modes is given
     """
-    moments, Q = _moments(full), first(1.0)
+    moments, Q = residual_moments(full), first(1.0)
     small, run = _run(full, Q, moments)
     for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)
@@ -277,28 +271,3 @@ def _enriched(
             full.model.links, small.model.links, zip(*answers, strict=True), strict=True
         )
     ]
-
-
-def _training(full: Prepared) -> RigidMotion:
-    """Rigid motion at the instants where the linkage is looked at: over the whole time, the last turn more closely."""
-    scene, grid = full.scene, time_grid(full.scene)
-    per_turn = turn_steps(scene)
-    half = INSTANTS // 2
-    t = grid.end * (np.arange(half) + 0.5) / half
-    if per_turn is not None:
-        turn = min(per_turn * grid.step, grid.end)
-        t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
-    t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
-    return rigid_motion(full.linkage, full.path, t, path_parameter(scene, t))
-
-
-def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:
-    """The time at which each load is greatest, so that short ones are not missed."""
-    phi = drive_angle(full.scene.motion, t)[0]
-    factors = [np.abs(load.factor(t, phi)) for loads in full.model.loads for load in loads]
-    return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])
-
-
-def _moments(full: Prepared) -> set[int]:
-    steps: Int[np.ndarray, " k"] = np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int)
-    return set(steps.tolist())

@@ -157,8 +157,8 @@ def accuracy(
     quick: Annotated[bool, typer.Option("--quick", help="A small reference and few variants.")] = False,
 ) -> None:
     """Run a scene in many variants: how fast, how near to the finest."""
-    from kedfem.accuracy.study import studied
-    from kedfem.accuracy.study_files import write_study, write_study_plot
+    from kedfem.accuracy.study.files import write_study, write_study_plot
+    from kedfem.accuracy.study.measuring import studied
     from kedfem.processes import machine
     from kedfem.results import ready_folder
     from kedfem.scene import read_scene

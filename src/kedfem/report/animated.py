@@ -14,8 +14,8 @@ from jaxtyping import Float
 from kedfem.errors import OutputError
 from kedfem.output.animation import read_collection
 from kedfem.output.derived import STEM, WORST
-from kedfem.output.rendering import view
 from kedfem.output.stress_files import ENVELOPE
+from kedfem.output.views import view
 from kedfem.report.surfaces import Surface, sources_of
 
 FRAMES = 120

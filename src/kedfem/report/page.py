@@ -17,10 +17,8 @@ from kedfem.output.words import with_prefix
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import Curve, cursor_places, curve_groups, polar_curves
 from kedfem.report.facts import (
-    Table,
     budget_table,
     facts,
-    fatigue_table,
     frequencies_table,
     joints_table,
     links_table,
@@ -30,6 +28,8 @@ from kedfem.report.facts import (
     peaks_table,
     steady_table,
 )
+from kedfem.report.fatigue_facts import fatigue_table
+from kedfem.report.records import Table
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
 from kedfem.results.extras import of_extra

@@ -9,8 +9,9 @@ from jaxtyping import Float, Int
 
 from kedfem.output.array_names import DISPLACEMENT, VON_MISES
 from kedfem.output.bars import LINES, THINNEST, heights, rims
-from kedfem.output.rendering import LIFT, QUADRILATERAL, SHARP
+from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
+from kedfem.output.views import LIFT
 
 NODES = 20_000
 """Most frames, and most nodes on the surfaces of all links: what a browser draws at once."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.rendering import picture_axes, sight
+from kedfem.output.views import picture_axes, sight
 from kedfem.report.animated import Animated, bounds, extent
 from kedfem.report.surfaces import Placement, Surface
 from kedfem.results.extras import of_extra

@@ -11,7 +11,8 @@ from kedfem.accuracy.error_budget import Budget, percent
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
-from kedfem.report.facts import ENDLESS, fatigue_notes, peak_rows
+from kedfem.report.facts import peak_rows
+from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
 from kedfem.results import Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.scene import Scene, without_vibration

@@ -3,7 +3,7 @@
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.accuracy.study import Measured, Study
+from kedfem.accuracy.study.measuring import Measured, Study
 from kedfem.output.words import percent
 
 REFERENCE = "reference"

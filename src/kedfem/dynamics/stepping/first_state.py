@@ -14,13 +14,13 @@ from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length, damper
 from kedfem.dynamics.stepping.start import Deflected, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.stepping.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import periodic
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.start import from_links
+from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path

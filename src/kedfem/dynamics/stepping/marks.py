@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from kedfem.dynamics.system.arrays import State
+from kedfem.dynamics.system.state import State
 
 
 @dataclass

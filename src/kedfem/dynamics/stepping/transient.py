@@ -14,13 +14,13 @@ from kedfem.dynamics.stepping.first_state import Start, begun, motion_of, starte
 from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage

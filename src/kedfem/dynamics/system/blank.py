@@ -4,7 +4,8 @@ import numpy as np
 
 from kedfem.dynamics.anderson import DEPTH
 from kedfem.dynamics.metric import room_for
-from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends, History, State, Trial, Work
+from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends
+from kedfem.dynamics.system.state import History, State, Trial, Work
 
 
 def empty_state(bodies: Bodies, of: Constraints) -> State:

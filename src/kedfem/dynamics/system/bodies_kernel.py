@@ -9,7 +9,8 @@ from kedfem.compiled import inlined, inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import balanced, entry, strained
 from kedfem.dynamics.metric_kernel import metric_force
-from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, turned, turned_back
+from kedfem.dynamics.system.products_kernel import mass_times, stiffness_times
 from kedfem.dynamics.system.record import COROTATIONAL, RIGID_BODY, TANGENTIAL
 from kedfem.dynamics.system.turning_kernel import turned_loads
 
@@ -80,31 +81,6 @@ def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type
     history.energy[t, i] = 0.5 * energy
     frame_copied(R, history.R[t, i])
     copied(g[:N], history.g[t, first:last])
-
-
-@inner
-def mass_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
-    """out becomes M x of a sparse body, in whichever axes; a matrix that all three components share is read once."""
-    n, d, of = bodies.functions[i], bodies.components[i], bodies.mass
-    row, column, value = of.row, of.column, of.value
-    if d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]:
-        at = of.at[of.of[i, 0]]
-        for j in range(n):
-            x0, x1, x2 = 0.0, 0.0, 0.0
-            for m in range(row[at + j], row[at + j + 1]):
-                k, y = column[m], value[m]
-                x0 += y * x[k]
-                x1 += y * x[n + k]
-                x2 += y * x[2 * n + k]
-            out[j], out[n + j], out[2 * n + j] = x0, x1, x2
-        return
-    for b in range(d):
-        at = of.at[of.of[i, b]]
-        for j in range(n):
-            total = 0.0
-            for m in range(row[at + j], row[at + j + 1]):
-                total += value[m] * x[b * n + column[m]]
-            out[b * n + j] = total
 
 
 @inner
@@ -182,22 +158,6 @@ def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-
              trial.angle[i : i + 1], work.strained, rooms)  # fmt: skip
     stiffness_times(bodies, i, work.strained, work.turned)
     balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
-
-
-@inner
-def stiffness_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
-    """out becomes K0 x of a co-rotational body."""
-    N = bodies.at[i + 1] - bodies.at[i]
-    if bodies.dense[i]:
-        product(bodies.K, bodies.G_at[i], N, N, x, out)
-        return
-    of = bodies.stiffness
-    row, column, value, at = of.row, of.column, of.value, of.at[of.of[i, 0]]
-    for j in range(N):
-        total = 0.0
-        for m in range(row[at + j], row[at + j + 1]):
-            total += value[m] * x[column[m]]
-        out[j] = total
 
 
 @inlined

@@ -18,7 +18,6 @@ from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.start import initial_rates
-from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.forces.exerted import exerted, on_links
@@ -34,6 +33,7 @@ from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.state import History, State
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene

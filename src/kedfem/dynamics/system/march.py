@@ -11,16 +11,7 @@ from kedfem.dynamics.force_element import stiffness_factors
 from kedfem.dynamics.matrices.dense import rows_of, work_over_time
 from kedfem.dynamics.nominal import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.arrays import (
-    Bodies,
-    Coefficients,
-    Constraints,
-    Driving,
-    Ends,
-    History,
-    State,
-    copied,
-)
+from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
@@ -28,6 +19,7 @@ from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import System, is_affine, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
+from kedfem.dynamics.system.state import Driving, History, State, copied
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 

@@ -20,7 +20,8 @@ from kedfem.dynamics.matrices.dense import DensePart
 from kedfem.dynamics.matrices.held import held_substructure
 from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix
 from kedfem.dynamics.stepping.state import Nodal
-from kedfem.dynamics.system.arrays import Masses, Trial, ends_of
+from kedfem.dynamics.system.arrays import Masses, ends_of
+from kedfem.dynamics.system.state import Trial
 from kedfem.links.record import Link
 from kedfem.processes import caught_in
 

@@ -19,13 +19,7 @@ from kedfem.dynamics.system.algebra_kernel import (
     turned,
     turned_back,
 )
-from kedfem.dynamics.system.bodies_kernel import (
-    internal_forces,
-    newmark,
-    orientation,
-    own_end,
-    residual,
-)
+from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation, own_end, residual
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,

@@ -22,7 +22,6 @@ from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
-from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.exerted import ELEMENTS
@@ -35,6 +34,7 @@ from kedfem.dynamics.system.record import End, System
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.starts.instant import Motion
 from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.state import History, State
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion

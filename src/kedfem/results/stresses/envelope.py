@@ -4,8 +4,8 @@ The steps of a link lie in the span of a few modes, found as they come. So its s
 coordinates, of a few columns; and `envelope_kernel` leaves out most of the times by bounds. Rigid links have no stress.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -16,7 +16,6 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery, stress_modes
 from kedfem.links.reduced import rigid_modes
-from kedfem.results.records import Peak
 
 EXACT = 1e-6  # of a link's highest stress: what may be missing of an envelope
 NOTHING = 1e-13  # of a link's displacement: rounding, which no mode is made for
@@ -271,62 +270,6 @@ def leading(
     )  # the rest in units in which Cauchy and Schwarz says much
     turned = (parts.reshape(-1, len(gain)) @ (V.T / gain[:, None] * unit)).reshape(parts.shape)
     return np.ascontiguousarray((C * gain) @ V.T / unit), turned, head
-
-
-def peaks(
-    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"],
-    near: Sequence[Sequence[str]] | None = None,
-) -> dict[str, Peak]:  # fmt: skip
-    """The highest von Mises stress of each link that has stress, and away from places where it means little.
-
-    Parameters
-    ----------
-    found : per link or segment
-    when : time and drive at every step
-    near : per link or segment what each point is near to, in words; empty where stress is what it seems
-    """
-    out: dict[str, Peak] = {}
-    away: dict[str, Peak] = {}
-    for k, each in enumerate(found):
-        if not each.stress.shape[1] or np.isnan(each.stress).all():
-            continue
-        words = None if near is None else near[k]
-        peak = _peak(each, when, np.ones(each.stress.shape[1], bool), words)
-        out[each.link] = max(out.get(each.link, peak), peak, key=lambda x: x.stress)
-        sound = np.array([not word for word in words]) if words is not None else np.ones(1, bool)
-        if words is not None and sound.any():
-            peak = _peak(each, when, sound, words)
-            away[each.link] = max(away.get(each.link, peak), peak, key=lambda x: x.stress)
-    return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
-
-
-def highest(every: Mapping[str, Peak]) -> Peak | None:
-    """Of all links; away from doubtful places that of all links, too."""
-    if not every:
-        return None
-    peak = max(every.values(), key=lambda x: x.stress)
-    sound = [x for each in every.values() if (x := each.away if each.near else each) is not None]
-    return replace(peak, away=max(sound, key=lambda x: x.stress, default=None)) if peak.near else peak
-
-
-def _peak(
-    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], among: np.ndarray, words: Sequence[str] | None
-) -> Peak:
-    return peak_at(each, when, int(np.where(among, each.stress[VON_MISES], -1.0).argmax()), words)
-
-
-def peak_at(
-    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], node: int, words: Sequence[str] | None
-) -> Peak:
-    """The highest von Mises stress of one point of a link, and when it is."""
-    step = int(each.step[VON_MISES, node])
-    link = each.recovery.link
-    place = each.recovery.at_points((link.full or link).X)[node]
-    time, angle = when[:, step] if step < when.shape[1] else (0.0, 0.0)
-    return Peak(
-        float(each.stress[VON_MISES, node]), each.link, (float(place[0]), float(place[1]), float(place[2])),
-        node, step, float(time), float(angle), words[node] if words is not None else "",
-    )  # fmt: skip
 
 
 def _largest(G: Float[np.ndarray, "T k"]) -> float:

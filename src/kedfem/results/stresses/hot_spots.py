@@ -7,7 +7,8 @@ from jaxtyping import Float
 
 from kedfem.links.recovery import StressRecovery
 from kedfem.results.records import Peak
-from kedfem.results.stresses.envelope import VON_MISES, LinkEnvelope, peak_at
+from kedfem.results.stresses.envelope import VON_MISES, LinkEnvelope
+from kedfem.results.stresses.peaks import peak_at
 
 APART = 0.02  # of the link's size: nearer points belong to the same place, as neighbours in a fine mesh do
 MOST = 10

@@ -12,7 +12,8 @@ from kedfem.dynamics.history import Exerted
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.system.ends import end_of, same_end
-from kedfem.dynamics.system.forces.supports import Supports, Vectors
+from kedfem.dynamics.system.forces.poses import Vectors
+from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.record import Constraint, Driven, End, Spring
 from kedfem.motion.constraints import cross
 

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.system.arrays import History, State
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.march import Ready, displacements
 from kedfem.dynamics.system.oracle.literal import Literal, Now
 from kedfem.dynamics.system.starts.instant import renumbered
 from kedfem.dynamics.system.starts.internal import own
+from kedfem.dynamics.system.state import History, State
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion

@@ -16,10 +16,11 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.nominal import forcings
-from kedfem.dynamics.system.arrays import History, State, copied, ends_of
+from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import Ready, march
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
+from kedfem.dynamics.system.state import History, State, copied
 from kedfem.motion.rigid import RigidMotion
 
 CARRIED = (

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Complex
 
-from kedfem.dynamics.system.arrays import State, copied
 from kedfem.dynamics.system.period.coarse import Coarse
 from kedfem.dynamics.system.period.krylov import (
     Derivative,
@@ -27,6 +26,7 @@ from kedfem.dynamics.system.period.map import CARRIED, Carried, PeriodMap
 from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
 from kedfem.dynamics.system.starts.instant import TURN, Flat
+from kedfem.dynamics.system.state import State, copied
 from kedfem.errors import SolveError
 from kedfem.scene import Pieces
 

@@ -11,19 +11,18 @@ from copy import copy
 
 import numpy as np
 from jaxtyping import Float
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.matrices.dense import work_on
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
-from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
-from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, held_body
+from kedfem.dynamics.system.starts.balance import Asked, Balance
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
 from kedfem.dynamics.system.starts.start import as_coordinates, begun
+from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
+from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 
@@ -32,9 +31,7 @@ DAMPED = 8  # times that rates of a deflection are found anew where dampers feel
 DIRECT = (
     2  # iterations of a linear system of dense bodies before its matrix gets rid of what makes it definite
 )
-KRYLOV = 60
 LEAST = 1 / 64  # of loads, that an increment of theirs is
-CONVERGED = 1e-10  # change of a iteration, of the deflection
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 STALLED, IN_A_ROW = 1e-5, 3  # the same of so many changes that do not fall, by matrices without mass
 FREE = 1e-3  # as ROUNDING where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
@@ -45,7 +42,6 @@ LATER = np.array([
 AHEAD = {1: [1], 2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
 Rows = Sequence[Float[np.ndarray, "_ _"]]
-Spins = Float[np.ndarray, "L 3 3"]
 
 
 class NoBalanceError(SolveError):
@@ -219,7 +215,7 @@ def _balanced(
     z1 : rates of the interface unknowns
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
-    of, mixing, bodies, settled, last = now.of, Mixing(), _Held(now, spins), False, np.inf
+    of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
     linear, slow = of.c.single, 0
     exact = linear and any(bodies.sparse)
     for n in range(SWEEPS):
@@ -261,71 +257,3 @@ def _asked(now: Instant, u: Flat, z1: Flat | None) -> Asked:
     target = np.where(soft, laws[:, 0] * compliance, -e[0])
     every = hard | soft
     return Asked(C[every], target[every], compliance[every], C.T @ np.where(every, 0.0, laws[:, 0]))
-
-
-class _Held:
-    """Bodies with K0 and the inertia of turning, held at their interface points."""
-
-    def __init__(self, now: Instant, spins: Spins | None) -> None:
-        self.now, self.spins, self._made = now, spins, list[HeldBody]()
-        self.still = now.always.still
-        self.sparse = [isinstance(part, SparsePart) for part in now.of.parts]
-
-    def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
-        """All bodies, the inertia of those that turn as their frames first were: iterations take out the rest."""
-        for k in range(len(self._made), len(R)):
-            link = self.now.of.system.model.links[k]
-            if self.sparse[k]:
-                self._made.append(self.now.always.held(k))
-                continue
-            A = self.still.K[k] + self.now.always.least(k) * np.eye(len(self.still.K[k]))
-            if self.spins is not None:
-                S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
-                A = A + np.kron(S, np.eye(link.n))
-            self._made.append(held_body(A, self.now.of.parts[k].W))
-        return self._made
-
-    def change(self, balance: Balance, r: Flat, exact: bool = False) -> Flat:
-        """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass.
-
-        Parameters
-        ----------
-        exact : whether it takes out the mass of dense bodies too
-        """
-        direct = balance.solved(r).x
-        if not any(self.sparse) and not exact:
-            return direct
-        none = balance.solved(0 * r).x
-
-        def applied(x: Flat) -> Flat:
-            return np.asarray(x + balance.solved(self.left_out(x, exact)).x - none)
-
-        whole = LinearOperator((len(r),) * 2, applied, dtype=float)
-        return np.asarray(gmres(whole, direct, rtol=CONVERGED, restart=KRYLOV, maxiter=4)[0])
-
-    def inertia(self, u: Flat) -> Flat:
-        """M ([α]× + [ω]×²) u of all bodies."""
-        out = np.zeros_like(u)
-        for k, S in enumerate(() if self.spins is None else self.spins):
-            out[own(self.now.of, k)] = self._momentum(k, S, u)
-        return out
-
-    def left_out(self, u: Flat, dense: bool) -> Flat:
-        """What matrices of sparse bodies leave out of that, less what they have of mass.
-
-        Parameters
-        ----------
-        dense : whether what matrices of dense bodies have of mass is taken off too
-        """
-        out, none = np.zeros_like(u), np.zeros((3, 3))
-        for k, sparse in enumerate(self.sparse):
-            if sparse or dense:
-                S = self.spins[k] if sparse and self.spins is not None else none
-                out[own(self.now.of, k)] = self._momentum(k, S - self.now.always.least(k) * np.eye(3), u)
-        return out
-
-    def _momentum(self, k: int, S: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
-        """M S u of body k; the mass of dense ones is one."""
-        link = self.now.of.system.model.links[k]
-        along = np.asarray(S[: link.d, : link.d] @ u[own(self.now.of, k)].reshape(link.d, -1)).ravel()
-        return momentum(link, along) if self.sparse[k] else along

@@ -12,7 +12,6 @@ from kedfem.dynamics.joints.first_rows import interface_forces
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.matrices.dense import coordinates, work_on
 from kedfem.dynamics.stepping.state import LinkState
-from kedfem.dynamics.system.arrays import State
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart
@@ -20,6 +19,7 @@ from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.balance import DEPENDENT, Asked, Balance, Solved
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
+from kedfem.dynamics.system.state import State
 
 Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
 

@@ -6,7 +6,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-from kedfem.accuracy.study import Measured, Study
+from kedfem.accuracy.study.measuring import Measured, Study
 from kedfem.results.files import replacing
 from kedfem.results.table import text_file
 

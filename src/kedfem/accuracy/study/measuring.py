@@ -8,7 +8,7 @@ from time import perf_counter
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.accuracy.study_variants import (
+from kedfem.accuracy.study.variants import (
     FINENESS,
     STEPS,
     Fidelity,

@@ -1,0 +1,95 @@
+"""The error of elements: what twice as many change, or what their stresses indicate."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from kedfem.accuracy.error_budget import Share, by_kind
+from kedfem.accuracy.histories import Histories, histories, relative_errors
+from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.reduction import first_reduced
+from kedfem.accuracy.variants import refined, with_links
+from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.dynamics.model import Model
+from kedfem.links.indicator import Indicator
+from kedfem.links.record import Link
+from kedfem.scene import Scene
+
+FUNCTIONS = 1e-3  # tolerance of a companion's modes: differences of runs need no better ones
+REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
+SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
+LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
+
+
+def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
+    """The scene with twice the elements in all elastic beams; None without any."""
+    beams = {name: link for name, link in scene.links.items() if link.category == "beam"}
+    beams = {name: link for name, link in beams.items() if link.shape is not None}
+    return with_links(scene, {name: refined(link, factor) for name, link in beams.items()}) if beams else None
+
+
+def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> dict[str, float]:
+    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η²."""
+    scene = finer_beams(small.scene)
+    model = small.model
+    if scene is not None:
+        links = {link.name: link.full or link for link in model.links}
+        if any(link.meshed for link in links.values()):
+            return _separate(small, base, scene, eta)
+        model = elastic_model(scene, small.linkage, along=small.path)
+        other = histories(replace(small, scene=scene, model=model))
+        return {name: REST * error for name, error in relative_errors(base, other).items()}
+    other = histories(replace(small, model=softened(model, eta)), near=base.begun)
+    return relative_errors(base, other)
+
+
+def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
+    """Of a scene with both beams and meshed links: each by itself, added up."""
+    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
+    if any(link.meshed and link.fit is not None for link in small.model.links):
+        return soft
+    model = elastic_model(finer, small.linkage, along=small.path)
+    whole = first_reduced(replace(small, scene=finer, model=model), FUNCTIONS)
+    other = relative_errors(base, histories(whole))
+    return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
+
+
+def softened(model: Model, eta: Mapping[str, float]) -> Model:
+    """A model whose meshed links give by what their meshes are too stiff: K0 (1 − 2 η²)."""
+    return replace(
+        model,
+        links=tuple(_softer(link, max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2)) for link in model.links),
+    )
+
+
+def _softer(link: Link, factor: float) -> Link:
+    if factor == 1.0 or link.rigid:
+        return link
+    return replace(link, K0=link.K0 * factor, frames=tuple(replace(x, K0=x.K0 * factor) for x in link.frames))
+
+
+def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float]:
+    """Link → η, all its segments together."""
+    sums: dict[str, np.ndarray] = {}
+    for k, each in found.items():
+        name = model.links[k].name
+        sums[name] = sums.get(name, np.zeros(2)) + np.array([each.error, each.error + each.energy])
+    return {name: float(np.sqrt(error / whole)) if whole else 0.0 for name, (error, whole) in sums.items()}
+
+
+def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:
+    """Of a model without a companion: η² of what moves, η of stress."""
+    if not eta:
+        return None
+    worst = max(eta.values())
+    errors = {kind: SOFT * worst**2 + (LOCAL * worst if kind == "stress" else 0.0) for kind in kinds}
+    return Share("mesh", errors, "recovered stress against that of elements")
+
+
+def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
+    """What elements of beams, and of solid and plane links, leave out, as a share of the error."""
+    errors = by_kind(mesh_errors(small, base, eta))
+    if eta and "stress" in errors:
+        errors["stress"] += LOCAL * max(eta.values())
+    return Share("mesh", errors, "recovered stress against that of elements; beams of twice the elements")

@@ -1,0 +1,1 @@
+"""Speed against error of a scene in many variants: `kedfem accuracy`."""

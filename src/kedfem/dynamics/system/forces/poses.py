@@ -1,0 +1,133 @@
+"""Where bodies and their ends are, displaced: poses, directions and points of forces."""
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.record import (
+    ANGLE,
+    FACE,
+    LINE,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RIGID,
+    End,
+    Term,
+)
+from kedfem.links.record import Link
+from kedfem.motion.constraints import cross
+from kedfem.motion.rigid import RigidMotion
+
+Vectors = Float[np.ndarray, "T 3"]
+Wrench = tuple[Vectors, Vectors]
+
+
+def resultant(
+    link: Link, rows: Float[np.ndarray, "T n d"], motion: RigidMotion, body: int, about: Vectors
+) -> Wrench:
+    """Resultant of nodal forces on a link that only moves rigidly, and moment about points."""
+    flat = 2 if link.planar else 3
+    f = np.zeros((*rows.shape[:2], 3))
+    f[:, :, :flat] = rows[:, :, :flat]
+    X = link.X @ motion.R[:, body].transpose(0, 2, 1)
+    arms = X + link.one[:, None] * (motion.p[:, body] - about)[:, None]
+    moment = np.cross(arms, f).sum(axis=1)
+    if link.kind == "beam":
+        moment[:, 2] += rows[:, :, 2] @ link.one
+    return np.einsum("tnk,n->tk", f, link.one), moment
+
+
+def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
+    """Moment on end i of a unit multiplier on a turn or an angle; on j it is the opposite."""
+    a = Q_i @ term.a
+    if term.kind != ANGLE:
+        return cross(a, Q_j @ term.b)
+    a_j, e, e_j = Q_j @ term.a_j, Q_i @ cross(term.b, term.a), Q_j @ cross(term.b, term.a_j)
+    along = (a * a_j + e * e_j).sum(axis=1)[:, None]
+    across = (a * e_j - e * a_j).sum(axis=1)[:, None]
+    moment = cross(a, along * e_j - across * a_j) - cross(e, along * a_j + across * e_j)
+    return np.asarray(moment / (along**2 + across**2))
+
+
+def poses(
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
+) -> tuple[Vectors, Float[np.ndarray, "T 3 3"]]:
+    """Place and orientation of an end over time."""
+    R = motion.R[:, end.body]
+    x = motion.p[:, end.body] + R @ end.origin
+    if end.form == RIGID:
+        return x, R
+    d = end.onto.shape[1]
+    u = np.einsum("pdk,tk->tpd", end.onto, z)
+    if end.line is not None:
+        u = np.einsum("tp,tpd->td", line_weights(end, motion), u)[:, None]
+    flat = 2 if end.form == PLANAR_BEAM else d
+    x[:, :flat] += u[:, 0, :flat]
+    if end.form in (POINT, LINE):
+        return x, R
+    if end.form == PLANAR_BEAM:
+        c, s, Q = np.cos(u[:, 0, 2]), np.sin(u[:, 0, 2]), np.zeros_like(R)
+        Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1], Q[:, 2, 2] = c, -s, s, c, 1.0
+        return x, Q @ R
+    return x, _rotations(_directions(end, R, u), end)
+
+
+def _directions(
+    end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]
+) -> Float[np.ndarray, "T 3 3"]:
+    """Directions of a surface as they are, row k direction k."""
+    d = end.onto.shape[1]
+    D = np.zeros((len(u), 3, 3))
+    for k in range(end.known):
+        D[:, k] = R @ end.directions[k]
+        D[:, k, :d] += (u[:, k + 1] - u[:, 0]) / end.lengths[k]
+    if end.form == PLANAR:
+        if end.known == 1:
+            D[:, 1] = cross(np.array([0.0, 0.0, 1.0]), D[:, 0])
+        D[:, 2] = [0, 0, 1]
+    if end.form == FACE:
+        D[:, 2] = cross(D[:, 0], D[:, 1])
+        D[:, 2] /= np.linalg.norm(D[:, 2], axis=1)[:, None]
+    return D
+
+
+def _rotations(D: Float[np.ndarray, "T 3 3"], end: End) -> Float[np.ndarray, "T 3 3"]:
+    """Q of Σ D_k ⊗ e_k = Q U."""
+    left, _, right = np.linalg.svd(D.transpose(0, 2, 1) @ end.directions)
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    return np.asarray(left @ right)
+
+
+def point_forces(
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"], force: Vectors, moment: Vectors
+) -> Float[np.ndarray, "T p d"]:
+    """Forces at an end's interface points that do what a force and a moment on it do: q_k of `ends_kernel`."""
+    p, d, _ = end.onto.shape
+    y = np.zeros((len(z), p, d))
+    flat = 2 if end.form == PLANAR_BEAM else d
+    y[:, 0, :flat] = force[:, :flat]
+    if end.line is not None:
+        return np.asarray(np.einsum("tp,td->tpd", line_weights(end, motion), y[:, 0]))
+    if end.form == PLANAR_BEAM:
+        y[:, 0, 2] = moment[:, 2]
+    if end.form in (POINT, PLANAR_BEAM):
+        return y
+    R, u = motion.R[:, end.body], np.einsum("pdk,tk->tpd", end.onto, z)
+    D = _directions(end, R, u)
+    Q = _rotations(D, end)
+    U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
+    G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
+    turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]
+    q = [(Q @ cross(turn, e)[:, :, None])[:, :, 0] for e in end.directions]
+    if end.form == PLANAR and end.known == 1:
+        q[0] = q[0] + cross(q[1], np.array([0.0, 0.0, 1.0]))
+    if end.form == FACE:
+        size = np.linalg.norm(cross(D[:, 0], D[:, 1]), axis=1)[:, None]
+        n = D[:, 2]
+        q[0] = q[0] - (q[2] * cross(D[:, 1], n)).sum(axis=1)[:, None] / size * n
+        q[1] = q[1] - (q[2] * cross(n, D[:, 0])).sum(axis=1)[:, None] / size * n
+    for k in range(end.known):
+        y[:, k + 1] += q[k][:, :d] / end.lengths[k]
+        y[:, 0] -= q[k][:, :d] / end.lengths[k]
+    return y

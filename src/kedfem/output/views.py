@@ -1,0 +1,119 @@
+"""From where a linkage is seen in a picture."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.output.array_names import VON_MISES
+from kedfem.output.bars import LINES, THINNEST, heights
+
+LIFT = 1e-3
+"""How far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it."""
+
+FLAT = 0.35
+"""A linkage whose least extent is below this part of its second is seen from that side."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """From where a linkage is drawn, and what it takes up there.
+
+    Parameters
+    ----------
+    direction, across, up : (3,) [-]
+        Unit vectors towards the eye, to the right and upwards in the picture.
+    cut : (3,) [m]
+        The highest stress, where it is hidden: what is before it is drawn translucent; else None.
+    middle, size : (2,) [m]
+        Centre, width and height of the linkage in the picture.
+    """
+
+    direction: Float[np.ndarray, " 3"]
+    across: Float[np.ndarray, " 3"]
+    up: Float[np.ndarray, " 3"]
+    middle: Float[np.ndarray, " 2"]
+    size: Float[np.ndarray, " 2"]
+    cut: Float[np.ndarray, " 3"] | None = None
+
+
+def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
+    """Whether something is in front of the highest stress."""
+    stress = grid.point_data[VON_MISES]
+    if not np.isfinite(stress).any():
+        return False
+    solids = grid.extract_cells(~np.isin(grid.celltypes, list(LINES)))
+    if not solids.n_cells:
+        return False
+    place = grid.points[int(np.nanargmax(stress))]
+    surface = solids.extract_surface(nonlinear_subdivision=1, algorithm=None).triangulate()
+    ends = place + LIFT * grid.length * direction, place + 2 * grid.length * direction
+    return len(surface.ray_trace(*ends)[0]) > 0
+
+
+def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
+    """The view of a linkage, all of it in the picture; from another side where only so the highest stress is seen."""
+    direction, upwards = sight(np.ptp(grid.points, axis=0))
+    seen = next((each for each in sides(direction) if not hidden(grid, each)), None)
+    cut = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))] if seen is None else None
+    direction = direction if seen is None else seen
+    across, up = picture_axes(direction, upwards, gravity)
+    drawn = grid.points @ np.column_stack([across, up])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
+    edge = max(4 * THINNEST * grid.length, *heights(grid).max(axis=0, initial=0.0))
+    return View(direction, across, up, (low + high) / 2, high - low + edge, cut)
+
+
+def picture_axes(
+    direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"], gravity: Float[np.ndarray, " 3"]
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Unit vectors to the right and upwards in a picture: against gravity, unless it is looked along or unknown.
+
+    Parameters
+    ----------
+    direction : (3,) [-], towards the eye
+    upwards : (3,) [-], about upwards where gravity does not tell
+    gravity : (3,) [m/s²]
+    """
+    if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
+        upwards = -gravity
+    across = np.cross(upwards, direction)
+    across /= np.linalg.norm(across)
+    return across, np.cross(direction, across)
+
+
+def sides(direction: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
+    """A direction to look from, then that from behind, then those mirrored at other axes."""
+    mirrored = [direction * signs for signs in product((1.0, -1.0), repeat=3)]
+    main = int(np.abs(direction).argmax())
+    turned = [
+        int(np.sum(each * direction < 0)) - 0.5 * (each[main] * direction[main] < 0) for each in mirrored
+    ]
+    return [mirrored[k] for k in np.argsort(turned, kind="stable")]
+
+
+def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """From where a linkage is seen best, and what is up: flat ones slightly tilted from their flat side.
+
+    Parameters
+    ----------
+    extents : (3,) [m]
+        Along x, y and z.
+
+    Returns
+    -------
+    direction, up
+        Unit vectors, the first towards the eye.
+    """
+    x, y, z = np.eye(3)
+    least, second, most = np.sort(extents)
+    thin = extents <= max(1.01 * least, FLAT * second if second < FLAT * most else 0.0)
+    if least > FLAT * second and second > FLAT * most:
+        direction, up = 0.6 * x + 0.5 * y + z, y
+    elif thin[2]:
+        direction, up = z + 0.3 * y, y
+    else:
+        direction, up = (-y if thin[1] else x) + 0.3 * z, z
+    return direction / np.linalg.norm(direction), up

@@ -1,0 +1,99 @@
+"""Deflection of a point from a line between two others, and how a link moves as a whole."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model
+from kedfem.links.record import in_space
+from kedfem.motion.linkage import Linkage
+from kedfem.results.followed import Drawn, Followed, followed_point, seen_from
+from kedfem.results.recorded import Rows
+from kedfem.scene import Probe, Scene
+
+
+def deflection(
+    scene: Scene, model: Model, linked: Linkage, name: str, probe: Probe, point: Followed
+) -> tuple[Callable[[Block], Rows], str]:
+    """Of a point in a frame that goes with its link: its chord, or its mean rigid motion, if it has no two joints."""
+    chord = probe.chord or _farthest(scene, probe.link)
+    frame = _mean_motion(model, probe.link)
+    axes = point.axes if probe.frame == "link" else None
+    if chord is None:
+
+        def from_mean(block: Block) -> Rows:
+            x, X, R = frame(block)
+            return seen_from(point.position(block) - x, R, point.X - X, axes)
+
+        return from_mean, "deflection from the link's mean rigid motion,"
+    where = f"output.probes.{name}.chord"
+    first, second = (
+        followed_point(model, linked, f"{where}[{i}]", probe.link, np.asarray(P)) for i, P in enumerate(chord)
+    )
+    drawn = second.X - first.X
+
+    def from_chord(block: Block) -> Rows:
+        start = first.position(block)
+        R = _along(frame(block)[2], drawn, second.position(block) - start)
+        return seen_from(point.position(block) - start, R, point.X - first.X, axes)
+
+    ends = " to ".join(f"({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in P.X)})" for P in (first, second))
+    return from_chord, f"deflection from the chord {ends},"
+
+
+def _farthest(scene: Scene, link: str) -> tuple[Drawn, Drawn] | None:
+    """The two joints of a link that are farthest apart; None if it has no two at different points."""
+    points = [np.asarray(joint.on(link)) for joint in scene.joints.values() if link in joint.links]
+    pairs = [(P, Q) for i, P in enumerate(points) for Q in points[i + 1 :] if np.linalg.norm(P - Q) > 0]
+    return max(pairs, key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])), default=None)
+
+
+def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.ndarray, "T 3 3"]:
+    """The orientations nearest to R that take a drawn chord to the direction that it has now."""
+    a = R @ (drawn / np.linalg.norm(drawn))
+    b = now / np.linalg.norm(now, axis=1)[:, None]
+    half = a + b
+    half /= np.linalg.norm(half, axis=1)[:, None]
+    eye = np.eye(3)
+    flip = 2 * half[:, :, None] * half[:, None, :] - eye  # half a turn about the middle of both
+    turn = 2 * a[:, :, None] * a[:, None, :] - eye  # after half a turn about the first: the least turn
+    return np.asarray(flip @ turn @ R)
+
+
+def _mean_motion(
+    model: Model, name: str
+) -> Callable[[Block], tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]]:
+    """The rigid motion of least mean square distance, by mass: centre now and as drawn, orientation."""
+    here = [(k, link, model.bodies[k]) for k, link in enumerate(model.links) if link.name == name]
+    mass = sum(float(link.one @ link.m1[:, 0]) for _, link, _ in here)
+    X = np.sum([link.one @ link.mX for _, link, _ in here], axis=0) / mass
+    fits = [link.mX - np.outer(link.m1[:, 0], X) for _, link, _ in here]
+
+    def moved(block: Block) -> tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]:
+        x, B = np.zeros((len(block), 3)), np.zeros((len(block), 3, 3))
+        for (k, link, body), fit in zip(here, fits, strict=True):
+            motion, u = block.motion, in_space(link, block.links[k].u)
+            p, R = motion.p[:, body], motion.R[:, body]
+            x += p * float(link.one @ link.m1[:, 0]) + R @ (link.one @ link.mX)
+            x += np.tensordot(u, link.m1[:, 0], (1, 0))
+            B += p[:, :, None] * (link.one @ fit) + R @ (link.X.T @ fit)
+            B += np.einsum("tai,aj->tij", u, fit)
+        return x / mass, X, _rotation(B, here[0][1].planar)
+
+    return moved
+
+
+def _rotation(B: Float[np.ndarray, "T 3 3"], planar: bool) -> Float[np.ndarray, "T 3 3"]:
+    """The rotations nearest to matrices, of planar links about z."""
+    if planar:
+        angle = np.arctan2(B[:, 1, 0] - B[:, 0, 1], B[:, 0, 0] + B[:, 1, 1])
+        out = np.tile(np.eye(3), (len(B), 1, 1))
+        out[:, 0, 0] = out[:, 1, 1] = np.cos(angle)
+        out[:, 1, 0] = np.sin(angle)
+        out[:, 0, 1] = -out[:, 1, 0]
+        return out
+    U, _, Vt = np.linalg.svd(B)
+    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
+    return np.asarray(U @ Vt)

@@ -1,0 +1,115 @@
+"""Points of links, followed over a run: position, velocity, acceleration and elastic state."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import Model, on_segment
+from kedfem.errors import SceneError
+from kedfem.links.point_rows import point_rows
+from kedfem.links.record import Link, in_space
+from kedfem.motion.constraints import cross
+from kedfem.motion.linkage import Linkage
+from kedfem.results.recorded import Rows
+
+ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state tells no displacement
+
+Drawn = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A point of a link, as a run knows it.
+
+    body, X : number of its link in the linkage, the point as drawn [m]
+    elastic : δ, δ' or δ'' there by their letter, world components (T, 3)
+    axes : (3, 3) of the link, as drawn
+    planar : whether the link moves in a plane
+    """
+
+    body: int
+    X: Drawn
+    elastic: Callable[[Block, str], Rows]
+    axes: Float[np.ndarray, "3 3"]
+    planar: bool = False
+
+    def position(self, block: Block) -> Rows:
+        """R' = R + f, [KED, eqs. (2)(3)] [m]."""
+        motion = block.motion
+        return np.asarray(motion.p[:, self.body] + motion.R[:, self.body] @ self.X + self.elastic(block, "u"))
+
+    def velocity(self, block: Block) -> Rows:
+        """Of both motions together [m/s]."""
+        motion, b = block.motion, self.body
+        return np.asarray(
+            motion.v[:, b] + cross(motion.omega[:, b], motion.R[:, b] @ self.X) + self.elastic(block, "v")
+        )
+
+    def acceleration(self, block: Block) -> Rows:
+        """Of both motions together [m/s²]."""
+        motion, b = block.motion, self.body
+        return np.asarray(motion.p2[:, b] + motion.R2[:, b] @ self.X + self.elastic(block, "a"))
+
+
+def followed_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) -> Followed:
+    """A point of a link: elastic, rigid, prescribed by a drive, or a slider without a shape, which moves with a pin."""
+    prescribed = next((x for x in model.carried if x.link.name == name), None)
+    if prescribed is not None:
+        link = prescribed.link
+        return Followed(prescribed.body, at, _at_rest, link.axes, link.planar)
+    slider = next((x for x in model.sliders if x.name == name), None)
+    if slider is not None:
+        moved = _read(slider.carrier, model.links[slider.carrier], slider.weights)
+        planar = model.links[slider.carrier].planar
+        return Followed(linked.bodies.index(name), at, moved, np.eye(3), planar)
+    if all(link.name != name for link in model.links):
+        raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
+    k, (value, X) = on_segment(model, name, at, lambda link: _value(link, where, at))
+    link = model.links[k]
+    return Followed(model.bodies[k], X, _read(k, link, value), link.axes, link.planar)
+
+
+def _at_rest(block: Block, field: str) -> Rows:
+    """The elastic motion of a rigid link that a drive prescribes."""
+    del field
+    return np.zeros((len(block), 3))
+
+
+def _read(k: int, link: Link, value: Float[np.ndarray, " n"]) -> Callable[[Block, str], Rows]:
+    """What link k's state means where its functions have given values."""
+    nodes = np.flatnonzero(value)
+    weights = value[nodes]
+
+    def read(block: Block, field: str) -> Rows:
+        return in_space(link, np.tensordot(getattr(block.links[k], field)[:, nodes], weights, (1, 0)))
+
+    return read
+
+
+def _value(link: Link, where: str, at: Drawn) -> tuple[Float[np.ndarray, " n"], Drawn]:
+    """Values of a link's functions at a point, and the point itself; of a rigid link wherever it is."""
+    if link.rigid:
+        known = np.column_stack([link.one, link.X[:, :2] if link.planar else link.X])
+        wanted = np.array([1.0, *at[: known.shape[1] - 1]])
+        value = np.linalg.lstsq(known.T, wanted, rcond=1e-12)[0]
+        X = np.array([*(value @ known)[1:], at[2]])[:3]
+    else:
+        found = point_rows(link, where, at)
+        value, X = found.value, found.X
+    beside = float(np.linalg.norm(X - at))
+    if link.kind == "beam" and beside > ON_AXIS * link.size:
+        got = f"got {beside:.3g} m beside it"
+        raise SceneError(f"{where}: must lie on the axis of planar beam '{link.name}' for a motion, {got}")
+    return value, X
+
+
+def seen_from(
+    x: Rows, R: Float[np.ndarray, "T 3 3"], X: Drawn, axes: Float[np.ndarray, "3 3"] | None
+) -> Rows:
+    """What x differs by from the rigid X, in axes that turn with the frame, or in the world's."""
+    if axes is None:
+        return np.asarray(x - R @ X)
+    return np.asarray(((x[:, None] @ R)[:, 0] - X) @ axes)
