@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
-from kedfem.accuracy.training import _training
+from kedfem.accuracy.training import training_motion
 from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases
@@ -58,7 +58,7 @@ def arm(kind: str, **analysis: Any) -> dict[str, Any]:
 
 
 def found_bases(full: Prepared) -> list[Basis]:
-    made = bases(full.model, instants(full.model, _training(full)), static_parts(full.model))
+    made = bases(full.model, instants(full.model, training_motion(full)), static_parts(full.model))
     return [basis for basis in made if basis is not None]
 
 
@@ -118,7 +118,7 @@ def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) 
 
 
 def static_work(model: Model, full: Prepared) -> float:
-    instant = instants(model, _training(full))[-1]
+    instant = instants(model, training_motion(full))[-1]
     F = [now.F @ now.R for now in instant.at]
     u = coupled(static_parts(model), [now.R for now in instant.at], F)[0]
     return sum(float(np.vdot(x, f)) for x, f in zip(u, F, strict=True))

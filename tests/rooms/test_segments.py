@@ -13,7 +13,7 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.plan import SEGMENTS, planned
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.training import _training
+from kedfem.accuracy.training import training_motion
 from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases
@@ -103,7 +103,7 @@ def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
 def test_functions_go_by_what_their_loss_costs() -> None:
     """As many functions sorted by their own energy leave out far more of the deflections' energy."""
     full = ready(bars(segments=3, kind="solid"))
-    parts, moments = static_parts(full.model), instants(full.model, _training(full))
+    parts, moments = static_parts(full.model), instants(full.model, training_motion(full))
     found = bases(full.model, moments, parts)
     for k in (1, 4, 7):  # between two cuts
         link = full.model.links[k]
