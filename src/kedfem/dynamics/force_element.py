@@ -18,7 +18,7 @@ from kedfem.scene import Pieces
 TURN, SLIDE, DISTANCE = 0, 1, 2
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
 TIME, SPEED, POSITION = 0, 1, 2
-OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION}
+OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION, "length": POSITION}
 IN_SPACE = (1.0, 1.0, 1.0)
 
 Vector = Float[np.ndarray, "3"]
@@ -66,7 +66,7 @@ class ForceElement:
     factor : of a spring, times (T,) and the drive's angles (T,) → what its stiffness is multiplied by; none: one
     limits : of a stop, between which it has no force; none: no stop
     axis : of a hinge or slide, as drawn
-    over, curve : of a motor; none: no points
+    over, curve : force along the coordinate, of a motor or beside a spring's; none: no points
     """
 
     name: str

@@ -197,6 +197,8 @@ def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement
     law: dict[str, Any] = {
         "stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free, "factor": factor,
     }  # fmt: skip
+    if spring.curve is not None:
+        law |= {"over": OVER[spring.curve.over], "curve": pieces(spring.curve).negative}
     if not isinstance(spring, LineSpring) or spring.between is None:
         made = _slide if isinstance(spring, LineSpring) else _hinge
         return replace(made(find, f"springs/{name}", str(spring.joint)), **law)

@@ -11,7 +11,7 @@ from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_seat
-from kedfem.scene import AngleLimit, Scene, TorsionSpring, time_grid, without_vibration
+from kedfem.scene import AngleLimit, Scene, TorsionSpring, pieces, time_grid, without_vibration
 
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
@@ -116,6 +116,8 @@ def _mounts(scene: Scene) -> tuple[float, float]:
             about += joint.bushing.rotational_stiffness or ()
     for spring in scene.springs.values():
         stiffness = max(spring.stiffness_factor.value) * spring.stiffness
+        if spring.curve is not None and spring.curve.over not in {"time", "speed"}:
+            stiffness += pieces(spring.curve).steepest
         (about if isinstance(spring, TorsionSpring) else along).append(stiffness)
     for limit in scene.limits.values():
         (about if isinstance(limit, AngleLimit) else along).append(limit.stiffness)

@@ -18,7 +18,7 @@ from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps
 from kedfem.scene.read.files import part_geometry
 from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from
 from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
-from kedfem.scene.records.curves import Curve, Factor, ForceCurve, TorqueCurve
+from kedfem.scene.records.curves import Curve, Factor, ForceCurve, PullCurve, TorqueCurve
 from kedfem.scene.records.damping import Damping, rayleigh
 from kedfem.scene.records.drives import (
     ConstantSpeed,
@@ -131,6 +131,7 @@ __all__ = [
     "Polynomial",
     "PressureLoad",
     "Probe",
+    "PullCurve",
     "Ramp",
     "RectangleSection",
     "RigidBody",

@@ -125,7 +125,7 @@ time = "0.2 s"
 joint = "A"
 torque = { over = "speed", at = [0, "600 rpm"], value = ["5 N*m", 0] }
 ''',
-    "torque of a motor": '''
+    "torque of a motor or a spring": '''
 [motors.starter]
 joint = "A"
 torque = { over = "time", at = [0, "0.1 s", "0.2 s"], value = [0, "5 N*m", 0] }
@@ -142,6 +142,13 @@ joint = "B"
 stiffness = "3 N*m/rad"
 damping = 0.1
 free_angle = "30 deg"
+''',
+    "force of a spring": '''
+[springs.strut]                         # a spring with a damper whose force is measured
+kind = "spring"
+between = [{ link = "rod", at = [2, 0] }, { link = "ground", at = [2, 1] }]
+stiffness = "2 N/mm"
+force = { over = "speed", at = ["-0.5 m/s", 0, "0.5 m/s"], value = ["-300 N", 0, "900 N"], interpolation = "smooth" }
 ''',
     "Ends of a spring": '''
 [springs.pull]

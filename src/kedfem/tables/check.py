@@ -31,7 +31,7 @@ from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.force_elements import measured_actions
 from kedfem.results.recording import recording
-from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
+from kedfem.scene import Curve, Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
 from kedfem.scene.questions.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
 from kedfem.tables.links import link_table, way_tables
@@ -170,9 +170,12 @@ def _limit_law(limit: Limit) -> str:
 
 def _motor_law(motor: Motor) -> str:
     """A motor's curve in words."""
-    unit, value = "N m" if motor.torque else "N", motor.curve.value
-    low, high = (with_prefix(x, unit) for x in (min(value), max(value)))
-    return low if len(value) == 1 else f"{low} to {high} over {motor.curve.over}"
+    return _curve_words(motor.curve, "N m" if motor.torque else "N")
+
+
+def _curve_words(curve: Curve, unit: str) -> str:
+    low, high = (with_prefix(x, unit) for x in (min(curve.value), max(curve.value)))
+    return low if len(curve.value) == 1 else f"{low} to {high} over {curve.over}"
 
 
 def _spring_law(spring: Spring) -> tuple[str, str]:
@@ -191,6 +194,8 @@ def _spring_law(spring: Spring) -> tuple[str, str]:
     given = [with_prefix(value, unit) for value, unit in constants if value]
     if not is_constant(factor):
         given[0] += f" times {min(factor.value):.4g} to {max(factor.value):.4g} over {factor.over}"
+    if spring.curve is not None:
+        given.append(_curve_words(spring.curve, units[0].partition("/")[0]))
     return on, ", ".join(given)
 
 

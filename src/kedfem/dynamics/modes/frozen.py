@@ -19,7 +19,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.layout import as_arrays, coefficients, factored
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import TIME, Curve, Stop, System
+from kedfem.dynamics.system.record import TIME, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
 from kedfem.dynamics.system.starts.instant import Instant
@@ -198,7 +198,7 @@ def tangent_warning(system: System, what: str) -> tuple[str, ...]:
     bent = (
         each.name
         for each in system.constraints
-        if isinstance(each.law, Stop) or (isinstance(each.law, Curve) and each.law.over != TIME)
+        if isinstance(each.law, Stop) or ((curve := curve_of(each.law)) is not None and curve.over != TIME)
     )
     names = ", ".join(dict.fromkeys(bent))
     return (

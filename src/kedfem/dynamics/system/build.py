@@ -59,7 +59,7 @@ from kedfem.scene import (
 )
 from kedfem.scene.checks.capabilities import SLOTS
 
-OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE}
+OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE, "length": COORDINATE}
 ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
 
@@ -96,10 +96,11 @@ def system_of(
 
 def spring_law(spring: LineSpring | TorsionSpring) -> Spring:
     """The law of a spring of a scene."""
-    factor = spring.stiffness_factor
+    factor, given = spring.stiffness_factor, spring.curve
+    curve = None if given is None else Curve(OVER[given.over], pieces(given).negative)
     if is_constant(factor):
-        return Spring(factor.value[0] * spring.stiffness, spring.damping, spring.free)
-    return Spring(spring.stiffness, spring.damping, spring.free, factor=factor_law(factor))
+        return Spring(factor.value[0] * spring.stiffness, spring.damping, spring.free, curve=curve)
+    return Spring(spring.stiffness, spring.damping, spring.free, factor=factor_law(factor), curve=curve)
 
 
 def without_stiffness(link: Link, turned: bool = False) -> Link:

@@ -117,14 +117,15 @@ def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyp
         k = factor * numbers[0]
         out[0], out[1], out[2] = k * (e - numbers[2]) + numbers[1] * rate, k, numbers[1]
     elif kind == CURVE:
-        over = of.over[r]
-        at = t if over == TIME else (rate if over == RATE else e)
-        value, slope = interpolated(of, r, at)
-        out[0] = -value
-        if over != TIME:
-            out[2 if over == RATE else 1] = -slope
+        out[0] = 0.0
     else:
         stop(numbers, e, rate, of.jumps[r] and numbers[0] <= before <= numbers[1], force, out)
+    if of.curve_at[r] < of.curve_at[r + 1]:
+        over = of.over[r]
+        value, slope = interpolated(of, r, t if over == TIME else (rate if over == RATE else e))
+        out[0] -= value
+        if over != TIME:
+            out[2 if over == RATE else 1] -= slope
     return False
 
 

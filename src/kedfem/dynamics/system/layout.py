@@ -39,6 +39,7 @@ from kedfem.dynamics.system.record import (
     Spring,
     Stop,
     System,
+    curve_of,
 )
 from kedfem.dynamics.system.sparse import (
     Part,
@@ -220,9 +221,7 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
     """All constraints and laws as flat arrays."""
     terms = [term for each in constraints for term in each.terms]
     laws = [_law(each.law) for each in constraints]
-    curves = [
-        each.law if isinstance(each.law, Curve) else Curve(COORDINATE, Pieces()) for each in constraints
-    ]
+    curves = [curve_of(each.law) or Curve(COORDINATE, Pieces()) for each in constraints]
     return Constraints(
         term_at=ends_of([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
         i=np.array([x.i for x in terms], int), j=np.array([x.j for x in terms], int),

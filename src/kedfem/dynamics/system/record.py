@@ -33,21 +33,6 @@ class Driven:
 
 
 @dataclass(frozen=True, slots=True)
-class Spring:
-    """A spring and damper: force k (e − free) + c e' against the coordinate e [N/m or N m; N s/m or N m s].
-
-    drive : number of a drive whose travel is taken from the coordinate, as of a shaft that gives; −1: none
-    factor : times (T,) and the drive's angles (T,) → what k is multiplied by (T,); none: one
-    """
-
-    stiffness: float
-    damping: float = 0.0
-    free: float = 0.0
-    drive: int = -1
-    factor: Factor | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Curve:
     """A force along the coordinate.
 
@@ -57,6 +42,23 @@ class Curve:
 
     over: int
     force: Pieces
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """A spring and damper: force k (e − free) + c e' against the coordinate e [N/m or N m; N s/m or N m s].
+
+    drive : number of a drive whose travel is taken from the coordinate, as of a shaft that gives; −1: none
+    factor : times (T,) and the drive's angles (T,) → what k is multiplied by (T,); none: one
+    curve : a force along the coordinate beside it
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    free: float = 0.0
+    drive: int = -1
+    factor: Factor | None = None
+    curve: Curve | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +167,13 @@ class System:
     stiffening: Any = None
 
 
+def curve_of(law: Law) -> Curve | None:
+    """The curve that a law has, or is."""
+    if isinstance(law, Spring):
+        return law.curve
+    return law if isinstance(law, Curve) else None
+
+
 def is_affine(system: System, each: Constraint) -> bool:
     """Whether a force, or a misfit, grows with z by a constant gradient: one solution of the interface is exact.
 
@@ -172,7 +181,8 @@ def is_affine(system: System, each: Constraint) -> bool:
     turns.
     """
     law = each.law
-    known = law.over == TIME if isinstance(law, Curve) else isinstance(law, Held | Driven | Spring)
+    curve = curve_of(law)
+    known = not isinstance(law, Stop) and (curve is None or curve.over == TIME)
     return known and (each.linear or all(_at_a_point(system, term) for term in each.terms))
 
 

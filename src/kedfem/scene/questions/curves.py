@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -24,6 +24,18 @@ class Pieces:
     at: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
     coefficients: Float[np.ndarray, "n 4"] = field(default_factory=lambda: np.zeros((0, 4)))
     period: float = 0.0
+
+    @property
+    def negative(self) -> Pieces:
+        """The same with the opposite sign, as of a pull along a distance, which it shortens."""
+        return replace(self, coefficients=-self.coefficients)
+
+    @property
+    def steepest(self) -> float:
+        """The largest slope, either way, at the ends and middles of its pieces; 0 of a constant."""
+        ends = np.append(self.at[1:], self.at[:1] + self.period if self.period else self.at[-1:])
+        places = np.concatenate([self.at, (self.at + ends) / 2, np.nextafter(ends, self.at)])
+        return float(np.abs(self(places)[1]).max(initial=0.0))
 
     def __call__(self, x: Values) -> tuple[Values, Values]:
         """Values and slopes at places."""

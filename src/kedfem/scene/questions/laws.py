@@ -205,8 +205,11 @@ def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
 
 
 def curves(scene: Scene) -> Iterator[tuple[str, Curve]]:
-    """All curves of a scene, each with where it stands: factors, torques and forces of motors."""
+    """All curves of a scene, each with where it stands: factors, torques and forces of motors and springs."""
     yield from factors(scene)
+    for name, spring in scene.springs.items():
+        if spring.curve is not None:
+            yield f"springs.{name}.{spring.effort}", spring.curve
     for name, motor in scene.motors.items():
         yield f"motors.{name}.{motor.curve.what[0]}", motor.curve
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from kedfem.errors import Fault, SceneError, Where
 from kedfem.scene.read.files import file_text
-from kedfem.scene.records.curves import Curve, Factor, ForceCurve, TorqueCurve
+from kedfem.scene.records.curves import Curve, Factor, ForceCurve, PullCurve, TorqueCurve
 from kedfem.scene.records.units import si_number
 
 
@@ -115,6 +115,8 @@ def _with_motion_table(where: Where, drive: Any, folder: Path) -> tuple[Any, lis
 CURVES: dict[tuple[str, str], type[Curve]] = {
     ("loads", "factor"): Factor,
     ("springs", "stiffness_factor"): Factor,
+    ("springs", "force"): PullCurve,
+    ("springs", "torque"): TorqueCurve,
     ("motors", "torque"): TorqueCurve,
     ("motors", "force"): ForceCurve,
 }

@@ -135,6 +135,18 @@ class ForceCurve(Curve):
     """force there"""
 
 
+class PullCurve(Curve):
+    """A pull over time, or over the length, travel or speed of what pulls."""
+
+    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "m/s", "length": "m", "travel": "m"}
+    what: ClassVar[tuple[str, str]] = ("force", "N")
+    over: Literal["time", "speed", "length", "travel"] = "time"
+    """what it depends on; `"length"`: the distance of both ends; `"travel"`: along a slide, from the reference position;
+    `"speed"`: at which either grows"""
+    value: tuple[Force, ...] = ()
+    """pull there; negative: it pushes"""
+
+
 def constant_as_curve(value: Any) -> Any:
     """A constant as a curve of one value."""
     return value if isinstance(value, (dict, Curve)) else {"time": [0.0], "value": [value]}
@@ -143,4 +155,5 @@ def constant_as_curve(value: Any) -> Any:
 FactorOver = Annotated[Factor, BeforeValidator(constant_as_curve)]
 TorqueOver = Annotated[TorqueCurve, BeforeValidator(constant_as_curve)]
 ForceOver = Annotated[ForceCurve, BeforeValidator(constant_as_curve)]
+PullOver = Annotated[PullCurve, BeforeValidator(constant_as_curve)]
 ONE = Factor(at=(0.0,), value=(1.0,))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -15,6 +15,8 @@ from kedfem.scene.records.curves import (
     Force,
     ForceCurve,
     ForceOver,
+    PullCurve,
+    PullOver,
     Torque,
     TorqueCurve,
     TorqueOver,
@@ -78,6 +80,8 @@ class SpringEnd(Record):
 class _Elastic(Record):
     """What all springs share."""
 
+    effort: ClassVar[str]
+    """the key of its curve"""
     stiffness_factor: FactorOver = ONE
     """what k is multiplied by, nowhere negative: a number, or a table over time or the drive's angle as the factor of a
     load has it, such as the stiffness of a tooth mesh; repeated with a `period`"""
@@ -92,10 +96,18 @@ class _Elastic(Record):
             refuse([Fault(("stiffness_factor",), "must be combined with a stiffness, got none")])
         return self
 
+    @property
+    def curve(self) -> PullCurve | TorqueCurve | None:
+        """What it pulls or turns back with beside its constants."""
+        curve: PullCurve | TorqueCurve | None = getattr(self, self.effort, None)
+        return curve
+
     @model_validator(mode="after")
     def _does_something(self) -> Self:
-        if not (getattr(self, "stiffness", 1.0) or getattr(self, "damping", 1.0)):
-            refuse([Fault(("stiffness",), "must be positive, or damping, got neither")])
+        if not (getattr(self, "stiffness", 1.0) or getattr(self, "damping", 1.0) or self.curve):
+            refuse(
+                [Fault(("stiffness",), f"must be positive, or damping, or a {self.effort}, got none of them")]
+            )
         return self
 
     @model_validator(mode="after")
@@ -111,12 +123,13 @@ class _Elastic(Record):
 
 
 class LineSpring(_Elastic):
-    """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l'.
+    """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l' + F.
 
     Along a slide l is the travel of the joint's first link that is not the ground against the other, from the drawn
     position, and what it pulls back is that link.
     """
 
+    effort: ClassVar[str] = "force"
     kind: Literal["spring"] = "spring"
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
@@ -132,6 +145,10 @@ class LineSpring(_Elastic):
     """l0 along a slide, at which it does not pull; 0, the reference position, if not given"""
     preload: Force | None = None
     """with what it pulls in the reference position, instead of l0; negative: it pushes"""
+    force: PullOver | None = None
+    """F: a pull beside these, or instead: a number, or a curve over the length (of a gas spring, a stop of rubber), over
+    the speed (of a damper) or over time (of a cylinder that is told its force): `{ over = "speed", at = [...], value =
+    [...] }`"""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
@@ -140,11 +157,13 @@ class LineSpring(_Elastic):
                 refuse([Fault(("between",), "is required, or a joint, got neither")])
             if self.free_length is not None:
                 refuse([Fault(("free_length",), "must be free_travel [m] along a joint, got a length")])
+            self._curve_over("length", "travel", "along a joint")
             return self
         if self.joint is not None:
             refuse([Fault(("between",), "cannot be combined with joint, got both")])
         if self.free_travel is not None:
             refuse([Fault(("free_travel",), "must be free_length [m] between two points, got a travel")])
+        self._curve_over("travel", "length", "between two points")
         a, b = self.between
         if a.at == b.at and (self.free_length != 0.0 or self.preload):
             refuse(
@@ -157,6 +176,12 @@ class LineSpring(_Elastic):
             )
         return self
 
+    def _curve_over(self, wrong: str, right: str, where: str) -> None:
+        if self.force is not None and self.force.over == wrong:
+            refuse(
+                [Fault(("force", "over"), f"must be {right!r} {where}, or 'speed' or 'time', got {wrong!r}")]
+            )
+
     @property
     def free(self) -> float:
         """l0: the length or travel at which it does not pull [m]."""
@@ -168,8 +193,9 @@ class LineSpring(_Elastic):
 
 
 class TorsionSpring(_Elastic):
-    """A spring and a damper about a hinge: they turn back with k (φ − φ0) + c φ'."""
+    """A spring and a damper about a hinge: they turn back with k (φ − φ0) + c φ' + T."""
 
+    effort: ClassVar[str] = "torque"
     kind: Literal["torsion"] = "torsion"
     joint: str
     """the hinge, cylindrical joint or screw"""
@@ -182,6 +208,8 @@ class TorsionSpring(_Elastic):
     that is not the ground against the other, about the joint's axis"""
     preload: Torque | None = None
     """with what it turns back in the reference position, −k φ0, instead of φ0"""
+    torque: TorqueOver | None = None
+    """T: a torque that turns back beside these, or instead: a number, or a curve over the angle, the speed or time"""
 
     @property
     def free(self) -> float:

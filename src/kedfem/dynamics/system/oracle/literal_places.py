@@ -40,13 +40,10 @@ Column = Float[np.ndarray, " _"]
 def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[float]:
     """Force of a law against its coordinate, at one time."""
     match law_at(each.law, at.t, at.phi):
-        case Spring(stiffness=k, damping=c, free=free):
-            return (k * (e - free) + c * rate,)
-        case Curve(over=over, force=of):
-            x = float(at.t[0]) if over == TIME else (rate if over == RATE else e)
-            x = of.at[0] + (x - of.at[0]) % of.period if of.period else max(x, of.at[0])
-            cubics = PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])
-            return (-float(cubics(x)),)
+        case Spring(stiffness=k, damping=c, free=free, curve=curve):
+            return (k * (e - free) + c * rate - _on_curve(curve, at, e, rate),)
+        case Curve() as curve:
+            return (-_on_curve(curve, at, e, rate),)
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
             if lower <= e <= upper:
                 return (0.0,)
@@ -55,6 +52,15 @@ def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[flo
             return (force if force * beyond > 0 else 0.0,)
         case _:
             raise ValueError(f"{each.name}: a constraint has no force law")
+
+
+def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> float:
+    """Force along the coordinate."""
+    if curve is None:
+        return 0.0
+    of, x = curve.force, float(at.t[0]) if curve.over == TIME else (rate if curve.over == RATE else e)
+    x = of.at[0] + (x - of.at[0]) % of.period if of.period else max(x, of.at[0])
+    return float(PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])(x))
 
 
 def turned_load(

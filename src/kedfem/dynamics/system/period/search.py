@@ -24,7 +24,7 @@ from kedfem.dynamics.system.period.krylov import (
 )
 from kedfem.dynamics.system.period.map import CARRIED, Carried, PeriodMap
 from kedfem.dynamics.system.period.multipliers import multipliers
-from kedfem.dynamics.system.record import ANGLE, COORDINATE, Curve, Spring, Stop
+from kedfem.dynamics.system.record import ANGLE, COORDINATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.state import State, copied
 from kedfem.errors import SolveError
@@ -231,8 +231,9 @@ def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
     before, after = (map_.state(each).e[0] for each in (x, y))
     for n, each in enumerate(map_.of.system.constraints):
         gone = float(after[n] - before[n])
-        depends = isinstance(each.law, Spring) or (
-            isinstance(each.law, Curve) and each.law.over == COORDINATE and not _repeats(each.law.force, gone)
+        curve = curve_of(each.law)
+        depends = (isinstance(each.law, Spring) and each.law.stiffness != 0.0) or (
+            curve is not None and curve.over == COORDINATE and not _repeats(curve.force, gone)
         )
         winds = any(term.kind == ANGLE for term in each.terms) and abs(gone) > TURN / 2
         if depends and winds:

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import RATE, Curve, Spring, Stop
+from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.balance import Asked, Balance
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
@@ -169,8 +169,9 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
 def _feels_rates(of: Ready) -> bool:
     """Whether a law's force depends on a rate."""
     laws = [each.law for each in of.system.constraints]
-    return any(law.damping != 0 if isinstance(law, Spring | Stop) else isinstance(law, Curve) and law.over == RATE
-               for law in laws)  # fmt: skip
+    curves = [curve for law in laws if (curve := curve_of(law)) is not None]
+    damped = any(isinstance(law, Spring | Stop) and law.damping != 0 for law in laws)
+    return damped or any(curve.over == RATE for curve in curves)
 
 
 def _spins(now: Instant) -> Spins:

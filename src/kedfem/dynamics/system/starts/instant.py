@@ -155,7 +155,8 @@ def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float
     """Force of a law along its coordinate, and how it falls with the coordinate and with its rate."""
     match law:
         case Spring(stiffness=k, damping=c, free=free):
-            return -k * (e - free) - c * rate, k, c
+            beside = (0.0, 0.0, 0.0) if law.curve is None else push(law.curve, t, e, rate)
+            return beside[0] - k * (e - free) - c * rate, beside[1] + k, beside[2] + c
         case Curve(over=over, force=force_at):
             x = {TIME: t, RATE: rate, COORDINATE: e}[over]
             value, slope = (float(found[0]) for found in force_at(np.array([x])))
