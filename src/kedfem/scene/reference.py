@@ -166,6 +166,7 @@ NAMED = {
     curves.FactorOver: ("number or curve", ""),
     curves.TorqueOver: ("number or curve", "N·m"),
     curves.ForceOver: ("number or curve", "N"),
+    curves.PullOver: ("number or curve", "N"),
     curves.Abscissa: ("number", "s, rad/s, rad, m/s or m"),
     drives.DriveSpeed: ("number", "rad/s or m/s"),
     drives.Smoothing: ("number", "rad or m"),
