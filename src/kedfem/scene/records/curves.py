@@ -84,11 +84,24 @@ def _number(quantity: Quantity, where: tuple[str | int, ...], given: Any) -> flo
 
 
 def curve_faults(
-    at: Sequence[float], value: Sequence[float], quantity: Quantity, key: str = "at"
+    at: Sequence[float],
+    value: Sequence[float],
+    quantity: Quantity,
+    key: str = "at",
+    values: str = "value",
+    least: int = 1,
 ) -> list[Fault]:
-    """What is wrong with a curve: places and messages."""
-    if not at:
-        return [Fault((key,), f"must hold at least one value{quantity.bracket}, got none")]
+    """What is wrong with values at places.
+
+    Parameters
+    ----------
+    quantity : of the places
+    key, values : the keys of places and values
+    least : how many there must be
+    """
+    if len(at) < least:
+        wanted = "one value" if least == 1 else f"{least} values"
+        return [Fault((key,), f"must hold at least {wanted}{quantity.bracket}, got {len(at) or 'none'}")]
     faults: list[Fault] = []
     for i, (before, after) in enumerate(pairwise(at), start=1):
         if after <= before:
@@ -97,7 +110,7 @@ def curve_faults(
             break
     if len(value) != len(at):
         faults.append(
-            Fault(("value",), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}")
+            Fault((values,), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}")
         )
     return faults
 

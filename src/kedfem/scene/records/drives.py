@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
@@ -12,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault
 from kedfem.scene.records.base import FileName, Record, refuse
+from kedfem.scene.records.curves import curve_faults
 from kedfem.scene.records.damping import Frequency
 from kedfem.scene.records.units import (
     Angle,
@@ -90,7 +90,7 @@ class Table(Record):
     def _one_row_per_time(self) -> Table:
         key = "travel" if self.travel else "angle"
         if self.file is None:
-            refuse(table_faults(self.time, key, self.values, at_least=2))
+            refuse(curve_faults(self.time, self.values, Quantity("s"), "time", key, least=2))
         elif self.time or self.values:
             refuse([Fault(("file",), f"cannot be combined with time and {key}, got both")])
         if self.travel and self.angle:
@@ -243,23 +243,3 @@ class Gear(Record):
         if self.teeth is not None:
             return (1 if self.internal else -1) * self.teeth[0] / self.teeth[1]
         return self.radius if self.radius is not None else self.ratio or 0.0
-
-
-def table_faults(
-    time: tuple[float, ...], key: str, values: tuple[float, ...], at_least: int = 1
-) -> list[Fault]:
-    """What is wrong with a table over time: places and messages."""
-    if len(time) < at_least:
-        return [Fault(("time",), f"must hold at least {at_least} times [s], got {len(time)}")]
-    faults: list[Fault] = []
-    for i, (before, after) in enumerate(pairwise(time), start=1):
-        if after <= before:
-            faults.append(
-                Fault(("time", i), f"must be later than the time before, {before:.6g} [s], got {after:.6g}")
-            )
-            break
-    if len(values) != len(time):
-        faults.append(
-            Fault((key,), f"must hold one value for each of the {len(time)} times, got {len(values)}")
-        )
-    return faults
