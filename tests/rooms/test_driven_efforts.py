@@ -86,6 +86,36 @@ def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(
         )
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("acting", ["torsion spring", "motor"])
+@pytest.mark.parametrize("coupler", ["plane", "solid"])
+def test_drives_bear_what_laws_exert_on_surfaces_that_they_share(acting: str, coupler: str) -> None:
+    """The pin's surface of the coupler has points that the rigid crank holds, and others that the law turns."""
+    raw = four_bar("rigid", ON_CRANK[acting])
+    b, c = (raw["joints"][name]["at"] for name in "BC")
+    raw["links"]["coupler"] = bar(coupler, b, c)
+    if coupler == "solid":
+        raw["links"]["rocker"] = bar(coupler, raw["joints"]["D"]["at"], c)
+    got = channels(*ran(raw))
+    rigid = got["drive/rigid_torque"]
+    assert_allclose(got["drive/torque"], rigid, atol=0.01 * np.abs(rigid).max())
+
+
+def test_a_spring_from_the_driven_crank_to_the_ground_is_in_its_hub() -> None:
+    """1417 N at A and 76.7 N m, 1e4 N/m to (0.5, 0): elongation and lever of the crank's pin, by hand."""
+    got = channels(*ran(four_bar("rigid", ON_CRANK["spring to the ground"])))
+    angle = np.radians(60) + np.linspace(0, 2 * np.pi / 3, len(got["drive/torque"]))
+    pin = np.hypot(0.05, 0.0866) * np.stack([np.cos(angle), np.sin(angle)])
+    arm = np.array([[0.5], [0.0]]) - pin
+    length = np.linalg.norm(arm, axis=0)
+    pull = 1e4 * (length - length[0])
+    torque = pull * (pin[0] * arm[1] - pin[1] * arm[0]) / length
+    assert_allclose(np.linalg.norm(got["joints/A/force"], axis=1).max(), pull.max(), rtol=1e-3)
+    assert_allclose(pull.max(), 1417, atol=1)
+    assert_allclose(got["drive/torque"][:, 0], -torque, atol=0.005)
+    assert_allclose(np.abs(torque).max(), 76.7, atol=0.1)
+
+
 @pytest.mark.parametrize("solver", ["condensed", "monolithic"])
 @pytest.mark.parametrize("acting", list(ON_CRANK))
 def test_what_the_drive_of_a_rigid_link_gives_is_the_work_of_its_supports(acting: str, solver: str) -> None:

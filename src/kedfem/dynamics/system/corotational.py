@@ -143,7 +143,7 @@ class CorotationalSteps:
     def _handed_on(
         self, found: History, forcing: Sequence[Forcing], motion: RigidMotion
     ) -> tuple[list[LinkHistory], Exerted]:
-        forces = supports(self.ready, self.scene, found, motion)
+        forces = supports(self.ready, found, motion)
         acting = on_links(forces, self.riders)
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
         return self._with_turning_loads(every, motion), exerted(forces, self.elements)

@@ -200,7 +200,7 @@ class SystemSteps:
             for k, (joint, each) in enumerate(zip(self.ready.system.model.joints, forcing, strict=True))
         ]
         if self._bearings:
-            seen = supports(self.ready, self.scene, found, motion)
+            seen = supports(self.ready, found, motion)
             at_ports = [force @ to.T for force, to in zip(at_ports, self._to_ports, strict=True)]
         for one in self._bearings:
             R, c = forcing[one.k].R, one.bears

@@ -15,27 +15,10 @@ from kedfem.dynamics.system.record import (
     End,
     Term,
 )
-from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
 Vectors = Float[np.ndarray, "T 3"]
-Wrench = tuple[Vectors, Vectors]
-
-
-def resultant(
-    link: Link, rows: Float[np.ndarray, "T n d"], motion: RigidMotion, body: int, about: Vectors
-) -> Wrench:
-    """Resultant of nodal forces on a link that only moves rigidly, and moment about points."""
-    flat = 2 if link.planar else 3
-    f = np.zeros((*rows.shape[:2], 3))
-    f[:, :, :flat] = rows[:, :, :flat]
-    X = link.X @ motion.R[:, body].transpose(0, 2, 1)
-    arms = X + link.one[:, None] * (motion.p[:, body] - about)[:, None]
-    moment = np.cross(arms, f).sum(axis=1)
-    if link.kind == "beam":
-        moment[:, 2] += rows[:, :, 2] @ link.one
-    return np.einsum("tnk,n->tk", f, link.one), moment
 
 
 def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
