@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from reference.results import told
 
 import kedfem
 from kedfem.results import read_results
-from kedfem.results.reference import told
 from kedfem.scene import read_scene, time_grid
 
 ROOT = Path(__file__).parents[1]

@@ -4,8 +4,8 @@ from itertools import product
 from typing import Any
 
 import pytest
+from reference.capabilities import CELLS
 
-from kedfem.scene.capability_page import CELLS
 from tests.cells import FACTORS, QUICK, Cell, all_cells, as_a_run, executed, pairs
 from tests.moving import beam_in_space
 from tests.systems import against_oracle, begun, marched

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from reference.capabilities import COLUMNS, JOINTS, capabilities_page
 
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
-from kedfem.scene.capability_page import COLUMNS, JOINTS, capabilities_page
 from kedfem.scene.checks import capabilities
 from kedfem.scene.checks.capabilities import KINDS, REFUSALS, refusals
 from tests.cells import as_said
@@ -34,7 +34,7 @@ def over(what: str, link: str = "arm") -> Raw:
 
 def test_the_page_is_the_table() -> None:
     page = Path(__file__).parents[2] / "docs" / "capabilities.md"
-    said = "python -m kedfem.scene.capability_page > docs/capabilities.md"
+    said = "python -m reference.capabilities > docs/capabilities.md"
     assert page.read_text("utf-8") == capabilities_page(), said
 
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from reference.scene import SECTIONS
+from reference.scene_examples import EXAMPLES
 
 from kedfem.scene import Scene, read_scene, scene_from
-from kedfem.scene.reference import SECTIONS
-from kedfem.scene.reference_examples import EXAMPLES
 from tests.rooms.test_bad_scenes import BEAMS, FREE, GOOD
 
 UNDRIVEN = ("motor", "spring", "initial_motions")

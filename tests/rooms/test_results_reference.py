@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from reference.results import CHANNELS, results_page, told
 
 from kedfem.analysis import analyse
 from kedfem.kinematics import kinematics
 from kedfem.results import Channel
-from kedfem.results.reference import CHANNELS, results_page, told
 from kedfem.scene import scene_from
 from tests.reliability.fuzz import short
 from tests.scenes import example
@@ -26,9 +26,7 @@ DRIVEN = (
 
 
 def test_the_page_is_made_from_the_code() -> None:
-    assert PAGE.read_text(encoding="utf-8") == results_page(), (
-        "python -m kedfem.results.reference > docs/results.md"
-    )
+    assert PAGE.read_text(encoding="utf-8") == results_page(), "python -m reference.results > docs/results.md"
 
 
 @pytest.mark.parametrize("name", SOME)

@@ -1,6 +1,6 @@
 """The reference of all keys of a scene, from its records.
 
-Regenerate it with ``python -m kedfem.scene.reference > docs/scene.md``.
+Regenerate it with ``python -m reference.scene > docs/scene.md``.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from kedfem.scene.records import (
     shapes,
 )
 from kedfem.scene.records.units import Quantity
-from kedfem.scene.reference_examples import EXAMPLES
+from reference.scene_examples import EXAMPLES
 
 INTRODUCTION = """\
 # The scene file
@@ -84,7 +84,7 @@ as *where: what was wanted, what was got*.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 
-The tables below are made from the program's own records (`python -m kedfem.scene.reference > docs/scene.md`).
+The tables below are made from the program's own records (`python -m reference.scene > docs/scene.md`).
 What a `—` in the column *default* stands for is said under *meaning*.
 """
 

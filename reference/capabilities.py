@@ -1,6 +1,6 @@
 """docs/capabilities.md, from the table of capabilities.
 
-Regenerate it with ``python -m kedfem.scene.capability_page > docs/capabilities.md``.
+Regenerate it with ``python -m reference.capabilities > docs/capabilities.md``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ moving start: as by the oracle, which assembles all tangents anew, to 1e-8 of th
 5e-7 with rigid-body ones and beams in space, where rounding beside the stiff rigid parts at their ends is 2e-7. {refused}
 were refused by lines of the table.
 
-The page is made by `python -m kedfem.scene.capability_page > docs/capabilities.md`.
+The page is made by `python -m reference.capabilities > docs/capabilities.md`.
 """
 CELLS = (332, 420)
 """Of `tests.cells`: those that ran, and those that were refused."""

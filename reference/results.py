@@ -1,6 +1,6 @@
 """docs/results.md: every channel of a results file, its sign, frame and unit.
 
-Regenerate it with ``python -m kedfem.results.reference > docs/results.md``.
+Regenerate it with ``python -m reference.results > docs/results.md``.
 """
 
 import re
@@ -147,7 +147,7 @@ have the highest von Mises and extreme principal stresses of every point, each w
 `results.csv` (`output.csv = true`) has all channels with nine digits, `results.parquet` (`output.parquet = true`, needs
 `pip install 'kedfem[data]'`) with all. From Python: [python.md](python.md).
 
-The page is made by `python -m kedfem.results.reference > docs/results.md`.
+The page is made by `python -m reference.results > docs/results.md`.
 """
 
 
