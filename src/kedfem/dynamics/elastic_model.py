@@ -22,7 +22,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
 from kedfem.links.build import bare_links, parted
-from kedfem.links.point_rows import PointRows, point_rows
+from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid
 from kedfem.links.segments import Segments
@@ -88,14 +88,8 @@ def elastic_model(
         for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
-        raise SceneError(
-            [
-                Fault(
-                    ("links",),
-                    "must hold a link that the drive does not simply carry along, got rigid ones only",
-                )
-            ]
-        )
+        wanted = "must hold a link that the drive does not simply carry along, got rigid ones only"
+        raise SceneError([Fault(("links",), wanted)])
     carried = tuple(
         replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
         for x in carried
@@ -173,18 +167,9 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
         if not isinstance(body, PointMass):
             raise
         key, point = on_part(links, body.link, at, lambda link: point_rows(link, f"{where}.at", at))
-        return key, with_point_mass(links[key], _on_axis(links[key], where, point, at), body.mass)
+        require_on_axis(links[key], f"{where}.at", at, point.X, "planar beam")
+        return key, with_point_mass(links[key], point.value, body.mass)
     return key, _carrying(links[key], seat, where, body, axis)
-
-
-def _on_axis(link: Link, where: str, point: PointRows, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, " n"]:
-    """Weights of a point of a link that carries a mass: of a planar beam on its axis."""
-    beside = float(np.linalg.norm(point.X - at))
-    if link.kind == "beam" and beside > 1e-6 * link.size:
-        raise SceneError(
-            f"{where}.at: must lie on the axis of planar beam '{link.name}', got {beside:.3g} m beside it"
-        )
-    return point.value
 
 
 def _carrying(

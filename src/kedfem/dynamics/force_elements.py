@@ -22,8 +22,8 @@ from kedfem.dynamics.force_element import (
 )
 from kedfem.dynamics.joints.places import seat_of, slider_axis
 from kedfem.dynamics.model import Model, Slider, on_segment
-from kedfem.errors import MeshError, SceneError
-from kedfem.links.point_rows import point_rows
+from kedfem.errors import MeshError
+from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
@@ -89,9 +89,7 @@ class _Ends:
             return End(-1, body, POINT, np.zeros((1, 0)), at[None], link=name)
         k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
         link = self.model.links[k]
-        beside = float(np.linalg.norm(rows.X - at))
-        if link.kind == "beam" and beside > 1e-6 * link.size:
-            raise SceneError(f"{where}: must lie on the axis of beam '{name}', got {beside:.3g} m beside it")
+        require_on_axis(link, where, at, rows.X)
         return End(k, self.model.bodies[k], POINT, rows.value[None], rows.X[None], _plane(link))
 
     def on_slider(self, slider: Slider, at: Vector) -> End:

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.joints.places import on_part
 from kedfem.errors import SceneError
-from kedfem.links.point_rows import point_rows
+from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
@@ -51,11 +51,7 @@ def at_point(
 def point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:
     """Of a force at a point of a link; beams take it on their axis alone."""
     rows = point_rows(link, f"{where}.at", at)
-    beside = float(np.linalg.norm(rows.X - at))
-    if link.kind == "beam" and beside > 1e-6 * link.size:
-        raise SceneError(
-            f"{where}.at: must lie on the axis of beam '{link.name}', got {beside:.3g} m beside it"
-        )
+    require_on_axis(link, f"{where}.at", at, rows.X)
     return rows.value
 
 

@@ -20,6 +20,7 @@ from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.mesh.elements.simplices import barycentric
 
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
+ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state tells no displacement
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,31 @@ def point_rows(
             return _beam_rows(link, where, point, kinks)
         case _:
             return _solid_rows(link, where, point)
+
+
+def require_on_axis(
+    link: Link,
+    where: str,
+    at: Float[np.ndarray, "3"],
+    nearest: Float[np.ndarray, "3"],
+    noun: str = "beam",
+    purpose: str = "",
+) -> None:
+    """Refuse a point beside the axis of a planar beam; other links have points anywhere.
+
+    Parameters
+    ----------
+    at, nearest : the point as drawn, and the nearest of the link [m]
+    noun, purpose : what a message calls the link, and says of what the point is for
+
+    Raises
+    ------
+    SceneError
+    """
+    beside = float(np.linalg.norm(nearest - at))
+    if link.kind == "beam" and beside > ON_AXIS * link.size:
+        wanted = f"must lie on the axis of {noun} '{link.name}'{purpose}"
+        raise SceneError(f"{where}: {wanted}, got {beside:.3g} m beside it")
 
 
 def _on_functions(stress: sp.csr_array, Q: Float[np.ndarray, "n s"], d: int) -> sp.csr_array:

@@ -9,13 +9,11 @@ from jaxtyping import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError
-from kedfem.links.point_rows import point_rows
+from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.results.recorded import Rows
-
-ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state tells no displacement
 
 Drawn = Float[np.ndarray, "3"]
 
@@ -99,10 +97,7 @@ def _value(link: Link, where: str, at: Drawn) -> tuple[Float[np.ndarray, " n"], 
     else:
         found = point_rows(link, where, at)
         value, X = found.value, found.X
-    beside = float(np.linalg.norm(X - at))
-    if link.kind == "beam" and beside > ON_AXIS * link.size:
-        got = f"got {beside:.3g} m beside it"
-        raise SceneError(f"{where}: must lie on the axis of planar beam '{link.name}' for a motion, {got}")
+    require_on_axis(link, where, at, X, "planar beam", " for a motion")
     return value, X
 
 

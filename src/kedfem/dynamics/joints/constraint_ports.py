@@ -19,8 +19,7 @@ from kedfem.dynamics.joints.constraint_joints import (
     station_ports,
 )
 from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis
-from kedfem.errors import SceneError
-from kedfem.links.point_rows import point_rows
+from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_seat
@@ -165,8 +164,7 @@ def _point_side(
         return None, None
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
     link = links[key]
-    if link.kind == "beam" and np.linalg.norm(rows.X - at) > 1e-6 * link.size:
-        raise SceneError(f"{where}: must lie on the axis of beam '{on}', got {at.tolist()}")
+    require_on_axis(link, where, at, rows.X)
     d = link.d
     known = only_u[:, :, :d].copy()
     if link.kind == "beam":

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.dynamics.force_element import OVER
 from kedfem.dynamics.joints.constraint_joints import (
     ConstraintJoint,
     bore_axis,
@@ -23,11 +24,8 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (
     ANGLE,
-    COORDINATE,
     DISTANCE,
     GAP,
-    RATE,
-    TIME,
     TURN,
     Constraint,
     Curve,
@@ -59,7 +57,6 @@ from kedfem.scene import (
 )
 from kedfem.scene.checks.capabilities import SLOTS
 
-OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE, "length": COORDINATE}
 ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
 

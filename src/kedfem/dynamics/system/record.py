@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.force_element import Factor, Times
+from kedfem.dynamics.force_element import OVER, Factor, Times
 from kedfem.links.stations import Stations
 from kedfem.scene import Pieces
 
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
-TIME, RATE, COORDINATE = range(3)
+TIME, RATE, COORDINATE = OVER["time"], OVER["speed"], OVER["length"]
 GAP, TURN, ANGLE, DISTANCE = range(4)
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
