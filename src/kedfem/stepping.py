@@ -1,6 +1,9 @@
 """All time steps of a run: rows to the results file, frames to the animation, states to go on from."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from time import perf_counter
@@ -13,7 +16,7 @@ from kedfem.accuracy.estimates import Seen, watcher
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import segments, ways
 from kedfem.dynamics.stepping.levels import leveled
 from kedfem.dynamics.stepping.literal import LiteralSteps
@@ -23,6 +26,7 @@ from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import AnimationWriter
 from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived
+from kedfem.output.fields import JointField
 from kedfem.output.frames import link_fields
 from kedfem.output.joint_frames import joint_field
 from kedfem.output.vtkhdf import AnimationFile
@@ -37,6 +41,7 @@ from kedfem.resume import Keeper, remove_state
 from kedfem.scene import Scene, time_grid, turn_steps
 
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
+AHEAD, HELD = 16, 100e6  # instants, and bytes of them, that wait to be drawn as frames while steps go on
 
 T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
@@ -108,7 +113,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     written = ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive
     )
-    with written.of_run(keeper.run, keeper.rows) if keeper else written as writer:
+    with written.of_run(keeper.run, keeper.rows) if keeper else written as writer, closing(shown):
         table = _Table(writer, channels, folder)
         try:
             for block in leveled(scene, ready.linkage, ready.path, model, solvers, marks):
@@ -125,6 +130,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
                 shown.add(block, values)
                 watch("steps", block.step + len(block) - 1, steps)
                 if keeper is not None and keeper.due(envelope.waits):
+                    shown.finish()
                     table.flush()
                     keeper.keep(writer.rows, memories)
         finally:
@@ -150,7 +156,7 @@ def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping
 
 @dataclass
 class _Frames:
-    """The animation: a list of files, and one file if that is wanted.
+    """The animation: a list of files, and one file if that is wanted; drawn by a thread while steps go on.
 
     wanted : steps that are frames
     """
@@ -160,6 +166,8 @@ class _Frames:
     frames: AnimationWriter
     one: AnimationFile | None
     wanted: set[int]
+    _thread: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1))
+    _waiting: deque[Future[None]] = field(default_factory=deque)
 
     @classmethod
     def of(cls, ready: Prepared, recoveries: list[StressRecovery], folder: FilePath) -> "_Frames":
@@ -171,16 +179,48 @@ class _Frames:
         return cls(ready, recoveries, frames, one, set(frame_steps(scene).tolist()))
 
     def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
-        """The frames among the time points of a block, with what joints exert."""
+        """The frames among the time points of a block, with what joints exert; an error of an earlier one comes here.
+
+        Raises
+        ------
+        OutputError
+        """
         scene, model = self.ready.scene, self.ready.model
+        ahead = min(AHEAD, max(1, int(HELD / (8 * 10 * model.unknowns))))
         for k in (k for k in range(len(block)) if block.step + k in self.wanted):
-            now = block.at(k)
+            self.finish(ahead - 1)
             joints = joint_field(scene, self.ready.linkage, block.motion, values, k)
-            exerted = [joints] if joints else []
-            self.frames.add(now.t, [*fields(scene, model, self.recoveries, now), *exerted], now.phi)
-            if self.one is not None:
-                drawn = link_fields(model, self.recoveries, now, 0.0)
-                self.one.add(now.t, now.phi, [*drawn, *exerted])
+            self._waiting.append(self._thread.submit(self._draw, block.at(k).copied(), joints))
+
+    def _draw(self, now: Snapshot, joints: JointField | None) -> None:
+        scene, model = self.ready.scene, self.ready.model
+        exerted = [joints] if joints else []
+        self.frames.add(now.t, [*fields(scene, model, self.recoveries, now), *exerted], now.phi)
+        if self.one is not None:
+            drawn = link_fields(model, self.recoveries, now, 0.0)
+            self.one.add(now.t, now.phi, [*drawn, *exerted])
+
+    def finish(self, but: int = 0) -> None:
+        """Wait for the frames that were begun, but for so many.
+
+        Raises
+        ------
+        OutputError
+        """
+        while len(self._waiting) > but:
+            self._waiting.popleft().result()
+
+    def close(self) -> None:
+        """Wait for the last frame; where one failed, for none of those after it.
+
+        Raises
+        ------
+        OutputError
+        """
+        try:
+            self.finish()
+        finally:
+            self._thread.shutdown(cancel_futures=True)
 
 
 def refuse_without(*writers: AnimationWriter | AnimationFile | None) -> None:

@@ -6,12 +6,20 @@ import scipy.sparse as sp
 import skfem
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import nodal_stress, stress_of_gradient, stress_recovery
+from kedfem.links.recovery import (
+    COMPONENTS,
+    nodal_stress,
+    principal_stresses,
+    stress_of_gradient,
+    stress_recovery,
+    turned_stress,
+)
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
 from kedfem.links.surfaces.surface import surface
 from kedfem.mesh import SolidMesh
@@ -290,3 +298,23 @@ def test_stiffness_is_that_of_the_vector_form(mesh: SolidMesh, nu: float) -> Non
     for component in range(3):
         here[vector.element_dofs[component::3]] = 3 * basis.element_dofs + component
     np.testing.assert_allclose(K0[np.ix_(here, here)], K, atol=ROUNDING * np.abs(K).max())
+
+
+def test_principal_stresses_are_eigenvalues_in_all_axes() -> None:
+    """Of drawn stresses of many sizes, and of all that have two equal ones, or three."""
+    rng = np.random.default_rng(3)
+    special = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0], [1, 1, 1], [1, -1, 0], [2, 1, 1]]
+    S = rng.standard_normal((500, 6)) * 10.0 ** rng.uniform(-30, 12, (500, 1))
+    S = np.concatenate([S, np.c_[np.array(special, float), np.zeros((8, 3))]])
+    T = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    full = np.zeros((len(S), 3, 3))
+    for k, (i, j) in enumerate(COMPONENTS):
+        full[:, i, j] = full[:, j, i] = S[:, k]
+    size = np.abs(S).max(axis=1, keepdims=True) + 1e-300
+    turned = T @ full @ T.T
+    components = np.stack([turned[:, i, j] for i, j in COMPONENTS], axis=1)
+    assert_allclose(turned_stress(S, T) / size, components / size, atol=1e-14)
+    expected = np.linalg.eigvalsh(full)[:, [0, 2]]
+    for stress in (S, components):  # the angle of Lode loses half of the digits where two are equal
+        assert_allclose(principal_stresses(stress) / size, expected / size, atol=1e-7)
+    assert np.isnan(principal_stresses(np.full((2, 6), np.nan))).all()

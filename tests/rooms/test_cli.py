@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from importlib.resources import files
@@ -19,8 +20,9 @@ import kedfem
 from kedfem import cli
 from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.errors import OutputError
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.output.animation import AnimationWriter
+from kedfem.output.animation import AnimationWriter, read_collection
 from kedfem.results import Results, read_results
 from kedfem.scene import read_scene, scene_from, time_grid
 
@@ -425,6 +427,29 @@ def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
     )
     analyse(read_scene(arm))
     assert set(seen) == {(True, True)}
+
+
+def test_a_frame_that_fails_while_steps_go_on_ends_the_run_and_rows_are_kept(
+    arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, threads = AnimationWriter.add, set()
+
+    def added(writer: AnimationWriter, *given: Any) -> list[Path]:
+        threads.add(threading.current_thread())
+        if writer.count == 5:
+            raise OutputError("the sixth frame")
+        return real(writer, *given)
+
+    monkeypatch.setattr(AnimationWriter, "add", added)
+    with pytest.raises(OutputError, match="the sixth frame"):
+        analyse(read_scene(arm))
+    assert threading.main_thread() not in threads
+    assert not any(thread.is_alive() for thread in threads)
+    folder = arm.with_name("arm-results")
+    results = read_results(folder / "results.h5")
+    assert results.status == "interrupted"
+    assert len(results.time) >= 50  # five frames, and the step of the sixth
+    assert len(read_collection(folder / "animation.pvd")) == 5
 
 
 def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, arm: Path) -> None:

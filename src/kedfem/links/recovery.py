@@ -56,12 +56,21 @@ def stress_of_gradient(H: Float[np.ndarray, "p d d"], link: Link) -> Float[np.nd
 
     In plane stress λ is λ*, and the components zz, yz, zx are zero.
     """
+    return np.asarray(H.reshape(len(H), -1) @ _stress_of_unit_gradients(link))
+
+
+def _stress_of_unit_gradients(link: Link) -> Float[np.ndarray, "dd 6"]:
+    """Of each H whose only component is 1, row by row."""
     (lam, mu), d = link.lame, link.d
-    H = np.einsum("ia,pij,jb->pab", link.axes[:d, :d], H, link.axes[:d, :d])
+    H = link.axes[:d, :d].T @ np.eye(d * d).reshape(-1, d, d) @ link.axes[:d, :d]
     stress = np.zeros((len(H), 3, 3))
     stress[:, :d, :d] = mu * (H + H.transpose(0, 2, 1))
     stress[:, :d, :d] += lam * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(d)
-    return np.stack([stress[:, i, j] for i, j in COMPONENTS], axis=1)
+    return _components(stress)
+
+
+def _components(S: Float[np.ndarray, "p 3 3"]) -> Float[np.ndarray, "p 6"]:
+    return np.stack([S[:, i, j] for i, j in COMPONENTS], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,10 +198,22 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
 
 def turned_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "p 6"]:
     """Stresses xx, yy, zz, xy, yz, zx in the axes that T takes components to: T S Tᵀ [same unit]."""
-    xx, yy, zz, xy, yz, zx = stress.T
-    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
-    S = T @ S @ T.T
-    return np.stack([S[:, i, j] for i, j in COMPONENTS], axis=1)
+    units = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate(COMPONENTS):
+        units[k, i, j] = units[k, j, i] = 1.0
+    return np.asarray(stress @ _components(T @ units @ T.T))
+
+
+def principal_stresses(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 2"]:
+    """Smallest and largest principal stress by the angle of Lode, from xx, yy, zz, xy, yz, zx [same unit]; nan of nan."""
+    mean, vm = stress[:, :3].mean(axis=1), von_mises(stress)
+    size = np.where(vm > 1e-150, vm, 1.0)  # squares of less are not numbers of full precision
+    xx, yy, zz = (stress[:, :3].T - mean) / size
+    xy, yz, zx = stress[:, 3:].T / size
+    third = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
+    angle = np.arccos(np.clip(13.5 * third, -1.0, 1.0)) / 3
+    radius = 2 / 3 * vm
+    return np.stack([mean + radius * np.cos(angle + 2 * np.pi / 3), mean + radius * np.cos(angle)], axis=1)
 
 
 def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarray, "m q"]]:

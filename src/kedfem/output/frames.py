@@ -8,7 +8,14 @@ from jaxtyping import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
-from kedfem.links.recovery import StressRecovery, nodal_state, nodal_stress, turned_stress, von_mises
+from kedfem.links.recovery import (
+    StressRecovery,
+    nodal_state,
+    nodal_stress,
+    principal_stresses,
+    turned_stress,
+    von_mises,
+)
 from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.output.fields import LinkField
 
@@ -77,21 +84,11 @@ def link_field(
         stress = np.full_like(stress, np.nan)
     points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
     kind, cells = recovery.cell_type, recovery.cells
-    von, least_and_most = von_mises(stress), extreme_principal(stress)
+    von, least_and_most = von_mises(stress), principal_stresses(stress)
     stress = _in_world(shown, moment, stress)
     return LinkField(
         link.name, kind, cells, points, displacement, stress, von, least_and_most, _section(link)
     )
-
-
-def extreme_principal(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 2"]:
-    """Smallest and largest principal stress; nan where stress is not known."""
-    xx, yy, zz, xy, yz, zx = stress.T
-    S = np.stack([np.stack([xx, xy, zx], 1), np.stack([xy, yy, yz], 1), np.stack([zx, yz, zz], 1)], 1)
-    known = np.isfinite(stress).all(axis=1)
-    out = np.full((len(stress), 2), np.nan)
-    out[known] = np.linalg.eigvalsh(S[known])[:, [0, 2]]
-    return out
 
 
 def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 6"]:

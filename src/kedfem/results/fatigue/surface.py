@@ -21,7 +21,8 @@ from kedfem.results.fatigue.strength import Strength
 from kedfem.results.stresses.envelope import Kept
 from kedfem.scene import Fatigue as Asked
 
-CHUNK = 4_000_000  # bytes of histories on 36 planes of some points: they stay in the cache
+PLANES = 36  # through a point, at the least, on which histories are counted
+CHUNK = 4_000_000  # bytes of histories of some points: they stay in the cache
 NOTHING = 1e-6  # of a link's highest stress: histories whose shape is rounding
 CRITERIA = ("signed von Mises", "normal stress", "Findley")
 SIGNED, NORMAL, FINDLEY = range(3)
@@ -113,28 +114,29 @@ class Look:
         self.recovery, self.near, self.parts = of.recovery, of.near, of.kept.parts
         self.name = of.recovery.link.name
         self.C, self.gone = period.of(of.kept)
+        self.moments, self.mean = self.C.T @ self.C / len(self.C), self.C.mean(axis=0)
         whole = free_surface(of.recovery)
         words = np.array([bool(word) for word in of.near])[whole.places % self.recovery.points]
         out = words & (not asked.near_joints)
         self.left_out = int(out.sum())
         self.surface = FreeSurface(whole.places[~out], whole.axes[~out])
         highest, apart = 0.0, 0.0
-        for which in self.chunks():
+        for which in self.chunks(1):
             A = self.parts[self.surface.places[which]]
-            highest = max(highest, _largest(A @ self.C.T))
-            apart = max(apart, _largest(A @ self.gone.T))
+            highest = max(highest, _largest(_histories(A, self.C)))
+            apart = max(apart, _largest(_histories(A, self.gone)))
         self.highest, self.repeats = highest, apart / highest if highest else 0.0
 
-    def chunks(self) -> Iterator[slice]:
+    def chunks(self, planes: int = PLANES) -> Iterator[slice]:
         """Some points at a time."""
-        size = max(1, CHUNK // (8 * 36 * max(len(self.C), len(self.gone))))
+        size = max(1, CHUNK // (8 * max(planes, 6) * max(len(self.C), len(self.gone))))
         return (slice(k, k + size) for k in range(0, len(self.surface.places), size))
 
     def judged(self, which: slice | list[int]) -> Judged:
         """Some of the points."""
         A, axes = self.parts[self.surface.places[which]], self.surface.axes[which]
-        H = A @ self.C.T
-        d = dominant(A @ (self.C.T @ self.C / len(self.C)) @ A.transpose(0, 2, 1), A @ self.C.mean(axis=0))
+        H = _histories(A, self.C)
+        d = dominant(A @ self.moments @ A.transpose(0, 2, 1), A @ self.mean)
         apart = np.where(np.abs(H).max(axis=(1, 2)) > NOTHING * self.highest, disproportion(H, d), 0.0)
         criterion = self._criterion(apart)
         found, h = np.zeros((len(A), 4)), np.zeros((len(A), len(self.C)))
@@ -218,6 +220,11 @@ def worse(damage: Float[np.ndarray, "k P"], amplitude: Float[np.ndarray, "k P"])
     """Of each point the history with the most damage; where none does any that with the largest amplitude."""
     some = damage.max(axis=1) > 0
     return np.asarray(np.where(some, damage.argmax(axis=1), amplitude.argmax(axis=1)))
+
+
+def _histories(A: Float[np.ndarray, "k 6 r"], C: Float[np.ndarray, "T r"]) -> Float[np.ndarray, "k 6 T"]:
+    """Stress over time from that of modes and their coordinates; one product of matrices for all points."""
+    return np.asarray((A.reshape(-1, A.shape[2]) @ C.T).reshape(len(A), 6, -1))
 
 
 def _largest(H: Float[np.ndarray, "k 6 T"]) -> float:
