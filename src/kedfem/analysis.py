@@ -156,7 +156,7 @@ def _analysed(
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
     plan = plan_for(scene, clock.stage)
     scene = plan.scene if plan else scene
-    ready, reduction = prepared(scene, clock.stage, beside.ends)
+    ready, reduction = prepared(scene, clock.stage, beside.ends, plan.links if plan else {})
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))

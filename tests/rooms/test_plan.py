@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.plan import MESH, MODEL, REDUCTION, STEP, Plan, plan_for, planned
+from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.trials import Trials
 from kedfem.analysis import analyse
@@ -116,6 +117,20 @@ def test_the_same_scene_has_the_same_plan() -> None:
     assert first.scene.model_dump() == second.scene.model_dump()
     assert first.notes == second.notes
     assert [x.error for x in first.shares] == [x.error for x in second.shares]
+
+
+@pytest.mark.parametrize("elements", [None, [8, 2, 1]])
+def test_links_of_trials_are_those_of_the_run_and_not_made_again(
+    elements: list[int] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raw = arm(model="solid", **({"mesh": {"elements": elements}} if elements else {}))
+    plan = planned(scene_from(raw))
+    fresh = meshed(plan.scene).model.links
+    monkeypatch.setattr("kedfem.links.build.bare_link", None)
+    taken = meshed(plan.scene, known=plan.links).model.links
+    for one, other in zip(fresh, taken, strict=True):
+        assert (one.K0 != other.K0).nnz == 0
+        assert np.array_equal(one.X, other.X)
 
 
 def test_a_start_that_no_step_resolves_is_said() -> None:

@@ -7,8 +7,8 @@ simpler links by putting them in. What the scene states stays; what it leaves op
 """
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -38,6 +38,7 @@ from kedfem.accuracy.variants import (
     with_links,
 )
 from kedfem.errors import KedfemError
+from kedfem.links.record import Link
 from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept
 
@@ -69,6 +70,7 @@ class Plan:
     finer : of the usual meshes, by which factor elements are smaller
     shares : parts of the error; the reduction's is what it may cause
     notes : what was tried, left out, and what limits the accuracy
+    links : of its trials, those that the scene has; not kept between runs
     """
 
     scene: Scene
@@ -76,6 +78,7 @@ class Plan:
     finer: float
     shares: tuple[Share, ...]
     notes: tuple[str, ...]
+    links: Mapping[str, Link] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def error(self) -> float:
@@ -129,12 +132,20 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     asked = scene.analysis.accuracy
     if asked == "quick":
         raise ValueError("the scene asks for no accuracy")
-    plan: Plan = kept("plan", key(scene), partial(_planned, scene, asked, stage), itself, itself)
+    search = Trials(asked, stage)
+    plan: Plan = kept(
+        "plan", key(scene), partial(_planned, search, scene), lambda plan: replace(plan, links={}), itself
+    )
     return plan
 
 
-def _planned(scene: Scene, asked: float, stage: Stage) -> Plan:
-    search = Trials(asked, stage)
+def _planned(search: Trials, scene: Scene) -> Plan:
+    plan = _chosen(search, scene)
+    return replace(plan, links=search.links_of(plan.scene))
+
+
+def _chosen(search: Trials, scene: Scene) -> Plan:
+    asked, stage = search.asked, search.stage
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)
     left_open = [name for name, link in scene.links.items() if link.model == "auto"]

@@ -1,13 +1,15 @@
 """A scene with everything that does not need a time step, and the key that what was found for it is kept under."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import drive_range
+from kedfem.links.build import bare_links
+from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
@@ -25,8 +27,14 @@ class Prepared:
     model: Model
 
 
-def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Prepared:
+def meshed(
+    scene: Scene, stage: Callable[[str], None] = lambda name: None, known: Mapping[str, Link] | None = None
+) -> Prepared:
     """Rigid path and elastic model of a scene with all its links unreduced; nothing is solved.
+
+    Parameters
+    ----------
+    known : links that are made already, by name; the others are meshed
 
     Raises
     ------
@@ -35,7 +43,10 @@ def meshed(scene: Scene, stage: Callable[[str], None] = lambda name: None) -> Pr
     stage("motion")
     joined, along = moving(scene)
     stage("mesh and matrices")
-    return Prepared(scene, joined, along, elastic_model(scene, joined, along=along))
+    made = known or {}
+    every = {**made, **bare_links(scene, [name for name in scene.links if name not in made])}
+    bare = {name: every[name] for name in scene.links if name in every}
+    return Prepared(scene, joined, along, elastic_model(scene, joined, bare, along))
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:

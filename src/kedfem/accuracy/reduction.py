@@ -12,7 +12,7 @@ Of links with co-rotational frames each segment is reduced, with modes that rigi
 the error have co-rotational frames. Of the residual in their frames only what moments do in turning these is left out.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -71,13 +71,17 @@ class Reduction:
 
 
 def prepared(
-    scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
+    scene: Scene,
+    stage: Stage = lambda name: None,
+    ends: Sequence[Scene] = (),
+    known: Mapping[str, Link] | None = None,
 ) -> tuple[Prepared, Reduction | None]:
     """Everything of a scene that does not need a time step; links that ask for it are reduced.
 
     Parameters
     ----------
     ends : scenes that share their modes with this one, as `alike` says; none: it has its own
+    known : links that are made already, by name: of this scene, or of all that share modes
 
     Raises
     ------
@@ -85,14 +89,14 @@ def prepared(
     """
     chosen = {name: link.modes for name, link in scene.links.items() if link.reduced}
     if not chosen:
-        return meshed(scene, stage), None
+        return meshed(scene, stage, known), None
     counts = {name: count for name, count in chosen.items() if count is not None}
 
     def found_for(one: Scene, *others: Scene) -> Reduction:
         tolerance = one.analysis.reduction_tolerance
         return kept(
             "reduction", " ".join(map(key, (one, *others))),
-            lambda: reduced(meshed(one, stage), chosen, tolerance, counts, stage, others),
+            lambda: reduced(meshed(one, stage, known), chosen, tolerance, counts, stage, others),
             _packed, lambda stored: _unpacked(stored, one),
         )  # fmt: skip
 

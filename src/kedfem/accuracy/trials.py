@@ -90,6 +90,11 @@ class Trials:
         self.links |= {texts[name]: link for name, link in fresh.items()}
         return {name: self.links[text] for name, text in texts.items()}
 
+    def links_of(self, scene: Scene) -> dict[str, Link]:
+        """Those links of a scene that trial runs had, by name: with the same meshes and matrices."""
+        known = ((name, self.links.get(_text(scene, name))) for name in scene.links)
+        return {name: link for name, link in known if link is not None}
+
     def _reduced(self, full: Prepared) -> Prepared:
         """With the modes of links that an earlier trial had too: the difference is then of the others alone."""
         texts = _texts(full)

@@ -63,7 +63,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     loaded, assembly = assembled(with_plain_defaults(read) if quick else read)
     with stages() as stage:
         plan = plan_for(loaded, stage)
-        ready, reduction = prepared(plan.scene if plan else loaded, stage)
+        ready, reduction = prepared(plan.scene, stage, known=plan.links) if plan else prepared(loaded, stage)
     found = sizes(loaded, ready.model)
     out.print(size_line(found), markup=False, soft_wrap=True)
     show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
