@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.stepping.literal import rotated_stiffness
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
-from kedfem.links.beams.section import Section, cowper, rectangle, torsion_stress, tube
+from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import (
     HUB_INERTIA,
     rigidities,
@@ -219,48 +219,3 @@ def test_port_weights_of_a_hub_reproduce_affine_fields_and_commute_with_rotation
         )
         there = port_weights(joint_seat(turned, "joints.A", turned.nodes[-k], None), points @ motion.R.T)
         np.testing.assert_allclose(there, W, atol=1e-11)
-
-
-# -- sections -------------------------------------------------------------------------------------------------
-
-
-def moment_of_torsion(section: Section, y: np.ndarray, z: np.ndarray, dA: np.ndarray) -> float:
-    """∫ (y σ_xz − z σ_xy) dA per G and twist."""
-    stress = np.array([torsion_stress(section, *point) for point in zip(y, z, strict=True)])
-    return float(np.sum((y * stress[:, 1] - z * stress[:, 0]) * dA))
-
-
-@pytest.mark.parametrize(("h", "t"), [(0.03, 0.03), (0.05, 0.02), (0.02, 0.1)])
-def test_torsion_constant_of_a_rectangle_is_the_moment_of_its_stresses(h: float, t: float) -> None:
-    r, w = np.polynomial.legendre.leggauss(40)
-    y, z = (g.ravel() for g in np.meshgrid(h / 2 * r, t / 2 * r, indexing="ij"))
-    section = rectangle(h, t)
-    moment = moment_of_torsion(section, y, z, np.outer(w, w).ravel() * h * t / 4)
-    assert moment == pytest.approx(section.torsion_constant, rel=1e-4)  # the series at the edges
-
-
-@pytest.mark.parametrize(("ratio", "J", "most"), [(1, 0.1406, 0.675), (2, 0.229, 0.930), (10, 0.312, 1.000)])
-def test_torsion_of_a_rectangle_is_the_published(ratio: float, J: float, most: float) -> None:
-    """Timoshenko and Goodier, Theory of Elasticity, table of §109: J = k1 a b³, τ_max = k G θ b amid the long side."""
-    wide, upright = rectangle(0.01 * ratio, 0.01), rectangle(0.01, 0.01 * ratio)
-    for section in (wide, upright):
-        assert section.torsion_constant == pytest.approx(J * ratio * 0.01**4, rel=2e-3)
-    assert abs(torsion_stress(wide, 0, 0.005)[0]) == pytest.approx(most * 0.01, rel=2e-3)
-    assert abs(torsion_stress(upright, 0.005, 0)[1]) == pytest.approx(most * 0.01, rel=2e-3)
-    for corner in (
-        torsion_stress(wide, 0.005 * ratio, 0.005),
-        torsion_stress(wide, 0.005 * ratio, 0.002)[:1],
-    ):
-        np.testing.assert_allclose(corner, 0, atol=1e-4)  # of 0.01: nothing crosses the edge
-
-
-def test_sections_of_circles() -> None:
-    """A tube is a circle less a circle; J = ∫ r² dA; κ of Cowper: 0.8864 solid, 0.5306 thin, ν = 0.3."""
-    whole, bore, ring = tube(0.05, 0, 0.9), tube(0.03, 0, 0.9), tube(0.05, 0.03, 0.6)
-    assert ring.area == pytest.approx(whole.area - bore.area)
-    assert ring.second_moment == pytest.approx(whole.second_moment - bore.second_moment)
-    assert ring.torsion_constant == pytest.approx(ring.second_moment + ring.second_moment_z)
-    assert whole.second_moment == pytest.approx(np.pi * 0.05**4 / 64)
-    assert torsion_stress(ring, 0.02, 0.01) == (-0.01, 0.02)
-    assert cowper(0.3, 0.0) == pytest.approx(6 * 1.3 / (7 + 1.8))
-    assert cowper(0.3, 1.0) == pytest.approx(2 * 1.3 / (4 + 0.9))

@@ -63,7 +63,9 @@ from kedfem.scene.records.materials import Material
 from kedfem.scene.records.outlines import Arc, Hole
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.sections import (
+    BoxSection,
     ConstantsSection,
+    ISection,
     RectangleSection,
     RoundSection,
     SectionShape,
@@ -92,6 +94,7 @@ __all__ = [
     "Bar",
     "Body",
     "BodyLoad",
+    "BoxSection",
     "Cad",
     "ChosenFace",
     "ConstantSpeed",
@@ -110,6 +113,7 @@ __all__ = [
     "Gear",
     "Harmonic",
     "Hole",
+    "ISection",
     "InitialMotion",
     "Joint",
     "Limit",

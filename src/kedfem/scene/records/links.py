@@ -111,7 +111,7 @@ class LinkScene(Record):
     """least scaled Jacobian of the elements of a solid or plane link; if not given 0.1, of tetrahedra 0: det J > 0 all
     over"""
     shear_coefficient: Annotated[float, Quantity("1", above=0.0, most=1.0)] | None = None
-    """part of the section that carries the shear force of a beam; if not given: 5/6, Cowper's of circles"""
+    """part of the section that carries the shear force; if not given: 5/6, Cowper's of circles, boxes and webs"""
     beam: Literal["planar", "spatial"] | None = None
     """what moves of a beam: (u, v, ψ) in a plane z = constant, or all in space; if not given, planar where it can be"""
     frames: Frames | None = None

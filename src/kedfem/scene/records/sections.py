@@ -50,6 +50,51 @@ class TubeSection(Record):
         return self
 
 
+class BoxSection(Record):
+    """A rectangular tube."""
+
+    kind: Literal["box"] = "box"
+    width: PositiveLength
+    """outer extent across the line, in the xy plane unless `up` says otherwise"""
+    thickness: PositiveLength
+    """outer extent across line and width"""
+    wall: PositiveLength
+    """thickness of all four walls, less than half the smaller extent"""
+
+    @model_validator(mode="after")
+    def _hollow(self) -> Self:
+        half = min(self.width, self.thickness) / 2
+        message = f"must be less than half the smaller extent {half:.6g} [m], got {self.wall:.6g}"
+        refuse([Fault(("wall",), message)] if self.wall >= half else [])
+        return self
+
+
+class ISection(Record):
+    """An I or H profile: two equal flanges and the web between them, sharp corners; twisted, it warps freely."""
+
+    kind: Literal["i"] = "i"
+    width: PositiveLength
+    """over both flanges, along the web: across the line, in the xy plane unless `up` says otherwise"""
+    thickness: PositiveLength
+    """of the whole section, across line and width: how wide the flanges are"""
+    web: PositiveLength
+    """how thick the web is, less than the section"""
+    flange: PositiveLength
+    """how thick each flange is, less than half the width"""
+
+    @model_validator(mode="after")
+    def _of_walls(self) -> Self:
+        found = []
+        if self.web >= self.thickness:
+            message = f"must be less than the thickness {self.thickness:.6g} [m], got {self.web:.6g}"
+            found.append(Fault(("web",), message))
+        if self.flange >= self.width / 2:
+            message = f"must be less than half the width {self.width / 2:.6g} [m], got {self.flange:.6g}"
+            found.append(Fault(("flange",), message))
+        refuse(found)
+        return self
+
+
 class ConstantsSection(Record):
     """Any section with two principal axes, by its constants; its shear stresses are not known."""
 
@@ -73,5 +118,6 @@ class ConstantsSection(Record):
 
 
 SectionShape = Annotated[
-    RectangleSection | RoundSection | TubeSection | ConstantsSection, Field(discriminator="kind")
+    RectangleSection | RoundSection | TubeSection | BoxSection | ISection | ConstantsSection,
+    Field(discriminator="kind"),
 ]
