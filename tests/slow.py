@@ -12,13 +12,15 @@ from pathlib import Path
 
 MOST = 180.0  # seconds of all workers together: with shorter tests less than 5 minutes of two
 LIST = Path(__file__).with_name("slow.txt")
+STUDIES = Path(__file__).with_name("studies.txt")
+"""Tests that .ci/run leaves out too: dear kinds of what cheaper kinds show as well."""
 LINE = re.compile(r"(\d+\.\d+)s (?:call|setup|teardown) +(\S.*)")
 HEAD = "# Tests that the default run leaves out; written by `python -m tests.slow`\n"
 
 
-def slow_tests() -> frozenset[str]:
-    """Names of the tests that are listed."""
-    return frozenset(LIST.read_text(encoding="utf-8").splitlines()[1:]) if LIST.exists() else frozenset()
+def listed(file: Path) -> frozenset[str]:
+    """Names of the tests in a list."""
+    return frozenset(file.read_text(encoding="utf-8").splitlines()[1:]) if file.exists() else frozenset()
 
 
 def slowest(log: str, most: float = MOST) -> list[str]:

@@ -1,4 +1,4 @@
-"""The list of tests that the default run leaves out."""
+"""The lists of tests that the default run, and `.ci/run`, leave out."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.slow import slow_tests, slowest
+from tests.slow import LIST, STUDIES, listed, slowest
 
 LOG = """
 3.00s call     tests/a.py::test_one[some, thing]
@@ -28,4 +28,5 @@ def test_all_that_are_listed_exist() -> None:
     """A test that has another name now would be in the default run, and nobody would see it."""
     asked = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", ""]
     found = subprocess.run(asked, cwd=Path(__file__).parents[1], check=True, capture_output=True, text=True)
-    assert slow_tests() - set(found.stdout.splitlines()) == set()
+    assert (listed(LIST) | listed(STUDIES)) - set(found.stdout.splitlines()) == set()
+    assert not listed(LIST) & listed(STUDIES)
