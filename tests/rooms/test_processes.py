@@ -14,6 +14,7 @@ import pytest
 
 import kedfem
 from kedfem.errors import MeshError
+from kedfem.mesh import isolated
 from kedfem.mesh.isolated import LONGEST, PART, apart, side_by_side
 from kedfem.processes import BLAS_THREADS, POLL, at_most
 
@@ -98,6 +99,22 @@ def test_a_part_that_hangs_as_it_is_read_is_tried_in_three_processes(tmp_path: P
     ):
         apart("part", PART, LONGEST, reading, file, 9)
     assert file.read_text() == "xxx"
+
+
+def test_a_part_that_breaks_down_after_a_rest_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process that waited has ended by then; that of the next one's end is seen too."""
+    monkeypatch.setattr("kedfem.mesh.isolated.IDLE", 0.2)
+    monkeypatch.setattr("kedfem.mesh.isolated.PATIENCE", 60)
+    file = tmp_path / "tries"
+    for hangs, expected in ((0, 1), (1, 2)):
+        file.write_text("")
+        assert apart("part", PART, LONGEST, reading, file, hangs) == expected
+        assert within(30.0, lambda: not isolated._idle)
+    file.write_text("")
+    with pytest.raises(MeshError, match="had not read in time"):
+        apart("part", PART, LONGEST, reading, file, 9)
 
 
 def together(here: Path, other: Path) -> int:

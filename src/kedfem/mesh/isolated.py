@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Timer
 from typing import Any, TypeVar
 
 from kedfem.errors import MeshError
@@ -17,6 +18,7 @@ from kedfem.processes import LATE, bounded, end_with_parent, threads
 LONGEST = 180  # seconds of processor time after which a part is given up
 READING = 60  # seconds of processor time after which a mesh file is given up
 TRIES = 3  # processes that are tried with a part that cannot be read in time
+IDLE = 180  # seconds after which a process that has no work is ended
 AGAIN = 0.05  # seconds between two tries to end what is not wanted any more
 MOST_MEMORY = 6e9  # bytes that the process may hold
 PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
@@ -47,7 +49,22 @@ class _Worker:
 
         with suppress(IndexError):
             return _idle.pop()
-        return cls(ProcessPoolExecutor(max_workers=1, timeout=LONGEST))
+        return cls(ProcessPoolExecutor(max_workers=1))
+
+    def rest(self) -> None:
+        """Wait for more work, for IDLE seconds.
+
+        By loky's own `timeout` the next process would begin while loky looks at none, and its end would not be seen.
+        """
+        _idle.append(self)
+        timer = Timer(IDLE, self._left)
+        timer.daemon = True
+        timer.start()
+
+    def _left(self) -> None:
+        with suppress(ValueError):  # it has work again
+            _idle.remove(self)
+            self.end()
 
     def end(self) -> None:
         """End the process at once."""
@@ -116,7 +133,7 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
         finally:
             _busy.remove(worker)
             if not worker.ended:
-                _idle.append(worker)
+                worker.rest()
     wanted, advice = words
     raise MeshError(f"{where}: {wanted}, {reason}; {advice}")
 
