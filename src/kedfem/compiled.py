@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import event
+from numba.core import codegen, event
 
 from kedfem.digests import drop_changed, note
 from kedfem.folders import KERNELS, compiled_folder
@@ -95,11 +95,44 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
                 save(key, code)
 
         file.save = alone
+        begin, part = dispatcher.compile, "no_cpython_wrapper" in options
+
+        def noted(types: object) -> Any:
+            _parts.append(part)
+            try:
+                return begin(types)
+            finally:
+                _parts.pop()
+
+        dispatcher.compile = noted
         return dispatcher
 
     return compiles
 
 
+_parts: list[bool] = []
+"""Of functions that are being compiled, the innermost last: whether it is only ever a part of others."""
+
+
+def _optimise_wholes_only() -> None:
+    """Let numba optimise compiled loops with all that they call, and not what they call before that.
+
+    It is optimised again as a part of each loop: the loops are as fast, and compiled in three quarters of the time. What
+    numba compiles for others stays as it is.
+    """
+    library: Any = codegen.CPUCodeLibrary
+    if not hasattr(library, "_optimize_final_module"):
+        return
+    optimise = library._optimize_final_module
+
+    def if_whole(self: Any) -> None:
+        if not (_parts and _parts[-1]):
+            optimise(self)
+
+    library._optimize_final_module = if_whole
+
+
+_optimise_wholes_only()
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 _FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
 compiled = _kept(_FAST)
