@@ -80,7 +80,7 @@ def exported_link(scene: Scene, name: str, stage: Callable[[str], None] = lambda
             'frames: take `frames = "rigid-body"`'
         )
         raise SceneError([Fault(("analysis", "frames"), wanted)])
-    ready, _ = prepared(scene, stage)
+    ready, _ = prepared(scene, stage, known=plan.links if plan else {})
     found = segments(ready.model)
     if name not in found:
         raise SceneError(f"--link: must be an elastic link, got '{name}', which moves as a rigid body")
