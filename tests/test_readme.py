@@ -13,6 +13,7 @@ from kedfem.analysis import Run
 from kedfem.mesh.session import SYSTEM_PACKAGES
 from kedfem.results import Peak, Results
 from kedfem.scene import read_scene, scene_from
+from tests.slow import STUDIES, listed
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -103,7 +104,8 @@ def test_ci_begins_with_the_readmes_tests_and_runs_every_example() -> None:
     script = (ROOT / ".ci/run").read_text(encoding="utf-8")
     steps = [line for line in script.splitlines() if line.startswith(("scripts/", ".venv/"))]
     assert steps[0].split()[0] == commands()[1]
-    assert any(line.startswith("scripts/test -m long") for line in steps)  # the examples are among these
+    assert any(line.startswith('scripts/test -m "long and not study"') for line in steps)
+    assert not any("test_examples" in name for name in listed(STUDIES))  # the examples are among these
 
 
 def test_python_of_pyproject_is_python_of_readme_and_setup() -> None:
