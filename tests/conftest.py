@@ -91,13 +91,11 @@ def pytest_runtest_setup() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests of laws and numbers that are no long studies, which .ci/run repeats with other BLAS and numba kernels;
     then those that the default run leaves out as they are slow, and those that .ci/run leaves out too."""
-    slow, studies = listed(LIST), listed(STUDIES)
+    lists = {"slow": listed(LIST), "study": listed(STUDIES)}
     for item in items:
         if item.path.parent.name in NUMERICAL and not item.get_closest_marker("long"):
             item.add_marker("kernels")
-        if item.nodeid in slow:
-            item.add_marker("slow")
-        if item.nodeid in studies:
-            item.add_marker("study")
-        if item.nodeid in slow | studies:
-            item.add_marker("long")
+        for mark, names in lists.items():
+            if item.nodeid in names:
+                item.add_marker(mark)
+                item.add_marker("long")

@@ -26,11 +26,11 @@ from kedfem.links.beams.section import (
 )
 from kedfem.scene import BoxSection, ISection, SectionShape
 
-BOX = BoxSection(width=0.06, thickness=0.04, wall=0.004)
-I = ISection(width=0.1, thickness=0.06, web=0.005, flange=0.008)  # noqa: E741
 WALLS = {
-    "box": BOX, "upright box": BoxSection(width=0.04, thickness=0.06, wall=0.004),
-    "square": BoxSection(width=0.05, thickness=0.05, wall=0.003), "i": I,
+    "box": BoxSection(width=0.06, thickness=0.04, wall=0.004),
+    "upright box": BoxSection(width=0.04, thickness=0.06, wall=0.004),
+    "square": BoxSection(width=0.05, thickness=0.05, wall=0.003),
+    "i": ISection(width=0.1, thickness=0.06, web=0.005, flange=0.008),
     "wide flanges": ISection(width=0.08, thickness=0.08, web=0.006, flange=0.006),
 }  # fmt: skip
 NU = 0.3

@@ -8,7 +8,6 @@ from hashlib import sha256
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.nominal import drive_range
-from kedfem.links.build import bare_links
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
@@ -43,10 +42,7 @@ def meshed(
     stage("motion")
     joined, along = moving(scene)
     stage("mesh and matrices")
-    made = known or {}
-    every = {**made, **bare_links(scene, [name for name in scene.links if name not in made])}
-    bare = {name: every[name] for name in scene.links if name in every}
-    return Prepared(scene, joined, along, elastic_model(scene, joined, bare, along))
+    return Prepared(scene, joined, along, elastic_model(scene, joined, known, along))
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:

@@ -85,10 +85,9 @@ class Trials:
         return self.motion
 
     def _bare(self, scene: Scene) -> dict[str, Link]:
-        texts = {name: _text(scene, name) for name, link in scene.links.items() if link.shape is not None}
-        fresh = bare_links(scene, [name for name, text in texts.items() if text not in self.links])
-        self.links |= {texts[name]: link for name, link in fresh.items()}
-        return {name: self.links[text] for name, text in texts.items()}
+        bare = bare_links(scene, self.links_of(scene))
+        self.links |= {_text(scene, name): link for name, link in bare.items()}
+        return bare
 
     def links_of(self, scene: Scene) -> dict[str, Link]:
         """Those links of a scene that trial runs had, by name: with the same meshes and matrices."""

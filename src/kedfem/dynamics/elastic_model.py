@@ -52,14 +52,14 @@ from kedfem.scene.checks.capabilities import SLIDERS
 
 
 def elastic_model(
-    scene: Scene, linkage: Linkage, bare: Mapping[str, Link] | None = None, along: Path | None = None,
+    scene: Scene, linkage: Linkage, known: Mapping[str, Link] | None = None, along: Path | None = None,
     elements: bool = False,
 ) -> Model:  # fmt: skip
     """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
 
     Parameters
     ----------
-    bare : `bare_links` of the scene, if they are there already
+    known : `bare_links` of the scene that are made already
     along : the linkage's path over the drive's range, needed with slots
     elements : whether springs, motors and rigid links get interface points, as a system has them
 
@@ -70,7 +70,7 @@ def elastic_model(
     SceneError
         If a load or body does not fit its link.
     """
-    cut = {name: parted(scene, name, link) for name, link in (bare or bare_links(scene)).items()}
+    cut = {name: parted(scene, name, link) for name, link in bare_links(scene, known).items()}
     links = {
         key: part
         for name, link in cut.items()

@@ -1,6 +1,6 @@
 """Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 
 import numpy as np
@@ -35,25 +35,25 @@ from kedfem.scene import (
 SEGMENTS = 6  # of a solid or plane link with co-rotational frames, where none are given
 
 
-def bare_links(scene: Scene, wanted: Collection[str] | None = None) -> dict[str, Link]:
+def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[str, Link]:
     """Records of all links that have a shape, without attached bodies; rigid ones still elastic.
 
     Parameters
     ----------
-    wanted : names of those that are asked for, if not all
+    known : those that are made already, by name
 
     Raises
     ------
     MeshError
         If a link cannot be meshed well enough.
     """
-    names = [
-        name
-        for name, link in scene.links.items()
-        if link.shape is not None and (wanted is None or name in wanted)
-    ]
-    spatial, meshes = spatial_beams(scene), part_meshes(scene, names)
-    return {name: bare_link(scene, name, spatial, meshes.get(name)) for name in names}
+    made = known or {}
+    names = [name for name, link in scene.links.items() if link.shape is not None]
+    spatial, meshes = spatial_beams(scene), part_meshes(scene, [name for name in names if name not in made])
+    return {
+        name: made[name] if name in made else bare_link(scene, name, spatial, meshes.get(name))
+        for name in names
+    }
 
 
 def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:

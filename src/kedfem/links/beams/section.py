@@ -9,12 +9,8 @@ from jaxtyping import Float, Int
 from kedfem.scene import BoxSection, ISection, RectangleSection, RoundSection, SectionShape, TubeSection
 
 EDGE = 1e-9  # of a wall: points on its edge are in it
-CORNER = 4 * (
-    1 - 0.5587
-)  # walls by which a flow round four corners is shorter than its middle line: of a square 0.5587
-ROUND = (
-    0.41  # walls squared by which it encloses less: measured by finite elements (tests/laws/test_sections.py)
-)
+CORNER = 4 * (1 - 0.5587)  # walls by which a flow round four corners is shorter than its middle line
+ROUND = 0.41  # walls squared by which it encloses less, measured (tests/laws/test_sections.py)
 TERMS = 200  # of the series of a rectangle in torsion: stress to 1e-5 on its edges, far better inside
 
 
@@ -150,19 +146,19 @@ def cowper(poisson_ratio: float, m: float) -> float:
 def cowper_box(poisson_ratio: float, height: float, thickness: float) -> float:
     """Shear coefficient along the height of a box with equal thin walls, by its middle line: Cowper (1966)."""
     nu, m = poisson_ratio, thickness / height
-    across = 10 * m**2 * ((3 + nu) * m + 3 * m**2)
-    return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (_thin_walls(nu, m) + across)
+    return _thin_walled(nu, m, 10 * m**2 * ((3 + nu) * m + 3 * m**2))
 
 
 def cowper_i(poisson_ratio: float, height: float, thickness: float, web: float, flange: float) -> float:
     """Shear coefficient along the web of an I with thin walls, height between the flanges' middles: Cowper (1966)."""
     nu, m, n = poisson_ratio, 2 * thickness * flange / (height * web), thickness / height
-    across = 30 * n**2 * (m + m**2) + 5 * nu * n**2 * (8 * m + 9 * m**2)
-    return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (_thin_walls(nu, m) + across)
+    return _thin_walled(nu, m, 30 * n**2 * (m + m**2) + 5 * nu * n**2 * (8 * m + 9 * m**2))
 
 
-def _thin_walls(nu: float, m: float) -> float:
-    return 12 + 72 * m + 150 * m**2 + 90 * m**3 + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
+def _thin_walled(nu: float, m: float, across: float) -> float:
+    """What Cowper's coefficients of a box and an I share; `across` is what their flanges' width adds."""
+    walls = 12 + 72 * m + 150 * m**2 + 90 * m**3 + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
+    return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (walls + across)
 
 
 def rectangle_torsion(height: float, thickness: float) -> float:

@@ -121,15 +121,15 @@ class Look:
         self.left_out = int(out.sum())
         self.surface = FreeSurface(whole.places[~out], whole.axes[~out])
         highest, apart = 0.0, 0.0
-        for which in self.chunks(1):
+        for which in self.chunks(6):
             A = self.parts[self.surface.places[which]]
             highest = max(highest, _largest(_histories(A, self.C)))
             apart = max(apart, _largest(_histories(A, self.gone)))
         self.highest, self.repeats = highest, apart / highest if highest else 0.0
 
-    def chunks(self, planes: int = PLANES) -> Iterator[slice]:
-        """Some points at a time."""
-        size = max(1, CHUNK // (8 * max(planes, 6) * max(len(self.C), len(self.gone))))
+    def chunks(self, each: int = PLANES) -> Iterator[slice]:
+        """Some points at a time, of which each has so many histories."""
+        size = max(1, CHUNK // (8 * each * max(len(self.C), len(self.gone))))
         return (slice(k, k + size) for k in range(0, len(self.surface.places), size))
 
     def judged(self, which: slice | list[int]) -> Judged:

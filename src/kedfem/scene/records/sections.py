@@ -44,9 +44,7 @@ class TubeSection(Record):
 
     @model_validator(mode="after")
     def _hollow(self) -> Self:
-        half = self.diameter / 2
-        message = f"must be less than half the diameter {half:.6g} [m], got {self.wall:.6g}"
-        refuse([Fault(("wall",), message)] if self.wall >= half else [])
+        refuse(_too_thick("wall", self.wall, "half the diameter", self.diameter / 2))
         return self
 
 
@@ -64,8 +62,7 @@ class BoxSection(Record):
     @model_validator(mode="after")
     def _hollow(self) -> Self:
         half = min(self.width, self.thickness) / 2
-        message = f"must be less than half the smaller extent {half:.6g} [m], got {self.wall:.6g}"
-        refuse([Fault(("wall",), message)] if self.wall >= half else [])
+        refuse(_too_thick("wall", self.wall, "half the smaller extent", half))
         return self
 
 
@@ -84,14 +81,8 @@ class ISection(Record):
 
     @model_validator(mode="after")
     def _of_walls(self) -> Self:
-        found = []
-        if self.web >= self.thickness:
-            message = f"must be less than the thickness {self.thickness:.6g} [m], got {self.web:.6g}"
-            found.append(Fault(("web",), message))
-        if self.flange >= self.width / 2:
-            message = f"must be less than half the width {self.width / 2:.6g} [m], got {self.flange:.6g}"
-            found.append(Fault(("flange",), message))
-        refuse(found)
+        web = _too_thick("web", self.web, "the thickness", self.thickness)
+        refuse(web + _too_thick("flange", self.flange, "half the width", self.width / 2))
         return self
 
 
@@ -115,6 +106,12 @@ class ConstantsSection(Record):
     """part of the area that carries a shear force along y"""
     shear_coefficient_thickness: ShearCoefficient = 5.0 / 6.0
     """part of the area that carries a shear force along z"""
+
+
+def _too_thick(key: str, wall: float, name: str, limit: float) -> list[Fault]:
+    """A fault where a wall is not thinner than what has room for it, which has a name."""
+    message = f"must be less than {name} {limit:.6g} [m], got {wall:.6g}"
+    return [Fault((key,), message)] if wall >= limit else []
 
 
 SectionShape = Annotated[
