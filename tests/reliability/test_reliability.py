@@ -75,11 +75,11 @@ def test_what_was_found_once_is_not_found_again(finding: dict[str, str], tmp_pat
 
 @pytest.mark.long
 def test_many_scenes_and_files(tmp_path: Path) -> None:
-    """A twentieth of the validations and files that the command tries; of its runs, which take seconds each, some."""
+    """A fortieth of the validations and files that the command tries; of its runs, which take seconds each, some."""
     tally = fuzz.Tally()
     with np.errstate(all="ignore"):
-        fuzz.validate_scenes(tally, 500, seed=3)
-        fuzz.damaged_files(tally, 100, 3, tmp_path)
+        fuzz.validate_scenes(tally, 250, seed=3)
+        fuzz.damaged_files(tally, 50, 3, tmp_path)
         fuzz.run_scenes(tally, 4, 3, tmp_path, ("spinning_bar", "four_bar_beams"))
     assert not tally.findings, tally.page()
 
